@@ -76,14 +76,16 @@ fn codes_that_are_no_reading_are_left_out_and_written_down() {
     }
     std::fs::write(at("codes.csv"), text).unwrap();
     let (source, toml) = (at("codes.csv"), at("codes.toml"));
-    let first = ["calibrate", "--body", "hand", "--source", &source, "--rest", "1.2", "-o", &toml];
+    let body = at("grid.glb");
+    done(&["author", "--grid", "3x4", "--pitch", "5mm", "-o", &body]);
+    let first = ["calibrate", "--body", &body, "--source", &source, "--rest", "1.2", "-o", &toml];
     done(&[&first[..], &["--missing", "30000"]].concat());
     let written = std::fs::read_to_string(&toml).unwrap();
     assert!(written.contains("missing = [30000.0]") && written.contains("invert = true"), "{written}");
-    let run = ["run", "--body", "hand", "--source", &source, "--calibration", &toml, "--backend", "cpu"];
+    let run = ["run", "--body", &body, "--source", &source, "--calibration", &toml, "--backend", "cpu"];
     let all = frames(&done(&[&run[..], &["--outputs", "total", "--all-fields", "--verify"]].concat()));
     let flagged = all.iter().filter(|frame| frame["fields"].to_string().contains("incomplete")).count();
-    assert_eq!(flagged, all.len(), "of a body of forty taxels, twelve deliver anything");
+    assert!(flagged > 0 && flagged < all.len() / 2, "{flagged} of {} frames have a code", all.len());
     // A pressed sensor gives 40000; a code is nothing.
     let totals = all.iter().flat_map(|frame| frame["fields"].as_array().unwrap()).filter_map(|f| f["total"].as_f64());
     let largest = totals.fold(0.0, f64::max);

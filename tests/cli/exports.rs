@@ -125,10 +125,10 @@ fn what_was_understood_of_a_plain_table_is_said_in_a_line() {
     let info = output(&[&["info", text_of(&path), "--json"][..], &grid].concat());
     assert_eq!((info.status.code(), stderr(&info)), (Some(0), understood.clone()));
     let known: Value = serde_json::from_slice(&info.stdout).unwrap();
-    assert_eq!((&known["frames"], known["duration"].as_f64()), (&3.into(), Some(0.1)), "{known}");
+    assert!(known["frames"] == 3 && (known["duration"].as_f64().unwrap() - 0.1).abs() < 1e-9, "{known}");
     let asked = [&["run", "--backend", "cpu", "--source", text_of(&path), "--outputs", "speed"][..], &grid].concat();
     let ran = output(&asked);
-    assert_eq!((ran.status.code(), stderr(&ran)), (Some(0), understood));
+    assert!(ran.status.success() && stderr(&ran).starts_with(&understood), "{}", stderr(&ran));
     // Without flags, the way out is named.
     let why = fails(1, &["info", text_of(&path)]);
     assert!(why.contains("column 2 is headed `a`") && why.contains("--grid 2x2") && why.lines().count() == 1, "{why}");

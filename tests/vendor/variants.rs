@@ -285,6 +285,13 @@ fn columns_of_a_plain_table_that_are_no_sensors_are_recognised_or_refused() {
     let gait = [row("0.00", 199.1), row("0.01", 199.1), row("0.02", 197.12)].concat();
     let all = read(&gait, [1, 6]).unwrap();
     assert_eq!(singles(&all.frames[2].1), [197.12, 87.34, 91.08, 24.09, 163.9, 79.86]);
+    // Nor is a total that stays a label, so that the time would be a sensor.
+    assert!(read(&gait, [1, 8]).unwrap_err().contains("as to 1x6"));
+    let above = "Rectangle width\n20\nFrame 0 (0.00 ms)\n1 2 3\n4 5 6\n\nFrame 1 (2.00 ms)\n1 2 3\n4 5 7\n";
+    let blocks = VendorOptions { grid: Some([2, 3]), rate_hz: Some(500.0), ..VendorOptions::default() };
+    assert_eq!(read_bytes("a.txt", above.as_bytes(), &blocks).unwrap().frames.len(), 2);
+    let why = read_bytes("a.txt", above.as_bytes(), &VendorOptions::default()).unwrap_err().to_string();
+    assert!(why.contains("as --grid 2x3;"), "{why}");
     let why = read(&gait, [2, 4]).unwrap_err();
     let known = "column 1 is the time, and columns 8 and 9 are the totals of columns 2 to 4 and of columns 5 to 7";
     assert!(why.contains(known) && why.contains("as to 2x3"), "{why}");

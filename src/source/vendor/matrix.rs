@@ -3,7 +3,7 @@
 
 use super::super::time_column::TimeColumn;
 use super::layout::{Grid, Layout, next_value};
-use super::matrix_columns::{Columns, begins_row, is_row, recognise};
+use super::matrix_columns::{Columns, begins_row, is_narrow, is_row, recognise};
 use super::parser::{Parser, Rate};
 use super::text::Separator;
 use crate::error::{Result, failed};
@@ -119,7 +119,7 @@ impl Parser for Matrix {
         let is_between = self.row == 0 && !has_time && !matches!(self.shape, Some(Shape::Line { .. }));
         let is_row = match self.has_begun {
             true => self.separator.cells(line).next().is_some_and(begins_row),
-            false => is_row(self.separator, line),
+            false => is_row(self.separator, line, is_narrow(self.grid)),
         };
         let is_blank = line.trim_ascii().is_empty();
         let is_above = !self.has_begun && !is_row;

@@ -44,22 +44,26 @@ pub(super) fn begins_row(word: Word<'_>) -> bool {
     word.number().is_some() || word.is_empty() || calendar(&word.text()).is_some()
 }
 
-/// Whether `line` is a row: it begins as one, and has a number.
-pub(super) fn is_row(separator: Separator, line: &[u8]) -> bool {
+/// Whether `line` is a row of a table whose rows have several cells, unless `is_narrow`: it begins as one, and has a number. A
+/// number alone above a wide table is part of what is said above it.
+pub(super) fn is_row(separator: Separator, line: &[u8], is_narrow: bool) -> bool {
     let mut cells = separator.cells(line);
-    cells.clone().next().is_some_and(begins_row) && cells.any(|word| word.number().is_some())
+    let filled = cells.clone().filter(|word| !word.is_empty()).take(2).count();
+    cells.clone().next().is_some_and(begins_row)
+        && (is_narrow || filled > 1)
+        && cells.any(|word| word.number().is_some())
 }
 
 impl<'a> Rows<'a> {
     /// The rows in `head`, the beginning of a text, as wide as the first; `None` if there is no whole one.
-    fn of(separator: Separator, head: &'a [u8]) -> Option<Self> {
+    fn of(separator: Separator, head: &'a [u8], is_narrow: bool) -> Option<Self> {
         let mut lines: Vec<&[u8]> = head.split(|&byte| byte == b'\n').collect();
         if head.len() >= HEAD_BYTES {
             // It goes on.
             lines.pop();
         }
         let cells = |line: &'a [u8]| separator.cells(line).collect::<Vec<_>>();
-        let is_row = |line: &[u8]| is_row(separator, line);
+        let is_row = |line: &[u8]| is_row(separator, line, is_narrow);
         let first = lines.iter().position(|line| is_row(line))?;
         let above = lines[..first].iter().rev().find(|line| !line.trim_ascii().is_empty());
         let names =
@@ -141,7 +145,7 @@ impl<'a> Rows<'a> {
 /// There are more or fewer columns than `grid` and what is beside it take, or it would take totals or the time for sensors; a
 /// usage error, as flags are the way out.
 pub(super) fn recognise(separator: Separator, grid: Grid, head: &[u8]) -> Result<Option<Columns>> {
-    let Some(rows) = Rows::of(separator, head) else { return Ok(None) };
+    let Some(rows) = Rows::of(separator, head, is_narrow(grid)) else { return Ok(None) };
     let (width, cells) = (rows.width(), grid.cells());
     if width < cells {
         // Rows of a block, or too few.
@@ -149,14 +153,20 @@ pub(super) fn recognise(separator: Separator, grid: Grid, head: &[u8]) -> Result
     }
     let ((time, unit), label) = (rows.time()?, rows.label());
     // By likelihood: where there is one column more, it is the time before it is a label.
-    for (has_time, has_label) in [(true, false), (false, false), (true, true), (false, true)] {
-        let fits = |has: bool, likely: Likely| if has { likely.may_be } else { !likely.is_sure };
+    let fits = |has: bool, likely: Likely| if has { likely.may_be } else { !likely.is_sure };
+    let readings: Vec<(bool, bool, Vec<Total>)> = [(true, false), (false, false), (true, true), (false, true)]
+        .into_iter()
+        .filter(|&(has_time, has_label)| fits(has_time, time) && fits(has_label, label))
+        .map(|(has_time, has_label)| {
+            let (first, end) = (usize::from(has_time), width - usize::from(has_label));
+            (has_time, has_label, if first < end { rows.totals(first, end) } else { Vec::new() })
+        })
+        .collect();
+    // Where totals are seen, no reading may take them for anything else.
+    let has_totals = readings.iter().any(|(.., totals)| !totals.is_empty());
+    for (has_time, has_label, totals) in readings {
         let (first, end) = (usize::from(has_time), width - usize::from(has_label));
-        if !fits(has_time, time) || !fits(has_label, label) || end < first + cells {
-            continue;
-        }
-        let totals = rows.totals(first, end);
-        if first + cells + totals.len() != end {
+        if first + cells + totals.len() != end || has_totals == totals.is_empty() {
             continue;
         }
         let left_out = totals.len() + usize::from(has_label);
@@ -168,6 +178,11 @@ pub(super) fn recognise(separator: Separator, grid: Grid, head: &[u8]) -> Result
         return Ok(Some(Columns { has_time, unit, left_out, words }));
     }
     Err(misfit(&rows, grid, time, label))
+}
+
+/// Whether rows of `grid` may have a single cell.
+pub(super) fn is_narrow(grid: Grid) -> bool {
+    grid.columns == 1
 }
 
 /// Refuses times that nobody says the unit of and that are hardly seconds.
@@ -252,7 +267,10 @@ fn misfit(rows: &Rows<'_>, grid: Grid, time: Likely, label: Likely) -> Error {
 /// What may be tried with a text that begins with `head` and is of no known format.
 pub(super) fn way_out(separator: Separator, head: &[u8]) -> Error {
     let table = "else save the columns of time and sensors as a CSV with the header `t,<taxel id>,...`";
-    let Some(rows) = Rows::of(separator, head) else {
+    let is_wide = |rows: &Rows<'_>| rows.width() > 1;
+    let wide = Rows::of(separator, head, false).filter(is_wide);
+    let is_narrow = wide.is_none();
+    let Some(rows) = wide.or_else(|| Rows::of(separator, head, true)) else {
         let first = head.split(|&byte| byte == b'\n').find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
         let first = super::text::shortened(super::text::decoded(first).trim());
         return failed!(
@@ -260,7 +278,7 @@ pub(super) fn way_out(separator: Separator, head: &[u8]) -> Error {
              before them, and give the rows and columns of a frame with --grid; {table}"
         );
     };
-    let (height, blocks) = blocks(separator, head);
+    let (height, blocks) = blocks(separator, head, is_narrow);
     let likely = rows.time().map(|(time, _)| time);
     let first = usize::from(likely.is_ok_and(|time| time.is_sure || (time.may_be && rows.rows.len() > 2)));
     let end = rows.width() - usize::from(rows.label().is_sure);
@@ -276,10 +294,10 @@ pub(super) fn way_out(separator: Separator, head: &[u8]) -> Error {
 }
 
 /// How many rows the first block of rows in `head` has, and how many blocks have as many.
-fn blocks(separator: Separator, head: &[u8]) -> (usize, usize) {
+fn blocks(separator: Separator, head: &[u8], is_narrow: bool) -> (usize, usize) {
     let mut heights = vec![0];
     for line in head.split(|&byte| byte == b'\n') {
-        let is_row = is_row(separator, line);
+        let is_row = is_row(separator, line, is_narrow);
         match heights.last_mut() {
             Some(height) if is_row => *height += 1,
             Some(0) | None => {}
