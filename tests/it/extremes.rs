@@ -506,7 +506,7 @@ fn a_taxel_that_measures_something_else_is_left_out_and_named() {
 #[test]
 fn nothing_is_kept_over_a_restart_of_time() {
     let body = field(&SQUARE);
-    let calibration = somatic::Calibration::parse("[contact]\non = 5\noff = 1\n", &[0, 1, 2, 3]).unwrap();
+    let calibration = Calibration::parse("[contact]\non = 5\noff = 1\n", &[0, 1, 2, 3]).unwrap();
     // Over the threshold, then under it but over that at which a touch ends.
     let (hard, soft) = ([9.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0]);
     let at = |times: &[(f64, [f64; 4])]| times.iter().map(|(t_s, values)| frame(*t_s, values)).collect::<Vec<_>>();
@@ -547,7 +547,7 @@ fn nothing_is_kept_over_a_restart_of_time() {
 
 #[test]
 fn drift_that_no_taxel_can_tell_is_named_at_the_start() {
-    let calibration = |keys: &str| somatic::Calibration::parse(keys, &[0, 1, 2, 3, 4, 5]).unwrap();
+    let calibration = |keys: &str| Calibration::parse(keys, &[0, 1, 2, 3, 4, 5]).unwrap();
     let uv = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1], [0.1, 0.1], [0.0, 0.2], [0.1, 0.2]];
     let remarks = |fields: &[std::ops::Range<u32>], keys: &str| {
         let flat = fields.iter().enumerate().fold(Flat::new(&uv).surface(1.0), |flat, (index, ids)| {
