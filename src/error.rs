@@ -10,6 +10,8 @@ use std::{fmt, io};
 
 use serde::de::DeserializeOwned;
 
+use crate::plain;
+
 /// `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -154,7 +156,7 @@ impl fmt::Display for Error {
         };
         // Whatever a library or a file name put in, an error stays one line.
         let words: Vec<&str> = line.split(['\n', '\r']).map(str::trim).filter(|s| !s.is_empty()).collect();
-        f.write_str(&words.join(" "))
+        f.write_str(&plain::line(&words.join(" ")))
     }
 }
 
@@ -257,6 +259,7 @@ mod tests {
         assert_eq!(error.place(), Some("a.csv: row 3"));
         assert_eq!(error.exit_code(), 1);
         assert_eq!(Error::usage("x").exit_code(), 2);
+        assert_eq!(Error::failed("`\x1b]0;P\x07`\t").at("a\0.csv").to_string(), "a\\u0000.csv: `\\u001b]0;P\\u0007`");
     }
 
     #[test]

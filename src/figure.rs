@@ -9,6 +9,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::error::Result;
 use crate::ink::{self, FAMILY, cannot};
+use crate::plain;
 
 /// Dots drawn for each pixel of a size below: plotters has whole dots only, and small figures would show it.
 const SCALE: u32 = 2;
@@ -150,7 +151,7 @@ impl Figure {
         let mut text = String::new();
         let (width, height) = self.size();
         self.draw(&SVGBackend::with_string(&mut text, (SCALE * width, SCALE * height)).into_drawing_area())?;
-        Ok(text)
+        Ok(plain::xml(&text).into_owned())
     }
 
     /// As PNG.

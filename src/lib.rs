@@ -89,6 +89,7 @@ mod parallel;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
+pub mod plain;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "mcap")]

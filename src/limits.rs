@@ -43,7 +43,7 @@ macro_rules! limits {
 // Sizes in bytes are `u64`, counts and depths are not.
 limits! {
     /// Size of a file in TOML: a scene, recipe, calibration, simulation or wiring, or the rules of `--mjcf-rules`
-    MAX_TOML_BYTES: u64 = 64 << 20;
+    MAX_TOML_BYTES: u64 = 16 << 20;
     /// Size of a file in XML: a URDF, MJCF or COLLADA mesh
     MAX_XML_BYTES: u64 = 256 << 20;
     /// Size of a body, `.glb` or `.gltf`, and of all the buffers beside it together
@@ -52,6 +52,8 @@ limits! {
     MAX_MESH_BYTES: u64 = 1 << 30;
     /// Size of a table of taxels, of a mask, or of a position file of an iCub
     MAX_TABLE_BYTES: u64 = 256 << 20;
+    /// Size of a recording of joint states as a table or NDJSON, which is kept in memory
+    MAX_STATES_BYTES: u64 = 1 << 30;
     /// Size of what a recorder writes beside a bag, `metadata.yaml`
     MAX_METADATA_BYTES: u64 = 16 << 20;
     /// Size of a chunk of an MCAP when it is unpacked, or of its summary
@@ -62,8 +64,6 @@ limits! {
     MAX_DEVICE_BYTES: u64 = 1 << 20;
     /// Length of a line of a recording as a table, NDJSON or an export
     MAX_LINE_BYTES: u64 = 64 << 20;
-    /// Length of a line of a table of taxels
-    MAX_TAXEL_LINE_BYTES: u64 = 64 << 10;
 
     /// Elements of an XML file within each other
     MAX_XML_DEPTH: usize = 500;
@@ -83,6 +83,8 @@ limits! {
     MAX_RAY_TESTS: usize = 1_000_000_000;
     /// Nodes of a glTF
     MAX_NODES: usize = 1_000_000;
+    /// Objects in the JSON of a glTF
+    MAX_JSON_OBJECTS: usize = 4_000_000;
     /// Nodes of a glTF within each other
     MAX_NODE_DEPTH: usize = 1000;
     /// Triangles of a body, of all meshes as often as they are placed
@@ -92,14 +94,18 @@ limits! {
     /// Elements of a glTF accessor without data
     MAX_ZERO_ELEMENTS: usize = 1 << 22;
 
-    /// Taxels that a recipe, `--taxels`, `bench` or a table makes
+    /// Taxels that a place of a recipe, a table of taxels or `--taxels` makes
     MAX_TAXELS: usize = 4_000_000;
     /// Cells of a sheet, or taxels of an array in a URDF or a touch grid in an MJCF
     MAX_CELLS: usize = 1_000_000;
-    /// Fields of a recipe, of a sheet's regions, or of `bench`
-    MAX_FIELDS: usize = 100_000;
-    /// Memberships of taxels in the fields of a body
-    MAX_MEMBERS: usize = 100_000_000;
+    /// Places of a recipe
+    MAX_PLACES: usize = 4096;
+    /// Fields that rules or a sheet's regions make
+    MAX_FIELDS: usize = 500_000;
+    /// Fields of a body within each other
+    MAX_FIELD_DEPTH: usize = 100;
+    /// Members of all fields that rules make
+    MAX_MEMBERS: usize = 20_000_000;
 }
 
 /// What [`std::fs::read`] gives, of at most `most` bytes.
@@ -265,6 +271,6 @@ mod tests {
         let wanted: Vec<String> =
             TABLE.iter().map(|limit| format!("| {} | {limit} | `{}` |", limit.what, limit.name)).collect();
         assert_eq!(rows, wanted, "write these rows into docs/limits.md:\n{}", wanted.join("\n"));
-        assert!(wanted[0].ends_with("| 64 MiB | `MAX_TOML_BYTES` |"), "{}", wanted[0]);
+        assert!(wanted[0].ends_with("| 16 MiB | `MAX_TOML_BYTES` |"), "{}", wanted[0]);
     }
 }

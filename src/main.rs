@@ -10,7 +10,11 @@ use clap::Parser as _;
 
 fn main() -> ExitCode {
     quieten_mesa();
-    match cli::run(&cli::Arguments::parse()) {
+    let arguments = match cli::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(answer) => return cli::answer(&answer),
+    };
+    match cli::run(&arguments) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             cli::say(&format!("{}: {error}", console::style("error").red().bold().for_stderr()));

@@ -12,10 +12,7 @@ use json::accessor::{ComponentType, Type};
 use json::validation::{Checked, Validate};
 
 use crate::error::{Error, Result, failed};
-use crate::limits::{self, MAX_BODY_BYTES};
-
-/// Maximum number of elements of an accessor without data; more mean a damaged file.
-const MAX_ZERO_ELEMENTS: u64 = 1 << 22;
+use crate::limits::{self, MAX_BODY_BYTES, MAX_JSON_OBJECTS, MAX_ZERO_ELEMENTS};
 
 pub(crate) struct Document {
     pub(crate) root: json::Root,
@@ -27,12 +24,19 @@ impl Document {
     pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Self> {
         let (text, chunk) = split(bytes)?;
         let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+        // Parsed, an object takes a hundred times the room that it may have in the text.
+        let objects = text.iter().filter(|&&byte| byte == b'{').count();
+        if objects > MAX_JSON_OBJECTS {
+            return Err(failed!(
+                "its JSON has {objects} objects, over the {MAX_JSON_OBJECTS} that a body may have; split it"
+            ));
+        }
         let root: json::Root = json::deserialize::from_slice(text)
             .map_err(|e| failed!("not a glTF: its JSON does not hold what glTF asks for: {e}"))?;
         refuse_unsupported_extensions(&root)?;
         validate(&root)?;
         let mut chunk = chunk;
-        let mut buffers = Vec::with_capacity(root.buffers.len());
+        let (mut buffers, mut total) = (Vec::with_capacity(root.buffers.len()), 0);
         for (index, buffer) in root.buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
                 Some(uri) => fetch(uri, folder).map_err(|e| e.at(format!("buffer {index}")))?,
@@ -45,6 +49,11 @@ impl Document {
                     bytes.len(),
                     buffer.byte_length.0
                 ));
+            }
+            total += bytes.len() as u64;
+            if total > MAX_BODY_BYTES {
+                let most = limits::size(MAX_BODY_BYTES);
+                return Err(failed!("its buffers have over {most} together, the most that a body may have; split it"));
             }
             buffers.push(bytes);
         }
@@ -99,6 +108,11 @@ impl Document {
         Ok(elements.rows(number))
     }
 
+    /// The number of elements that accessor `index` says it has.
+    pub(crate) fn count(&self, index: usize) -> u64 {
+        self.root.accessors.get(index).map_or(0, |accessor| accessor.count.0)
+    }
+
     /// Whether accessor `index` holds single floats, as every attribute of a layout must.
     pub(crate) fn is_scalar_float(&self, index: usize) -> bool {
         self.root.accessors.get(index).is_some_and(|accessor| {
@@ -123,7 +137,7 @@ impl Document {
         let count = accessor.count.0;
         let bytes = match accessor.buffer_view {
             Some(view) => self.strided(view.value(), accessor.byte_offset.map_or(0, |o| o.0), count, size)?,
-            None if count > MAX_ZERO_ELEMENTS => {
+            None if count > MAX_ZERO_ELEMENTS as u64 => {
                 return Err(damaged(&format!("it claims {count} elements and has no data")));
             }
             None => Cow::Owned(vec![0; count as usize * size]),

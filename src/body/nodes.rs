@@ -11,6 +11,7 @@ use super::layout::FIELD_KEY;
 use super::model::{Link, rigid_part};
 use super::primitives::is_taxels;
 use crate::error::{Error, Result, failed};
+use crate::limits::{MAX_NODE_DEPTH, MAX_NODES};
 
 /// Maximum coordinate, m; sums and products of smaller ones do not overflow.
 pub(super) const MAX_COORDINATE_M: f64 = 1e9;
@@ -30,6 +31,9 @@ pub(super) struct Nodes<'a> {
 impl<'a> Nodes<'a> {
     pub(super) fn of(document: &'a Document) -> Result<Self> {
         let raw = &document.root.nodes[..];
+        if raw.len() > MAX_NODES {
+            return Err(failed!("it has {} nodes, over the {MAX_NODES} that a body may have; merge some", raw.len()));
+        }
         let mut parent = vec![None; raw.len()];
         for (index, node) in raw.iter().enumerate() {
             for child in node.children.iter().flatten() {
@@ -51,7 +55,14 @@ impl<'a> Nodes<'a> {
             return Err(Error::failed("its nodes form a ring: the file is damaged; export it again"));
         }
         let mut world_from_node = vec![DAffine3::IDENTITY; raw.len()];
+        let mut depth = vec![1_usize; raw.len()];
         for &node in &in_order {
+            depth[node] = parent[node].map_or(1, |up: usize| depth[up] + 1);
+            if depth[node] > MAX_NODE_DEPTH {
+                return Err(failed!(
+                    "node {node} has {MAX_NODE_DEPTH} nodes above it, and no more may stand within each other; is the file damaged?"
+                ));
+            }
             let local = local_transform(&raw[node]);
             if !local.is_finite() {
                 return Err(failed!("node {node} has a transform that is not finite; export it again"));

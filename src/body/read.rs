@@ -15,7 +15,7 @@ use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
 use super::primitives::{attribute, custom, has_mode, is_taxels};
 use super::repair;
 use crate::error::{Error, Result, failed};
-use crate::limits::{self, MAX_BODY_BYTES};
+use crate::limits::{self, MAX_BODY_BYTES, MAX_FIELD_DEPTH, MAX_TRIANGLES, MAX_VERTICES};
 
 /// Places in the file of what was read, for writing.
 #[derive(Default)]
@@ -74,6 +74,7 @@ fn read(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
 
 /// Reads the body called `name` from `document`, and where its parts come from.
 pub(super) fn from_document(name: &str, document: &Document, nodes: &Nodes<'_>) -> Result<(Body, Sources)> {
+    check_size(document, nodes)?;
     let mut sources = Sources::default();
     let mut body = Body {
         name: name.to_owned(),
@@ -93,6 +94,31 @@ pub(super) fn from_document(name: &str, document: &Document, nodes: &Nodes<'_>) 
     body.fields = read_fields(document, nodes, &mut body)?;
     repair::suggest_export_options(document, &mut body);
     Ok((body, sources))
+}
+
+/// Refuses more vertices or triangles than a body may have, before any is read.
+fn check_size(document: &Document, nodes: &Nodes<'_>) -> Result<()> {
+    let (mut vertices, mut triangles) = (0_u64, 0_u64);
+    let meshes = nodes.raw.iter().filter_map(|node| document.root.meshes.get(node.mesh?.value()));
+    for primitive in meshes.flat_map(|mesh| &mesh.primitives) {
+        let Some(positions) = attribute(primitive, &Semantic::Positions) else { continue };
+        let of_positions = document.count(positions);
+        vertices = vertices.saturating_add(of_positions);
+        let own = primitive.indices.map_or(of_positions, |indices| document.count(indices.value()));
+        // Those of a strip or fan have a corner of their own each.
+        let own = match primitive.mode {
+            Checked::Valid(Mode::Triangles) => own / 3,
+            Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => own,
+            _ => 0,
+        };
+        triangles = triangles.saturating_add(own);
+        for (count, most, what) in [(vertices, MAX_VERTICES, "vertices"), (triangles, MAX_TRIANGLES, "triangles")] {
+            if count > most as u64 {
+                return Err(failed!("it has over {most} {what}, the most that a body may have; simplify its meshes"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Per joint of a skinned node its link, and link_from_mesh.
@@ -394,8 +420,16 @@ fn parents_first(fields: Vec<FieldSpec>) -> Result<Vec<FieldSpec>> {
                     at.name
                 )
             })?;
-            if depth > fields.len() {
-                return Err(failed!("field `{}` is its own ancestor; break the ring", field.name));
+            if depth > MAX_FIELD_DEPTH {
+                let above = |at: &&FieldSpec| Some(&fields[*names.get(at.parent.as_deref()?)?]);
+                let is_ring = std::iter::successors(Some(field), above).take(fields.len() + 1).count() > fields.len();
+                let name = &field.name;
+                return Err(match is_ring {
+                    true => failed!("field `{name}` is its own ancestor; break the ring"),
+                    false => failed!(
+                        "field `{name}` has over {MAX_FIELD_DEPTH} fields above it; put fewer within each other"
+                    ),
+                });
             }
         }
         depths.push(depth);

@@ -133,10 +133,9 @@ impl Sheet {
         self.cells.iter().map(taxel).collect()
     }
 
-    /// The mean place of the cells `ids`, or of all if there are none.
-    fn middle_of(&self, ids: &[u32]) -> DVec3 {
-        let ids: BTreeSet<u32> = ids.iter().copied().collect();
-        let chosen = self.cells.iter().filter(|cell| ids.is_empty() || ids.contains(&cell.id));
+    /// The mean place of the cells at `indices`, ascending.
+    fn middle_of(&self, indices: impl IntoIterator<Item = usize>) -> DVec3 {
+        let chosen = indices.into_iter().map(|index| &self.cells[index]);
         let (sum, count) = chosen.fold((DVec3::ZERO, 0), |(sum, count), cell| (sum + in_link(cell.centre), count + 1));
         sum / f64::from(count.max(1))
     }
@@ -164,12 +163,12 @@ pub fn sheets(sheets: &[Sheet]) -> Result<Glb> {
                 return Err(failed!("two sheets or parts are called `{name}`; give each a name of its own"));
             }
         }
-        let own: BTreeSet<u32> = sheet.cells.iter().map(|cell| cell.id).collect();
+        let own: HashMap<u32, usize> = sheet.cells.iter().zip(0..).map(|(cell, index)| (cell.id, index)).collect();
         if let Some(id) = sheet.cells.iter().map(|cell| cell.id).find(|&id| !ids.insert(id)) {
             return Err(failed!("id {id} is used twice; give each cell of the body an id of its own"));
         }
         if let Some((name, id)) =
-            parts.iter().find_map(|(name, ids)| Some((name, ids.iter().find(|&id| !own.contains(id))?)))
+            parts.iter().find_map(|(name, ids)| Some((name, ids.iter().find(|&id| !own.contains_key(id))?)))
         {
             return Err(failed!("`{name}` holds cell {id}, which the sheet does not have"));
         }
@@ -184,11 +183,13 @@ pub fn sheets(sheets: &[Sheet]) -> Result<Glb> {
         let no_chart = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
         let chart = (!sheet.has_places).then_some(no_chart);
         let whole = FieldSpec { name: sheet.name.clone(), chart, ..FieldSpec::default() }.with_members(all);
-        glb.field(&whole, Some(link), sheet.middle_of(&[]));
+        glb.field(&whole, Some(link), sheet.middle_of(0..sheet.cells.len()));
         for (name, ids) in parts {
             let members = ids.iter().map(|&id| (id, MemberSpec::default())).collect();
             let parent = Some(sheet.name.clone());
-            glb.field(&FieldSpec { name, parent, members, chart: None }, Some(link), sheet.middle_of(ids));
+            // In the order of the cells, so that the sum is the same whatever the order of the part.
+            let cells: BTreeSet<usize> = ids.iter().map(|id| own[id]).collect();
+            glb.field(&FieldSpec { name, parent, members, chart: None }, Some(link), sheet.middle_of(cells));
         }
     }
     if sheets.is_empty() {

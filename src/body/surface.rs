@@ -1,5 +1,9 @@
 //! A body's triangles, with nearest-point and ray queries.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
 use glam::{DAffine3, DVec3};
 use rstar::primitives::{CachedEnvelope, GeomWithData};
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
@@ -47,7 +51,16 @@ impl Body {
     }
 }
 
-/// Finds the nearest points of a body's surface in any link's frame, without search indices.
+/// Searches for nearest points in one link's frame before a search index of its triangles is made: that takes as long.
+const SEARCHES_WITHOUT_INDEX: u32 = 16;
+
+/// Triangles as the mesh has them, with their numbers and whether the link's frame mirrors them.
+type TriangleTree = RTree<GeomWithData<CachedEnvelope<Triangle>, (u32, bool)>>;
+
+/// The number of searches in a link's frame, and the index if there is one.
+type Searched = (u32, Option<Rc<TriangleTree>>);
+
+/// Finds the nearest points of a body's surface in any link's frame. The results do not depend on whether an index is there.
 #[derive(Debug)]
 pub(crate) struct Nearest<'a> {
     body: &'a Body,
@@ -55,6 +68,8 @@ pub(crate) struct Nearest<'a> {
     longest: Vec<f64>,
     /// Per surface its lowest and highest coordinates, in its mesh.
     bounds: Vec<[DVec3; 2]>,
+    /// Per link.
+    indices: RefCell<HashMap<usize, Searched>>,
 }
 
 impl<'a> Nearest<'a> {
@@ -69,7 +84,7 @@ impl<'a> Nearest<'a> {
             let ends = [DVec3::INFINITY, DVec3::NEG_INFINITY];
             surface.positions.iter().fold(ends, |[low, high], &p| [low.min(p), high.max(p)])
         });
-        Self { body, longest: longest.collect(), bounds: bounds.collect() }
+        Self { body, longest: longest.collect(), bounds: bounds.collect(), indices: RefCell::default() }
     }
 
     pub(crate) fn body(&self) -> &'a Body {
@@ -95,6 +110,18 @@ impl<'a> Nearest<'a> {
 
     /// The surface within about `radius` of `centre`, m, in the frame of `link`.
     pub(crate) fn around(&self, link: usize, centre: DVec3, radius: f64) -> SurfaceIndex {
+        if let Some(index) = self.index(link) {
+            let reach = DVec3::splat(radius * (1.0 + 1e-9) + f64::MIN_POSITIVE);
+            let ends = AABB::from_corners((centre - reach).to_array(), (centre + reach).to_array());
+            let close = index.locate_in_envelope_intersecting(ends).map(|triangle| (triangle.data, **triangle.geom()));
+            let close = close.map(|((number, mirrored), Triangle([a, b, c]))| {
+                (number, Triangle(if mirrored { [a, c, b] } else { [a, b, c] }))
+            });
+            let mut near: Vec<(u32, Triangle)> =
+                close.filter(|(_, t)| t.box_distance_squared(centre) <= radius * radius).collect();
+            near.sort_unstable_by_key(|(number, _)| *number);
+            return SurfaceIndex::new(near.into_iter().map(|(_, triangle)| triangle).collect());
+        }
         let mut near = Vec::new();
         for (index, (surface, longest)) in self.body.surfaces.iter().zip(&self.longest).enumerate() {
             let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
@@ -110,8 +137,47 @@ impl<'a> Nearest<'a> {
         SurfaceIndex::new(near)
     }
 
-    /// The surface point nearest to `p`, in the frame of `link`.
+    /// The surface point nearest to `p`, in the frame of `link`; of several, that of the first triangle.
     pub(crate) fn in_link(&self, link: usize, p: DVec3) -> Option<DVec3> {
+        match self.index(link) {
+            Some(index) => {
+                let near = index.nearest_neighbor(p.to_array())?;
+                let least = p.distance_squared(near.geom().nearest(p));
+                // Beyond the rounding of boxes and distances.
+                let within = index.locate_within_distance(p.to_array(), least * (1.0 + 1e-9) + f64::MIN_POSITIVE);
+                let points = within.map(|triangle| (triangle.geom().nearest(p), triangle.data.0));
+                let nearest = points
+                    .map(|(point, number)| (p.distance_squared(point), number, point))
+                    .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                nearest.map(|(.., point)| point)
+            }
+            None => self.in_link_one_by_one(link, p),
+        }
+    }
+
+    /// The search index of `link`, from a number of searches on.
+    fn index(&self, link: usize) -> Option<Rc<TriangleTree>> {
+        let mut indices = self.indices.borrow_mut();
+        let (searches, index) = indices.entry(link).or_default();
+        *searches += 1;
+        if *searches > SEARCHES_WITHOUT_INDEX && index.is_none() {
+            let seen = self.body.surfaces.iter();
+            let seen = seen.filter_map(|surface| Some((surface, surface.link_from_mesh(self.body, link)?)));
+            let triangles = seen.flat_map(|(surface, link_from_mesh)| {
+                let at = move |v: u32| link_from_mesh.transform_point3(surface.positions[v as usize]);
+                let mirrored = link_from_mesh.matrix3.determinant() < 0.0;
+                surface.triangles.iter().map(move |&[a, b, c]| (Triangle([at(a), at(b), at(c)]), mirrored))
+            });
+            let numbered = triangles.zip(0..).filter(|((triangle, _), _)| triangle.unit_normal().is_some());
+            let numbered = numbered.map(|((triangle, mirrored), number)| {
+                GeomWithData::new(CachedEnvelope::new(triangle), (number, mirrored))
+            });
+            *index = Some(Rc::new(RTree::bulk_load(numbered.collect())));
+        }
+        index.clone()
+    }
+
+    fn in_link_one_by_one(&self, link: usize, p: DVec3) -> Option<DVec3> {
         let (mut nearest, mut least) = (None, f64::INFINITY);
         let placed = self.body.surfaces.iter().enumerate();
         let placed = placed.filter_map(|(i, surface)| Some((i, surface, surface.link_from_mesh(self.body, link)?)));
@@ -327,4 +393,34 @@ pub(crate) type PointTree = RTree<GeomWithData<[f64; 3], usize>>;
 pub(crate) fn point_tree(points: impl IntoIterator<Item = DVec3>) -> PointTree {
     let numbered = points.into_iter().enumerate();
     RTree::bulk_load(numbered.map(|(index, p)| GeomWithData::new(p.to_array(), index)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+
+    #[test]
+    fn with_an_index_the_nearest_point_is_the_same_to_the_bit() {
+        for bytes in [bundled::HAND, bundled::HUMANOID] {
+            let body = Body::from_bytes("a.glb", bytes).unwrap();
+            let nearest = Nearest::new(&body);
+            let mut compared = 0;
+            for link in 0..body.links.len() {
+                // Corners and middles of edges are equally near to several triangles.
+                let triangles: Vec<[DVec3; 3]> = body.triangles_in_link(link).step_by(37).take(20).collect();
+                let places = triangles.iter().flat_map(|&[a, b, c]| [a, (a + b) / 2.0, (a + b + c) / 3.0, c * 1.1]);
+                for p in places {
+                    let one_by_one = nearest.in_link_one_by_one(link, p);
+                    assert_eq!(nearest.in_link(link, p), one_by_one, "{p} in link {link}");
+                    let (radius, fresh) = (0.01, Nearest::new(&body));
+                    let around =
+                        |nearest: &Nearest<'_>| nearest.around(link, p, radius).nearest(p + DVec3::splat(1e-3));
+                    assert_eq!(around(&nearest), around(&fresh), "around {p} in link {link}");
+                    compared += usize::from(nearest.indices.borrow()[&link].1.is_some());
+                }
+            }
+            assert!(compared > 100, "{compared} with an index");
+        }
+    }
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::model::{Body, MAX_TAXEL_ID, Modality};
 use crate::error::{Error, Result, failed};
+use crate::limits::MAX_TAXELS;
 
 /// The columns that a table may have, in the order in which they are written.
 const COLUMNS: [&str; 10] = ["id", "link", "x", "y", "z", "nx", "ny", "nz", "area", "modality"];
@@ -59,6 +60,11 @@ pub fn read_taxel_table(reader: impl Read, flat: bool) -> Result<Vec<TaxelRow>> 
             return Err(what.at(format!("line {line}")));
         }
         rows.push(row);
+        if rows.len() > MAX_TAXELS {
+            return Err(
+                failed!("the table has over {MAX_TAXELS} taxels, the most that is read").at(format!("line {line}"))
+            );
+        }
     }
     if rows.is_empty() {
         return Err(Error::failed("it has no rows; give each taxel one, as id,x,y,z"));

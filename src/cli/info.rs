@@ -4,7 +4,6 @@ mod bag;
 mod contacts;
 
 use clap::Args;
-use console::style;
 use serde_json::{Value, json};
 use somatic::recording::{Attached, BagSurvey, Reader, Rhythm, Survey};
 use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
@@ -17,7 +16,7 @@ use super::exports::ExportFlags;
 use super::first_source::source_of;
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
-use super::words::{between_s, number, size_words, span};
+use super::words::{between_s, number, one_line, size_words, span, title};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -226,8 +225,8 @@ fn as_json(known: &Known) -> Value {
 fn text(name: &str, known: &Known) -> String {
     let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts, .. } = known;
     let rhythm = &survey.rhythm;
-    let mut text = format!("{}\n", style(name).bold());
-    let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
+    let mut text = format!("{}\n", title(name));
+    let mut line = |what: &str, value: String| text += &format!("  {what:<12}{}\n", one_line(&value));
     line("kind", format!("{kind}, {}{}", size_words(*bytes), if *has_end { "" } else { ", never ended" }));
     let rate = rhythm.rate_hz().map_or(String::new(), |rate| format!(" at {} Hz", number(rate)));
     let whole = if losses.is_empty() { "" } else { " whole" };

@@ -131,7 +131,7 @@ impl LineReport {
     /// What stands below the table.
     pub(super) fn rows(&self) -> Vec<String> {
         let accounts = self.lines.accounts();
-        let mut rows = Vec::new();
+        let mut rows: Vec<String> = Vec::new();
         if accounts.len() <= MAX_BOARD_ROWS {
             rows.extend(accounts.iter().map(|account| {
                 let text = format!("  {}: {}, {}", account.name(), account.state.word(), told(account));

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use console::{Term, style};
-use somatic::{Engine, Outputs, Percept, Percepts};
+use somatic::{Engine, Outputs, Percept, Percepts, plain};
 
 use super::screen::Screen;
 use super::words::{clipped, count, fitted, number, span};
@@ -221,7 +221,7 @@ impl Table {
         let (name, what, _) = about.engine.backend();
         let plan = about.engine.plan();
         let row = |field: usize| FieldRow {
-            name: plan.label(field),
+            name: plain::line(&plan.label(field)).into_owned(),
             latest: None,
             touches: 0,
             touched_at: None,
@@ -229,14 +229,14 @@ impl Table {
             largest: None,
         };
         Self {
-            title: format!("{} ← {}", about.body, about.source),
+            title: plain::line(&format!("{} ← {}", about.body, about.source)).into_owned(),
             backend: format!("{name}, {what}"),
             outputs: plan.outputs(),
             all_fields: about.all_fields,
             rows: (0..plan.fields().len()).map(row).collect(),
             largest_total: 0.0,
             unit: plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::of),
-            world: plan.world().to_owned(),
+            world: plain::line(plan.world()).into_owned(),
             in_world: false,
             tallest: 0,
         }

@@ -58,8 +58,8 @@ mod words;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use somatic::Result;
 
-pub(crate) use self::stdio::say;
 use self::stdio::{DONE, print};
+pub(crate) use self::stdio::{answer, say};
 
 /// What `somatic` alone prints.
 const GREETING: &str = concat!(

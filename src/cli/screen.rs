@@ -2,9 +2,12 @@
 
 use console::Term;
 
+use super::stdio::for_terminal;
+
 /// Lines drawn over what this drew before; gone, and the cursor back, when it is dropped.
 pub(super) struct Screen {
     term: Term,
+    on_stderr: bool,
     /// Width of each line that stands there, in columns.
     drawn: Vec<usize>,
 }
@@ -12,7 +15,8 @@ pub(super) struct Screen {
 impl Screen {
     pub(super) fn new(term: Term) -> Self {
         let _ = term.hide_cursor();
-        Self { term, drawn: Vec::new() }
+        let on_stderr = matches!(term.target(), console::TermTarget::Stderr);
+        Self { term, on_stderr, drawn: Vec::new() }
     }
 
     /// Rows and columns that lines may fill: one less than there are, so that nothing scrolls or wraps.
@@ -26,7 +30,7 @@ impl Screen {
         // In one write, and between marks that let a terminal show it at once.
         let mut text = format!("\x1b[?2026h{}", self.way_back());
         for line in lines {
-            text += line;
+            text += &for_terminal(line, self.on_stderr);
             text += "\x1b[K\n";
         }
         text += "\x1b[J\x1b[?2026l";

@@ -1,10 +1,12 @@
 //! Standard output, standard error and exit codes.
 
+use std::borrow::Cow;
 use std::io::{self, Write as _};
+use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use somatic::output::{OutputPaths, refuse_standard_output};
-use somatic::{Error, Result};
+use somatic::{Error, Result, plain};
 
 /// Exit code: everything was done.
 pub(super) const DONE: u8 = 0;
@@ -15,7 +17,42 @@ pub(super) const LOST: u8 = 3;
 
 /// Prints `line` on standard error. A closed standard error is no reason to stop.
 pub(crate) fn say(line: &str) {
+    let line = if console::colors_enabled_stderr() { plain::coloured_line(line) } else { plain::line(line) };
     let _ = writeln!(io::stderr(), "somatic: {line}");
+}
+
+/// Prints what the arguments are answered with, help or what is wrong with them, and gives the exit code.
+pub(crate) fn answer(answer: &clap::Error) -> ExitCode {
+    let (text, code) = (answer.render(), answer.exit_code());
+    // What was wrong may be the name of a file, with line ends too.
+    let arguments = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
+    let with_value = |argument: String| {
+        let value = argument.split_once('=').map(|(_, value)| value.to_owned());
+        std::iter::once(argument).chain(value)
+    };
+    let arguments: Vec<String> = arguments.flat_map(with_value).collect();
+    let shown = |coloured: bool| {
+        // Without its colours a part of an argument would be gone too.
+        let text = arguments.iter().fold(text.ansi().to_string(), |text, argument| match plain::line(argument) {
+            Cow::Owned(escaped) => text.replace(argument.as_str(), &escaped),
+            Cow::Borrowed(_) => text,
+        });
+        if coloured { text } else { plain::without_colours(&text) }
+    };
+    let _ = if answer.use_stderr() {
+        let text = shown(console::colors_enabled_stderr());
+        let text = if console::colors_enabled_stderr() { plain::coloured_lines(&text) } else { plain::lines(&text) };
+        io::stderr().write_all(text.as_bytes())
+    } else {
+        print(&shown(console::colors_enabled())).map_err(io::Error::other)
+    };
+    u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from)
+}
+
+/// `line` for a terminal, with this command's colours if it has any.
+pub(super) fn for_terminal(line: &str, on_stderr: bool) -> Cow<'_, str> {
+    let coloured = if on_stderr { console::colors_enabled_stderr() } else { console::colors_enabled() };
+    if coloured { plain::coloured_line(line) } else { plain::line(line) }
 }
 
 /// Says what of the input was never processed, and gives the exit code.
@@ -70,6 +107,7 @@ mod closed {
 /// Writes `text` to standard output. A reader that has gone is a normal end.
 pub(super) fn print(text: &str) -> Result<()> {
     OutputPaths::default().add_standard_output()?;
+    let text = if console::colors_enabled() { plain::coloured_lines(text) } else { plain::lines(text) };
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {

@@ -24,7 +24,7 @@ use super::plot_file::PlotFile;
 use super::scene::{RunOptions, first, grouped};
 use super::stdio::{DONE, FAILED, print, say};
 use super::table::{plain, shown};
-use super::words::{count, number};
+use super::words::{count, number, one_line, title};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -173,10 +173,10 @@ fn json(report: &Report, pick: Option<&Pick<'_>>) -> Result<String> {
 
 fn text(report: &Report, all: bool) -> String {
     let frames = count(report.frames as u64, "frame");
-    let mut text = format!("{}, {frames} of {}\n", style(&report.body).bold(), report.source);
+    let mut text = format!("{}, {frames} of {}\n", title(&report.body), one_line(&report.source));
     const KEPT: usize = 3;
     for line in report.kept_charts.iter().take(KEPT).chain(&report.left_out) {
-        text += &format!("  not measured  {line}\n");
+        text += &format!("  not measured  {}\n", one_line(line));
     }
     if report.kept_charts.len() > KEPT {
         let more = report.kept_charts.len() - KEPT;

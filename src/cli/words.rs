@@ -1,9 +1,10 @@
 //! Numbers as people read them.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use console::{Alignment, Term, measure_text_width, pad_str, style, truncate_str};
-use somatic::{Error, Result};
+use somatic::{Error, Result, plain};
 
 /// `value` with four significant digits, in at most nine characters.
 pub(super) fn number(value: f64) -> String {
@@ -75,12 +76,23 @@ pub(super) fn seconds(text: &str) -> Result<Duration> {
         .ok_or_else(|| Error::usage(format!("--for `{text}` is not a time; write 2s, 500ms or 10min")))
 }
 
+/// `text` as people can read it on one line, whatever is in it.
+pub(super) fn one_line(text: &str) -> Cow<'_, str> {
+    plain::line(text)
+}
+
+/// `name` above what there is to say about it.
+pub(super) fn title(name: &str) -> String {
+    style(one_line(name)).bold().to_string()
+}
+
 /// A line of a list for people: a mark, and `text` between words onto as many lines as a terminal needs.
 pub(super) fn bullet(text: &str) -> String {
     let term = Term::stdout();
     let width = if term.is_term() { usize::from(term.size().1).max(40) } else { usize::MAX };
     let mut lines = format!("  {} ", style("•").yellow());
     let mut used = 4;
+    let text = one_line(text);
     for (index, word) in text.split(' ').enumerate() {
         let wide = measure_text_width(word);
         if index > 0 && used + 1 + wide > width {

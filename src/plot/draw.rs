@@ -15,6 +15,7 @@ use crate::colours::pressure_colours;
 use crate::error::{Error, Result};
 use crate::ink::{self, FAMILY, cannot};
 use crate::percept::{Column, Unit};
+use crate::plain;
 
 /// Dots drawn for each pixel of the arrangement: plotters has whole dots only.
 const SCALE: i32 = 2;
@@ -49,7 +50,7 @@ pub fn svg(all: &[Gathered]) -> Result<String> {
     let plot = Plot::of(all)?;
     let mut text = String::new();
     plot.draw(&SVGBackend::with_string(&mut text, plot.dots()).into_drawing_area())?;
-    Ok(text)
+    Ok(plain::xml(&text).into_owned())
 }
 
 /// The same as PNG.

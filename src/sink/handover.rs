@@ -4,7 +4,6 @@
 //! when it begins and told at the end.
 
 use std::collections::VecDeque;
-use std::io::{self, Write as _};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -224,7 +223,7 @@ fn carry_all<T>(shared: &Shared<T>, mut carrier: impl Carrier<T>) -> Result<()> 
 
 /// Tells people something. A closed standard error is no reason to stop.
 pub(crate) fn tell(line: &str) {
-    let _ = writeln!(io::stderr(), "somatic: {line}");
+    crate::plain::say(line);
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! The sink that shows a run in browsers.
 
-use std::io::{self, Write as _};
 use std::sync::mpsc::Receiver;
 
 use super::{Flow, InputFrames, News, Question, Session, Sink};
 use crate::error::{Error, Result};
 use crate::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Request, Server, ViewerId};
 use crate::percept::Percepts;
+use crate::plain;
 
 /// Shows a run on a page.
 #[derive(Debug)]
@@ -36,8 +36,7 @@ impl PageSink {
             recorded_max: None,
         };
         let (server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
-        // A closed standard error is no reason to stop.
-        let _ = io::stderr().write_all(server.announcement().as_bytes());
+        plain::announce(&server.announcement());
         Ok(Self { publisher, server, questions: None })
     }
 

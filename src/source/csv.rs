@@ -16,10 +16,8 @@ use super::csv_cells::{number, shortened, trimmed};
 use super::csv_header::{self, Header};
 use super::time_column::TimeColumn;
 use crate::error::{Error, Result, failed};
+use crate::limits::MAX_LINE_BYTES;
 use crate::signal::{Frame, RawValue};
-
-/// Longest accepted row, so that a file that is no CSV does not fill the memory.
-const MAX_ROW_BYTES: usize = 64 << 20;
 
 /// A recording read from CSV.
 pub struct CsvSource {
@@ -304,10 +302,10 @@ struct LimitedReader {
 
 impl Read for LimitedReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.row_bytes > MAX_ROW_BYTES {
+        if self.row_bytes as u64 > MAX_LINE_BYTES {
             return Err(io::Error::other(format!(
                 "a row of over {} MiB: no CSV, or its lines have no end",
-                MAX_ROW_BYTES >> 20
+                MAX_LINE_BYTES >> 20
             )));
         }
         let read = self.inner.read(buffer)?;

@@ -3,7 +3,6 @@
 //! Positions are in radians, or metres for prismatic joints. A state need not have every joint.
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
@@ -11,6 +10,7 @@ use serde::Deserialize;
 
 use super::time_column::{TimeColumn, unit_in_head};
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_STATES_BYTES};
 use crate::signal::FrameTime;
 
 /// Joint states over time.
@@ -48,7 +48,7 @@ impl JointStates {
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let failed = |e: std::io::Error| Error::io(path, &e);
-        let mut reader = BufReader::new(File::open(path).map_err(failed)?);
+        let mut reader = BufReader::new(limits::open(path, MAX_STATES_BYTES).map_err(failed)?);
         let is_json = reader.fill_buf().map_err(failed)?.trim_ascii_start().first() == Some(&b'{');
         let mut states = Self { name: path.display().to_string(), ..Self::default() };
         let read = if is_json { states.read_ndjson(reader) } else { states.read_csv(reader) };

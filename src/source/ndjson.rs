@@ -15,10 +15,8 @@ use super::Source;
 use super::csv::is_csv_row;
 use super::unknown_taxels::UnknownTaxels;
 use crate::error::{Error, Result, failed};
+use crate::limits::MAX_LINE_BYTES;
 use crate::signal::{Frame, Pose, RawValue};
-
-/// Longest accepted line, so that invalid input does not fill the memory.
-const MAX_LINE_BYTES: u64 = 64 << 20;
 
 /// A frame, for messages.
 const EXAMPLE: &str = "{\"t\":0.5,\"values\":{\"7\":12}}";

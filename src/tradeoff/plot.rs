@@ -7,6 +7,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::{CallMode, Errors, Measurement, Report};
 use crate::error::Result;
 use crate::ink::{self, FAMILY, cannot};
+use crate::plain;
 
 /// Width and height of a panel, dots.
 const PANEL: (u32, u32) = (760, 560);
@@ -30,7 +31,7 @@ const COLOURS: [(&str, RGBColor); 5] = [
 pub fn plot_svg(report: &Report) -> Result<String> {
     let mut text = String::new();
     draw(report, &SVGBackend::with_string(&mut text, size(report)).into_drawing_area())?;
-    Ok(text)
+    Ok(plain::xml(&text).into_owned())
 }
 
 /// A report as PNG.

@@ -26,8 +26,10 @@ mod limbs_merged;
 mod limbs_network;
 #[cfg(all(unix, feature = "zenoh"))]
 mod limbs_others;
+mod limits;
 mod live;
 mod mjcf;
+mod names;
 mod other_readers;
 mod outputs;
 #[cfg(all(unix, feature = "page"))]

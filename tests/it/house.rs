@@ -16,6 +16,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("keys", vec!["error"]),
         ("length", vec![]),
         ("limits", vec![]),
+        ("plain", vec![]),
         ("setters", vec![]),
         ("words", vec!["error"]),
         ("parallel", vec![]),
@@ -63,7 +64,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
 }
 
 /// What every module may use, and which use nothing.
-const FOR_ALL: [&str; 1] = ["limits"];
+const FOR_ALL: [&str; 2] = ["limits", "plain"];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -301,8 +302,10 @@ fn files_are_read_whole_within_limits_only() {
                 .find(|word| line.contains(word) && !line.contains(".take("))
         };
         for word in code.iter().filter_map(whole) {
-            // Recordings, line by line or record by record.
-            let streams = ["source", "recording"].iter().any(|folder| path.starts_with(folder));
+            // Recordings, line by line or record by record; and a file of which only the lock is asked for.
+            let streams = ["source/csv.rs", "source/vendor/lines.rs", "recording", "output/lock.rs"]
+                .iter()
+                .any(|at| path.starts_with(at));
             let allowed =
                 path == Path::new("limits.rs") || (streams && ["File::open(", "read_to_end("].contains(&word));
             assert!(allowed, "{} says {word}; a file is read whole by src/limits.rs alone", path.display());
@@ -310,6 +313,41 @@ fn files_are_read_whole_within_limits_only() {
         }
     }
     for word in ["read_to_end(", "read_to_string(", "File::open("] {
+        assert!(seen.contains(&word), "{word} is not even seen where it is");
+    }
+}
+
+#[test]
+fn all_that_is_printed_is_escaped_in_one_place() {
+    // Where text goes to a terminal, after `plain` has seen it; and what writes bytes for programs.
+    let doors = ["plain.rs", "cli/stdio.rs", "cli/screen.rs", "cli/tune/session.rs"];
+    let raw = [
+        "println!",
+        "print!(",
+        "dbg!(",
+        "stdout().lock",
+        "stdout().write",
+        "stderr().write",
+        "stderr(), ",
+        "term.write",
+        ".write_line(",
+    ];
+    let mut seen = Vec::new();
+    for (_, path, text) in sources() {
+        if path.ends_with("tests.rs") {
+            continue;
+        }
+        let text = text.split("mod tests {").next().unwrap();
+        for line in text.lines().map(|line| line.split("//").next().unwrap_or("")) {
+            for word in raw.into_iter().filter(|word| line.contains(word)) {
+                let door = doors.iter().any(|door| path == Path::new(door));
+                assert!(door, "{} says `{word}`; people are told through plain.rs or cli/stdio.rs", path.display());
+                assert_ne!(word, "println!", "{}: a closed terminal would be a panic", path.display());
+                seen.push(word);
+            }
+        }
+    }
+    for word in ["stderr(), ", "term.write", "stdout().lock"] {
         assert!(seen.contains(&word), "{word} is not even seen where it is");
     }
 }

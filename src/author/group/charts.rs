@@ -1,5 +1,7 @@
 //! Charts of the fields that rules made: computed, checked, and if there is none split or reported.
 
+use std::collections::BTreeSet;
+
 use glam::{DVec2, DVec3};
 
 use super::axis::least_axis;
@@ -58,7 +60,8 @@ impl Grouper<'_> {
         bare.fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
         let planes: Vec<_> =
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
-        let has_children = |name: &str| specs.iter().any(|spec| spec.parent.as_deref() == Some(name));
+        let parents: BTreeSet<&str> = specs.iter().filter_map(|spec| spec.parent.as_deref()).collect();
+        let has_children = |name: &str| parents.contains(name);
         let mut fields = Vec::with_capacity(specs.len());
         let mut notes = ChartNotes::default();
         let made = std::mem::take(&mut self.made);

@@ -16,25 +16,16 @@ const PAINTED: f64 = 0.5;
 type TaxelPlace = (usize, usize, [f64; 3]);
 
 impl Grouper<'_> {
-    /// The taxels of `among`, indices into the body's taxels, that `rule` selects.
-    pub(super) fn choose(&mut self, rule: &FieldRule, among: &[usize]) -> Result<Vec<usize>> {
-        let mut chosen = among.to_vec();
-        if let Some(lists) = &rule.taxels {
-            let has = |id: u32| self.body.taxel_index(id).is_some();
-            let missing =
-                lists.iter().find(|ids| !self.body.taxels.iter().any(|t| (ids.first..=ids.last).contains(&t.id)));
-            if let Some(ids) = missing {
-                let span = match &self.body.taxels[..] {
-                    [first, .., last] => format!("its ids are from {} to {}", first.id, last.id),
-                    few => format!("it has {}", few.len()),
-                };
-                let Ids { first, last } = ids;
-                return Err(failed!("`taxels`: the body has no taxel from {first} to {last}; {span}"));
+    /// The taxels of `among`, indices into the body's taxels, ascending, or of all taxels, that `rule` selects.
+    pub(super) fn choose(&mut self, rule: &FieldRule, among: Option<&[usize]>) -> Result<Vec<usize>> {
+        let mut chosen = match &rule.taxels {
+            None => among.map_or_else(|| (0..self.body.taxels.len()).collect(), <[usize]>::to_vec),
+            Some(lists) => {
+                let mut listed = self.listed(lists)?;
+                listed.retain(|taxel| among.is_none_or(|among| among.binary_search(taxel).is_ok()));
+                listed
             }
-            let listed: BTreeSet<u32> =
-                lists.iter().flat_map(|ids| (ids.first..=ids.last).filter(|&id| has(id))).collect();
-            chosen.retain(|&taxel| listed.contains(&self.body.taxels[taxel].id));
-        }
+        };
         self.keep_modality(rule, &mut chosen)?;
         if let Some(globs) = &rule.link {
             let carrying: BTreeSet<&str> =
@@ -70,6 +61,33 @@ impl Grouper<'_> {
             });
         }
         Ok(chosen)
+    }
+
+    /// The taxels with the ids in `lists`, each of which has one at least: indices into the body's taxels, ascending.
+    pub(super) fn listed(&self, lists: &[Ids]) -> Result<Vec<usize>> {
+        let taxels = &self.body.taxels;
+        let mut ranges = Vec::with_capacity(lists.len());
+        for Ids { first, last } in lists {
+            // They are sorted by id.
+            let range = taxels.partition_point(|t| t.id < *first)..taxels.partition_point(|t| t.id <= *last);
+            if range.is_empty() {
+                let span = match &taxels[..] {
+                    [first, .., last] => format!("its ids are from {} to {}", first.id, last.id),
+                    few => format!("it has {}", few.len()),
+                };
+                return Err(failed!("`taxels`: the body has no taxel from {first} to {last}; {span}"));
+            }
+            ranges.push((range.start, range.end));
+        }
+        // Ranges that overlap give each taxel once.
+        ranges.sort_unstable();
+        let mut end = 0;
+        let fresh = ranges.into_iter().flat_map(|(from, to)| {
+            let fresh = from.max(end)..to.max(end);
+            end = fresh.end;
+            fresh
+        });
+        Ok(fresh.collect())
     }
 
     /// Keeps the taxels of the rule's modality; by default pressure taxels if there are any, unless the rule lists ids.

@@ -49,7 +49,8 @@ impl Grouper<'_> {
                 Patches::Of { of, even: true } => return Ok(numbered(&stem("patch"), self.even_patches(chosen, of))),
                 Patches::Of { of, .. } => chosen.len().div_ceil(of),
             };
-            let patches = self.patches(chosen, count, MAX_ROUNDS);
+            // No patch is empty.
+            let patches = self.patches(chosen, count.min(chosen.len()), MAX_ROUNDS);
             if patches.len() != count && matches!(wanted, Patches::Number(_)) {
                 let what = self.rule_name(rule);
                 self.notes.push(format!(
@@ -226,12 +227,15 @@ impl Grouper<'_> {
         match seeds {
             Seeds::Points(points) => Ok(points.iter().map(|&p| Seed::Point(DVec3::from_array(p))).collect()),
             Seeds::Ids(lists) => {
-                let ids = lists.iter().flat_map(|ids| ids.first..=ids.last.min(crate::body::MAX_TAXEL_ID));
+                let ids = lists.iter().flat_map(|ids| ids.first..=ids.last);
                 let mut taxels = Vec::new();
                 for id in ids {
-                    let taxel = body.taxel_index(id).filter(|taxel| chosen.contains(taxel));
+                    let taxel = body.taxel_index(id).filter(|taxel| chosen.binary_search(taxel).is_ok());
                     let why = || failed!("`seeds`: taxel {id} is not among those that the rule chooses");
                     taxels.push(Seed::Taxel(taxel.ok_or_else(why)?));
+                    if taxels.len() > chosen.len() {
+                        return Err(failed!("`seeds`: it lists a taxel twice; list each once"));
+                    }
                 }
                 Ok(taxels)
             }

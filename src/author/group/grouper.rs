@@ -8,6 +8,7 @@ use crate::author::placed::Progress;
 use crate::body::{Body, FieldSpec, MemberSpec};
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::{Unroller, unions};
+use crate::limits::{MAX_FIELDS, MAX_MEMBERS};
 
 /// The fields that rules made.
 #[derive(Clone, Debug, Default)]
@@ -55,6 +56,9 @@ pub(in crate::author) fn group_while(
     grower.finish_while(progress).map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
 }
 
+/// A field to which a rule is applied, and its taxels.
+type Host = (Option<String>, Option<Vec<usize>>);
+
 /// A field before its chart is computed.
 #[derive(Clone)]
 pub(super) struct FieldDraft {
@@ -81,6 +85,8 @@ pub struct Grouper<'a> {
     /// Fields with distorted charts, and their distortion.
     pub(super) poor: Vec<(String, f64)>,
     applied: usize,
+    /// Members of all fields so far.
+    memberships: usize,
 }
 
 impl<'a> Grouper<'a> {
@@ -97,6 +103,7 @@ impl<'a> Grouper<'a> {
             notes: Vec::new(),
             poor: Vec::new(),
             applied: 0,
+            memberships: 0,
         }
     }
 
@@ -108,7 +115,7 @@ impl<'a> Grouper<'a> {
         rule.check()?;
         let mut any = false;
         for (host, among) in self.hosts(rule)? {
-            let chosen = self.choose(rule, &among)?;
+            let chosen = self.choose(rule, among.as_deref())?;
             if chosen.is_empty() {
                 continue;
             }
@@ -137,15 +144,13 @@ impl<'a> Grouper<'a> {
         }
     }
 
-    /// The fields to which `rule` is applied, with their taxels; or all taxels.
-    fn hosts(&self, rule: &FieldRule) -> Result<Vec<(Option<String>, Vec<usize>)>> {
-        let Some(globs) = &rule.within else {
-            return Ok(vec![(None, (0..self.body.taxels.len()).collect())]);
-        };
+    /// The fields to which `rule` is applied, with their taxels, ascending; or no field and `None` for all taxels.
+    fn hosts(&self, rule: &FieldRule) -> Result<Vec<Host>> {
+        let Some(globs) = &rule.within else { return Ok(vec![(None, None)]) };
         let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
         let taxels = |ids: BTreeSet<u32>| ids.into_iter().filter_map(|id| self.body.taxel_index(id)).collect();
         let all = specs.iter().zip(unions(&specs)).filter(|(spec, _)| globs.matches(&spec.name));
-        let hosts: Vec<_> = all.map(|(spec, ids)| (Some(spec.name.clone()), taxels(ids))).collect();
+        let hosts: Vec<Host> = all.map(|(spec, ids)| (Some(spec.name.clone()), Some(taxels(ids)))).collect();
         if hosts.is_empty() {
             let asked = globs.listed();
             let hint = suggestion(&asked, specs.iter().map(|spec| spec.name.as_str()));
@@ -162,7 +167,11 @@ impl<'a> Grouper<'a> {
             }
         }
         let above = self.top(name, rule)?;
-        let parent = self.add_levels(name, above);
+        let parent = self.add_levels(name, above)?;
+        self.memberships += taxels.len();
+        if self.memberships > MAX_MEMBERS {
+            return Err(failed!("the fields have over {MAX_MEMBERS} members together; choose fewer taxels for each"));
+        }
         let member = MemberSpec { weight: rule.weight.unwrap_or(1.0), uv: None };
         let members = taxels.iter().map(|&taxel| (self.body.taxels[taxel].id, member)).collect();
         let spec = FieldSpec { name: name.to_owned(), parent, members, chart: None };
@@ -187,7 +196,7 @@ impl<'a> Grouper<'a> {
                     "it makes a field `{name}`, and there is one of that name; give it another `name` or `stem`"
                 ));
             }
-            None => self.push(made),
+            None => self.push(made)?,
         }
         Ok(())
     }
@@ -208,33 +217,37 @@ impl<'a> Grouper<'a> {
                 ));
             }
         }
-        let above = self.add_levels(parent, None);
-        self.add_level(parent, above);
+        let above = self.add_levels(parent, None)?;
+        self.add_level(parent, above)?;
         Ok(Some(parent.clone()))
     }
 
     /// Adds the levels above `name`, the topmost below `above`. Returns the parent of `name`.
-    fn add_levels(&mut self, name: &str, above: Option<String>) -> Option<String> {
+    fn add_levels(&mut self, name: &str, above: Option<String>) -> Result<Option<String>> {
         let mut parent = above;
         for level in name.match_indices('/').map(|(end, _)| &name[..end]) {
-            self.add_level(level, parent);
+            self.add_level(level, parent)?;
             parent = Some(level.to_owned());
         }
-        parent
+        Ok(parent)
     }
 
     /// Adds the field `name` without members of its own, unless it exists.
-    fn add_level(&mut self, name: &str, parent: Option<String>) {
+    fn add_level(&mut self, name: &str, parent: Option<String>) -> Result<()> {
         if self.index_of.contains_key(name) {
-            return;
+            return Ok(());
         }
         let spec = FieldSpec { name: name.to_owned(), parent, ..FieldSpec::default() };
         let (chart, wrap) = (ChartWish::Auto, Wrap::Bare);
-        self.push(FieldDraft { spec, chart, wrap, u: None, is_level: true, rule: self.applied });
+        self.push(FieldDraft { spec, chart, wrap, u: None, is_level: true, rule: self.applied })
     }
 
-    fn push(&mut self, made: FieldDraft) {
+    fn push(&mut self, made: FieldDraft) -> Result<()> {
+        if self.made.len() >= MAX_FIELDS {
+            return Err(failed!("the rules make over {MAX_FIELDS} fields; make fewer"));
+        }
         self.index_of.insert(made.spec.name.clone(), self.made.len());
         self.made.push(made);
+        Ok(())
     }
 }

@@ -16,8 +16,7 @@ impl Grouper<'_> {
     pub(super) fn apply_usual(&mut self) -> Result<()> {
         let patches = Some(Patches::Of { of: USUAL_TAXELS, even: true });
         let rule = FieldRule { patches, wrap: Some(Wrap::Split), ..FieldRule::default() };
-        let all: Vec<usize> = (0..self.body.taxels.len()).collect();
-        let chosen = self.choose(&rule, &all)?;
+        let chosen = self.choose(&rule, None)?;
         if chosen.is_empty() {
             return Err(Error::failed("there is no taxel to make fields of"));
         }

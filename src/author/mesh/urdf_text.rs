@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 
 use super::options::{Up, y_up_from};
 use crate::body::{Body, Modality, Taxel};
+use crate::plain;
 
 /// The depth of a taxel's box, which says nothing, m.
 const BOX_DEPTH_M: f64 = 0.001;
@@ -41,18 +42,17 @@ pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
             pose(&parent_from_link)
         );
     }
-    for (index, link) in body.links.iter().enumerate() {
-        let own = || body.taxels.iter().filter(|taxel| taxel.link == index && taxel.modality == Modality::Pressure);
-        if own().next().is_none() {
-            continue;
-        }
+    let mut taxels_of: Vec<Vec<&Taxel>> = vec![Vec::new(); body.links.len()];
+    let felt = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Pressure);
+    felt.for_each(|taxel| taxels_of[taxel.link].push(taxel));
+    for (link, own) in body.links.iter().zip(taxels_of).filter(|(_, own)| !own.is_empty()) {
         let name = escaped(&link.name);
         let _ = writeln!(
             text,
             "  <sensor name=\"{name} skin\" update_rate=\"100\">\n    <parent link=\"{name}\"/>\n    <origin xyz=\"0 0 0\" \
              rpy=\"0 0 0\"/>\n    <tactile channel=\"{CHANNEL}\">"
         );
-        own().for_each(|taxel| put_taxel(taxel, &mut text));
+        own.into_iter().for_each(|taxel| put_taxel(taxel, &mut text));
         text += "    </tactile>\n  </sensor>\n";
     }
     text += "</robot>\n";
@@ -61,6 +61,14 @@ pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
     if others > 0 {
         notes.push(format!(
             "{others} taxels measure something else than pressure, for which a URDF has no place: left out"
+        ));
+    }
+    let odd: Vec<&str> =
+        body.links.iter().map(|link| link.name.as_str()).filter(|n| !n.chars().all(plain::is_xml)).collect();
+    if let [first, ..] = odd[..] {
+        notes.push(format!(
+            "XML has no place for some characters in the names of {} links, the first `{first}`: they are written as \\uXXXX",
+            odd.len()
         ));
     }
     (text, notes)
@@ -118,8 +126,22 @@ fn numbers(v: DVec3) -> String {
     format!("{x} {y} {z}")
 }
 
+/// `name` as the value of an attribute, from which a reader has every character back that XML can hold.
 fn escaped(name: &str) -> String {
-    name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    let mut escaped = String::new();
+    for c in plain::xml(name).chars() {
+        match c {
+            '&' => escaped += "&amp;",
+            '<' => escaped += "&lt;",
+            '>' => escaped += "&gt;",
+            '"' => escaped += "&quot;",
+            '\t' | '\n' | '\r' => {
+                let _ = write!(escaped, "&#{};", u32::from(c));
+            }
+            c => escaped.push(c),
+        }
+    }
+    escaped
 }
 
 #[cfg(test)]

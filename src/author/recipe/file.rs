@@ -1,14 +1,15 @@
 //! Reads and checks a recipe's file.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::spec::{MAX_COUNT, PlaceSpec, Placement, Recipe, SKIN, unit_metres};
+use super::spec::{PlaceSpec, Placement, Recipe, SKIN, unit_metres};
 use crate::author::group::FieldRule;
 use crate::author::origin::Origin;
 use crate::author::recipe_values::{Globs, Length, Names};
@@ -16,7 +17,7 @@ use crate::author::region::Region;
 use crate::body::{MAX_TAXEL_ID, Modality};
 use crate::error::{Error, Result, suggestion};
 use crate::keys::Text;
-use crate::limits::{self, MAX_TOML_BYTES};
+use crate::limits::{self, MAX_PLACES, MAX_TAXELS, MAX_TOML_BYTES};
 
 /// Default maximum distance of a given place from the surface, m.
 const DEFAULT_WITHIN_M: f64 = 0.01;
@@ -90,13 +91,15 @@ struct PlaceKeys {
 /// A recipe's text and its name in messages.
 #[derive(Clone, Copy)]
 struct RecipeText<'a> {
-    name: &'a str,
     text: Text<'a>,
+    /// Both, as origins keep them.
+    shared: &'a [Arc<str>; 2],
 }
 
 impl RecipeText<'_> {
     fn origin(self, span: Range<usize>) -> Origin {
-        Origin(format!("{}: {}", self.name, self.text.place(span)))
+        let [name, text] = self.shared;
+        Origin::in_text(name, text, span.start)
     }
 
     fn point(self, key: &str, value: Option<&Spanned<[f64; 3]>>) -> Result<Option<DVec3>> {
@@ -127,7 +130,7 @@ impl Recipe {
     /// # Errors
     /// As [`Recipe::load`].
     pub fn parse(name: &str, text: &str, folder: &Path) -> Result<Self> {
-        parse(RecipeText { name, text: Text(text) }, folder).map_err(|e| e.at(name))
+        parse(RecipeText { text: Text(text), shared: &[name.into(), text.into()] }, folder).map_err(|e| e.at(name))
     }
 }
 
@@ -159,11 +162,17 @@ fn parse(recipe_text: RecipeText<'_>, folder: &Path) -> Result<Recipe> {
         check(std::slice::from_ref(name.get_ref()), name.span())?;
         recipe.bare.push((name.get_ref().clone(), recipe_text.origin(name.span())));
     }
+    if let Some(place) = file.place.get(MAX_PLACES) {
+        let what =
+            format!("there are over {MAX_PLACES} places; place taxels by `points` or a `csv`, which may have many");
+        return Err(text.wrong(place.span(), what));
+    }
+    let mut names = BTreeSet::new();
     for spanned in &file.place {
         let keys = spanned.get_ref();
         let place = place(recipe_text, spanned, folder)?;
         check(&place.regions, span(keys.region.as_ref()).unwrap_or(spanned.span()))?;
-        if recipe.places.iter().any(|other| other.name == place.name) {
+        if !names.insert(place.name.clone()) {
             let what = format!("two places are called `{}`; give one another `name`", place.name);
             return Err(text.wrong(span(keys.name.as_ref()).unwrap_or(spanned.span()), what));
         }
@@ -263,7 +272,7 @@ fn how(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Path)
     }
     let spacing_m = keys.spacing.as_ref().map(|spacing| spacing.get_ref().metres);
     let within_m = keys.within.as_ref().map_or(DEFAULT_WITHIN_M, |within| within.get_ref().metres);
-    let how = if let Some(count) = text.int("taxels", keys.taxels.as_ref(), 1..MAX_COUNT as i64 + 1)? {
+    let how = if let Some(count) = text.int("taxels", keys.taxels.as_ref(), 1..MAX_TAXELS as i64 + 1)? {
         let count = count as usize;
         match (&keys.density, spacing_m) {
             (Some(density), Some(_)) => {

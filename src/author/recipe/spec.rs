@@ -12,6 +12,7 @@ use crate::author::region::Region;
 use crate::body::Modality;
 use crate::error::{Error, Result, failed};
 use crate::length;
+use crate::limits::MAX_TAXELS;
 
 /// Which taxels to place on a body, and how to group them.
 ///
@@ -129,8 +130,8 @@ impl Recipe {
         let spacing_m = spacing.map(|length: Length| length.metres);
         let (how, flag) = match (taxels, spacing_m) {
             (Some(count), apart_m) => {
-                let wrong = || failed!("{count} taxels; ask for 1 to {MAX_COUNT}").at("--taxels");
-                let fits = usize::try_from(count).ok().filter(|count| (1..=MAX_COUNT).contains(count));
+                let wrong = || failed!("{count} taxels; ask for 1 to {MAX_TAXELS}").at("--taxels");
+                let fits = usize::try_from(count).ok().filter(|count| (1..=MAX_TAXELS).contains(count));
                 (Placement::Evenly { count: fits.ok_or_else(wrong)?, apart_m }, "--taxels")
             }
             (None, Some(spacing_m)) => (Placement::Apart { spacing_m }, "--spacing"),
@@ -141,7 +142,7 @@ impl Recipe {
         let name = if nodes.is_empty() { SKIN.to_owned() } else { nodes.join(", ") };
         let mut regions = Vec::new();
         if !nodes.is_empty() {
-            let at = Origin("--region".to_owned());
+            let at = Origin::flag("--region");
             let node = Some(Globs::try_from(Names(nodes.to_vec())).map_err(|e| at.put(e))?);
             let region = Region { node, material: None, attribute: None, bounds: None, except: Vec::new(), at };
             recipe.regions.insert(name.clone(), region);
@@ -154,7 +155,7 @@ impl Recipe {
             first_id: 0,
             modality: Modality::Pressure,
             how,
-            at: Origin(flag.to_owned()),
+            at: Origin::flag(flag),
         });
         Ok(recipe)
     }
@@ -194,8 +195,6 @@ impl Recipe {
 }
 
 pub(super) const SKIN: &str = "skin";
-
-pub(super) const MAX_COUNT: usize = 4_000_000;
 
 /// The metres of `unit`.
 pub(super) fn unit_metres(unit: &str) -> Result<f64> {

@@ -3,9 +3,7 @@
 use super::mask;
 use crate::body::{Sheet, SheetCell};
 use crate::error::{Error, Result, failed};
-
-/// Most cells of a grid.
-const MAX_CELLS: u64 = 1_000_000;
+use crate::limits::{MAX_CELLS, MAX_FIELDS};
 
 /// How the cells of a grid are numbered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -137,7 +135,7 @@ impl SheetGrid {
 
     fn check(&self) -> Result<()> {
         let (rows, columns) = (self.rows, self.columns);
-        if rows == 0 || columns == 0 || u64::from(rows) * u64::from(columns) > MAX_CELLS {
+        if rows == 0 || columns == 0 || u64::from(rows) * u64::from(columns) > MAX_CELLS as u64 {
             return Err(failed!("a grid of {rows} rows and {columns} columns; give it 1 to {MAX_CELLS} cells"));
         }
         if self.present.as_ref().is_some_and(|present| present.len() != (rows * columns) as usize) {
@@ -151,6 +149,9 @@ impl SheetGrid {
         match self.regions {
             Some([down, across]) if down == 0 || across == 0 || down > rows || across > columns => Err(failed!(
                 "{down} × {across} regions do not fit {rows} rows and {columns} columns; ask for fewer, at least one"
+            )),
+            Some([down, across]) if u64::from(down) * u64::from(across) > MAX_FIELDS as u64 => Err(failed!(
+                "{down} × {across} regions are over the {MAX_FIELDS} fields that a sheet may have; ask for fewer"
             )),
             _ => Ok(()),
         }

@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use comfy_table::Cell;
-use console::style;
 use serde_json::{Value, json};
 use somatic::author::{Authored, PlaceReport};
 use somatic::body::Body;
 use somatic::field::FieldSet;
 
 use crate::cli::table::{plain, shown};
-use crate::cli::words::{bullet, count, millimetres};
+use crate::cli::words::{bullet, count, millimetres, title};
 
 /// Links, ids and moves that a person is shown.
 const MOST_LISTED: usize = 6;
@@ -45,7 +44,7 @@ pub(super) fn text(output: &Path, authored: &Authored, robot: bool) -> String {
         0 => String::new(),
         triangles => format!(", on {}", count(triangles as u64, "triangle")),
     };
-    let mut text = format!("{}: {taxels} in {fields}{surface}\n", style(output.display()).bold());
+    let mut text = format!("{}: {taxels} in {fields}{surface}\n", title(&output.display().to_string()));
     if authored.places.is_empty() {
         text += &format!(
             "  its taxels are those it had{}\n",

@@ -1,13 +1,12 @@
 //! What is in a bag of ROS 2, for people and machines.
 
-use console::style;
 use serde_json::{Value, json};
 use somatic::FrameTime;
 use somatic::recording::{BagSurvey, SurveyedTopic};
 use somatic::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
 
 use super::super::table::{plain, shown};
-use super::super::words::{count, number, size_words, span};
+use super::super::words::{count, number, size_words, span, title};
 
 /// What runs read messages of the type `kind` as, if they do.
 fn read_as(kind: &str) -> Option<&'static str> {
@@ -26,7 +25,7 @@ fn seconds_of(ns: u64) -> f64 {
 pub(super) fn text(name: &str, survey: &BagSurvey) -> String {
     let spans = survey.topics.iter().filter_map(|topic| topic.span_ns);
     let whole = spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-    let mut text = format!("{}\n", style(name).bold());
+    let mut text = format!("{}\n", title(name));
     let files = count(survey.files as u64, "file");
     text += &format!("  {:<12}bag of ROS 2, {files}, {}\n", "kind", size_words(survey.bytes));
     if let Some([first_ns, last_ns]) = whole {

@@ -1,6 +1,6 @@
 //! A body in words and tables.
 
-use comfy_table::{ColumnConstraint, Table};
+use comfy_table::ColumnConstraint;
 use console::style;
 use rstar::RTree;
 use somatic::author::Coverage;
@@ -8,14 +8,14 @@ use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, RestOverlap, WORLD};
 
 use super::inspection::Inspection;
-use crate::cli::table::{plain, shown};
-use crate::cli::words::{bullet, count, millimetres};
+use crate::cli::table::{TextTable, plain, shown};
+use crate::cli::words::{bullet, count, millimetres, one_line, title};
 
 /// All there is to say, the oddest last, where it is read.
 pub(super) fn text(seen: &Inspection) -> String {
     let Inspection { body, fields, findings, .. } = seen;
-    let mut text = format!("{}\n", style(&body.name).bold());
-    let mut line = |what: &str, value: String| text += &format!("  {what:<10}{value}\n");
+    let mut text = format!("{}\n", title(&body.name));
+    let mut line = |what: &str, value: String| text += &format!("  {what:<10}{}\n", one_line(&value));
     let triangles: usize = body.surfaces.iter().map(|surface| surface.triangles.len()).sum();
     line("links", body.links.len().to_string());
     let surfaces = count(triangles as u64, "triangle");
@@ -91,11 +91,13 @@ fn coverage(body: &Body, coverage: &Coverage) -> Vec<(&'static str, String)> {
     lines
 }
 
-fn links(body: &Body, coverage: &Coverage) -> Table {
+fn links(body: &Body, coverage: &Coverage) -> TextTable {
     let mut table = plain(["link", "taxels", "cm²", "seen"], 1..4);
     let parents: Vec<Option<usize>> = body.links.iter().map(|link| link.parent).collect();
+    let mut taxels_on = vec![0; body.links.len()];
+    body.taxels.iter().for_each(|taxel| taxels_on[taxel.link] += 1);
     for (link, branch) in branches(&parents) {
-        let taxels = body.taxels.iter().filter(|taxel| taxel.link == link).count();
+        let taxels = taxels_on[link];
         let surface = coverage.links.iter().find(|of| of.link == link);
         let area = surface.map_or(String::new(), |of| format!("{:.1}", of.area * 1e4));
         let seen = surface.filter(|of| of.seen > 0.0);
@@ -106,7 +108,7 @@ fn links(body: &Body, coverage: &Coverage) -> Table {
 }
 
 /// Links whose taxels are so near at rest that touches there could be one contact.
-fn overlaps(body: &Body, overlaps: &[RestOverlap]) -> Table {
+fn overlaps(body: &Body, overlaps: &[RestOverlap]) -> TextTable {
     let mut table = plain(["near at rest", "taxels", "nearest mm", "within mm", "pairs that face"], 2..5);
     for overlap in overlaps {
         let [a, b] = overlap.links.map(|link| body.links[link].name.as_str());
@@ -122,7 +124,7 @@ fn overlaps(body: &Body, overlaps: &[RestOverlap]) -> Table {
     table
 }
 
-fn tree(body: &Body, fields: &[Field]) -> Table {
+fn tree(body: &Body, fields: &[Field]) -> TextTable {
     let mut table = plain(["field", "taxels", "radius mm", "anchor", "distortion", "chart"], [1, 2, 4]);
     // Where it is narrow, reasons are wrapped and names are not.
     table.set_constraints((0..5).map(|_| ColumnConstraint::ContentWidth));

@@ -1,19 +1,18 @@
 //! A bill as text and as JSON.
 
 use comfy_table::ColumnConstraint;
-use console::style;
 use serde_json::{Value, json};
 use somatic::Agreement;
 use somatic::tradeoff::Words;
 
 use super::bill::{Bill, Stage};
 use crate::cli::table::{plain, shown};
-use crate::cli::words::count;
+use crate::cli::words::{count, one_line, title};
 
 impl Bill {
     pub(super) fn text(&self) -> String {
-        let mut text = format!("{}\n", style(&self.body).bold());
-        let mut line = |what: &str, value: String| text += &format!("  {what:<12}{value}\n");
+        let mut text = format!("{}\n", title(&self.body));
+        let mut line = |what: &str, value: String| text += &format!("  {what:<12}{}\n", one_line(&value));
         line("fields", format!("{} of {}", self.fields[0], self.fields[1]));
         line("taxels", format!("{} of {} are read", self.taxels[0], self.taxels[1]));
         line("memberships", self.memberships.to_string());

@@ -12,7 +12,7 @@ use somatic::source::{BoardState, Lines, SerialSource};
 use somatic::{Error, Frame, Result};
 
 use crate::cli::feed::{Arrival, Feed};
-use crate::cli::stdio::say;
+use crate::cli::stdio::{for_terminal, say};
 use crate::cli::words;
 
 /// Boards without progress for this long are given up.
@@ -82,7 +82,7 @@ impl Guide {
         if self.term.is_term() {
             self.clear();
             let width = usize::from(self.term.size().1).saturating_sub(1);
-            self.shown = self.term.write_str(&words::clipped(&text(), width)).is_ok();
+            self.shown = self.term.write_str(&for_terminal(&words::clipped(&text(), width), true)).is_ok();
         }
     }
 }

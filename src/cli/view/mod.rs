@@ -9,7 +9,6 @@ mod shared;
 mod subject;
 mod timeline;
 
-use std::io::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -134,7 +133,7 @@ impl Opening<'_> {
     fn start(&self, scene: PageScene) -> Result<Opened> {
         let (server, publisher) = Server::start(&self.listen, scene)?;
         // A closed standard error is no reason to stop.
-        let _ = std::io::stderr().write_all(server.announcement().as_bytes());
+        somatic::plain::announce(&server.announcement());
         let handed_over = match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
             Ok(file) => file,
             Err(error) => {

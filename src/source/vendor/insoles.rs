@@ -1,11 +1,11 @@
 //! Where an insole's sensors are, from a table beside a recording that does not say it.
 
-use std::fs::File;
 use std::path::Path;
 
 use super::layout::Cell;
 use crate::body::{TaxelRow, read_taxel_table};
 use crate::error::{Error, Result, failed};
+use crate::limits::{self, MAX_TABLE_BYTES};
 
 /// The panel whose places are those of the other one, mirrored.
 const MIRRORED: &str = "right";
@@ -20,7 +20,7 @@ pub(super) struct Insoles {
 
 impl Insoles {
     pub(super) fn load(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+        let file = limits::open(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
         let rows = read_taxel_table(file, true).map_err(|e| e.at(path.display()))?;
         Ok(Self { name: path.display().to_string(), rows })
     }

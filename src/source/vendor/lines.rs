@@ -10,9 +10,8 @@ use encoding_rs::{UTF_16BE, UTF_16LE};
 use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 
 use crate::error::{Error, Result};
+use crate::limits::MAX_LINE_BYTES;
 
-/// Longest accepted line, so that a file that is no table does not fill the memory.
-const MAX_LINE_BYTES: usize = 64 << 20;
 /// Bytes that are looked at to tell encoding and format.
 pub(super) const HEAD_BYTES: usize = 1 << 16;
 const BUFFER_BYTES: usize = 1 << 18;
@@ -117,7 +116,7 @@ impl Lines {
                 let start = std::mem::replace(&mut self.start, self.end);
                 return Ok(Some(without_return(&self.buffer[start..self.end])));
             }
-            if searched > MAX_LINE_BYTES {
+            if searched as u64 > MAX_LINE_BYTES {
                 return Err(Error::failed(format!(
                     "a line of over {} MiB: no table, or its lines have no end",
                     MAX_LINE_BYTES >> 20
