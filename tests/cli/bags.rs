@@ -221,7 +221,7 @@ fn a_bag_gives_the_percepts_of_the_tables_that_it_holds() {
     std::fs::write(&scene, text.replace("'auto'", "0")).unwrap();
     assert!(done(&["run", text_of(&scene)]) == expected);
     std::fs::write(&scene, text.replace("'auto'", "'soon'")).unwrap();
-    let why = refused(1, &["run", text_of(&scene)]);
+    let why = refused(2, &["run", text_of(&scene)]);
     assert!(why.contains("line 6") && why.contains("give seconds, or \"auto\""), "{why}");
     // A bag that is read is not written to.
     let sink = format!("ros2-mcap:{}", text_of(&bag));

@@ -8,7 +8,7 @@ fn a_build_without_it_says_how_to_get_it() {
     super::skips::skip("ZENOH", "built without the feature `zenoh`: cargo test --features zenoh --test cli limbs");
     for arguments in [["--sink", "zenoh:robot/arm"], ["--sink", "zenoh-percepts:arm"], ["--source", "zenoh:robot/arm"]]
     {
-        assert!(fails(1, &[&["run"], &arguments[..]].concat()).contains("cargo install somatic --features zenoh"));
+        assert!(fails(1, &[&["run"], &arguments[..]].concat()).contains("--features zenoh"));
     }
 }
 

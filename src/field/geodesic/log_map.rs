@@ -1,12 +1,12 @@
 //! Windows, their priority queue, and the shortest paths that they give.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
 use super::SurfacePlace;
+use super::queue::{QueueEntry, VERTEX_FLAG};
 use super::source::{Fan, Source, Start, Wedge, angle, towards};
 use crate::body::{NONE, Topology, next};
 use crate::error::{Error, Result, failed};
@@ -58,38 +58,6 @@ impl Window {
         if t.is_nan() { a.length() } else { a.lerp(b, t).length() }
     }
 }
-
-/// An entry of the queue; small, as a queue of windows themselves is slow.
-struct QueueEntry {
-    distance_m: f64,
-    /// Sequence number, which makes the order total.
-    turn: u32,
-    /// Index of a window; or with [`VERTEX_FLAG`] set, of a vertex.
-    what: u32,
-}
-
-/// Flag of an entry for a vertex.
-const VERTEX_FLAG: u32 = 1 << 31;
-
-impl Ord for QueueEntry {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.distance_m.total_cmp(&self.distance_m).then(other.turn.cmp(&self.turn))
-    }
-}
-
-impl PartialOrd for QueueEntry {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for QueueEntry {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for QueueEntry {}
 
 /// The shortest known path to a vertex.
 #[derive(Clone, Copy, Debug)]

@@ -7,6 +7,7 @@
 
 mod log_map;
 mod place;
+mod queue;
 mod source;
 
 pub(crate) use log_map::{FIRST_LIMIT, MAX_WINDOWS};

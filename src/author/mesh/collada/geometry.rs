@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use roxmltree::Node;
 
-use super::File;
+use super::file::File;
 use crate::author::mesh::triangles::Triangles;
 use crate::error::Result;
 

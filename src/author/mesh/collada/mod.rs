@@ -1,5 +1,6 @@
 //! Reads COLLADA 1.4 and 1.5: the meshes of its scene, each as often as it is placed, where its nodes put it.
 
+mod file;
 mod geometry;
 mod numbers;
 mod transform;
@@ -8,12 +9,13 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use glam::{DAffine3, DVec3};
-use roxmltree::{Document, Node};
+use roxmltree::Node;
 
+use self::file::File;
 use super::options::{Up, check_unit};
 use super::triangles::Triangles;
-use super::xml::{self, Lines};
-use crate::error::{Error, Result, failed};
+use super::xml;
+use crate::error::{Result, failed};
 use crate::limits::{MAX_NODES, MAX_XML_DEPTH};
 
 /// The mesh in metres, in the axes of the file, and which of these points up.
@@ -33,12 +35,6 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Triangles, Up)> {
     Ok((mesh, up))
 }
 
-/// A document, with its elements by what they are and by `id`.
-struct File<'a> {
-    by_id: HashMap<(&'a str, &'a str), Node<'a, 'a>>,
-    lines: Lines,
-}
-
 /// A node that is still to be placed.
 struct Placed<'a> {
     node: Node<'a, 'a>,
@@ -47,32 +43,6 @@ struct Placed<'a> {
 }
 
 impl<'a> File<'a> {
-    fn of(document: &'a Document<'a>) -> Self {
-        let mut by_id = HashMap::new();
-        for node in document.descendants() {
-            if let Some(id) = node.attribute("id") {
-                by_id.entry((node.tag_name().name(), id)).or_insert(node);
-            }
-        }
-        Self { by_id, lines: Lines::of(document) }
-    }
-
-    fn at(&self, node: Node<'_, '_>, what: impl Into<String>) -> Error {
-        Error::failed(format!("not a valid COLLADA mesh: {}", what.into()))
-            .at(format!("line {}", self.lines.line(node)))
-    }
-
-    /// The element `tag` that the attribute `key` of `node` names.
-    fn named(&self, node: Node<'a, 'a>, key: &str, tag: &'static str) -> Result<Node<'a, 'a>> {
-        let missing = || self.at(node, format!("<{}> has no `{key}`", node.tag_name().name()));
-        let url = node.attribute(key).ok_or_else(missing)?;
-        let Some(id) = url.strip_prefix('#') else {
-            return Err(self.at(node, format!("`{url}` is in another file; export all into one")));
-        };
-        let unknown = || self.at(node, format!("there is no <{tag}> called `{id}`; export it again"));
-        self.by_id.get(&(tag, id)).copied().ok_or_else(unknown)
-    }
-
     fn unit_and_up(&self, asset: Node<'a, 'a>) -> Result<(f64, Up)> {
         let child = |tag: &'static str| asset.children().find(|node| node.has_tag_name(tag));
         let unit_m = match child("unit").and_then(|unit| Some((unit, unit.attribute("meter")?))) {

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use roxmltree::Node;
 
-use super::File;
+use super::file::File;
 use crate::error::Result;
 
 impl<'a> File<'a> {

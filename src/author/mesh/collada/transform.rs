@@ -3,7 +3,7 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use roxmltree::Node;
 
-use super::File;
+use super::file::File;
 use crate::error::Result;
 
 impl<'a> File<'a> {
