@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     joints: Option<PathBuf>,
 
     /// Axis that points up in the URDF of --joints [default: z].
-    #[arg(long, requires = "joints")]
+    #[arg(long, requires = "joints", value_name = "AXIS")]
     up: Option<Up>,
 }
 
