@@ -47,7 +47,9 @@ pub(crate) fn write(
         return Err(usage(py, "a page shows frames too; see `Engine.view`"));
     }
     if spec.needs_frames() {
-        let what = format!("sink `{text}` has frames too, and percepts alone are written here; write mcap:FILE, ndjson:FILE or csv:FILE, or run `somatic run --sink {text}`");
+        let what = format!(
+            "sink `{text}` has frames too, and percepts alone are written here; write mcap:FILE, ndjson:FILE or csv:FILE, or run `somatic run --sink {text}`"
+        );
         return Err(usage(py, what));
     }
     if wide && !matches!(spec, SinkSpec::Csv(_)) {
