@@ -25,13 +25,13 @@ pub fn line(text: &str) -> Cow<'_, str> {
     escape(text, is_hidden, |_| None)
 }
 
-/// As [`line`], but for line ends and tabs, which stay.
+/// As [`line()`], but for line ends and tabs, which stay.
 #[must_use]
 pub fn lines(text: &str) -> Cow<'_, str> {
     escape(text, is_hidden_in_text, |_| None)
 }
 
-/// As [`line`], but for `\x1b[…m` with the colours and weights of a command's own text, which stay.
+/// As [`line()`], but for `\x1b[…m` with the colours and weights of a command's own text, which stay.
 #[must_use]
 pub fn coloured_line(text: &str) -> Cow<'_, str> {
     escape(text, is_hidden, colour)
@@ -55,7 +55,7 @@ pub fn without_colours(text: &str) -> String {
     left + rest
 }
 
-/// Without what XML 1.0 cannot hold in any way: such characters are escaped as in [`line`].
+/// Without what XML 1.0 cannot hold in any way: such characters are escaped as in [`line()`].
 #[must_use]
 pub fn xml(text: &str) -> Cow<'_, str> {
     escape(text, |c| !is_xml(c), |_| None)

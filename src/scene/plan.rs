@@ -1,5 +1,7 @@
 //! The plan: the least work that gives a scene what it asks for, as plain data that a backend runs.
 
+mod lookups;
+
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -10,17 +12,16 @@ use super::left_out::{LeftOut, is_pressure, pressed_members};
 use super::members::{LinkPart, beside, parts, quantity_of, surface, thresholds, unit_of, weights};
 use super::onset::{SoftOnset, softened};
 use super::stages::Stages;
-use super::{Arithmetic, Coordinates, Knobs, Scene, choose_fields};
+use super::{Coordinates, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
 use crate::percept::{Flags, Outputs};
 use crate::signal::{Calibration, Letter, Mark, Quantity, Receptor, Response, TaxelCalibration};
-use crate::stage::calibrate::Table;
 use crate::stage::footprint::Layer;
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
-use crate::stage::{Sums, filter, layout, touches};
+use crate::stage::{filter, layout, touches};
 
 /// What a backend runs: only the taxels, fields and stages that the scene needs.
 #[derive(Clone, Debug)]
@@ -428,43 +429,5 @@ impl Plan {
     #[must_use]
     pub fn label(&self, field: usize) -> String {
         self.fields.get(field).map_or(String::new(), |named| format!("{}{}", named.name, self.mark(field)))
-    }
-
-    /// Per slot that is calibrated.
-    pub(crate) fn curve_of(&self, slot: usize) -> Table<'_> {
-        self.curves.of(self.taxels[slot].response)
-    }
-
-    pub(crate) fn members_of(&self, field: &PlanField) -> &[layout::Member] {
-        &self.members[field.first..field.first + field.count]
-    }
-
-    /// The weight of member `member` of `field`, as the layout has it.
-    pub(crate) fn weight(&self, field: &PlanField, member: usize) -> f64 {
-        field.weights.get(member).copied().unwrap_or_else(|| self.members[field.first + member].weight.into())
-    }
-
-    /// How many taxels' pressures percepts keep.
-    pub(crate) fn kept_pressures(&self) -> usize {
-        if self.stages().pressures { self.slots() } else { 0 }
-    }
-
-    /// What is traded for what.
-    #[must_use]
-    pub fn knobs(&self) -> Knobs {
-        self.knobs
-    }
-
-    /// How single precision adds up over a field of `members`, and so how far it may be off.
-    pub(crate) fn sums(&self, members: usize) -> Sums {
-        if self.is_compensated() { Sums::compensated(members) } else { Sums::OnePass }
-    }
-
-    pub(crate) fn is_compensated(&self) -> bool {
-        self.knobs.arithmetic == Some(Arithmetic::Compensated)
-    }
-
-    pub(crate) fn stages(&self) -> Stages {
-        self.stages
     }
 }

@@ -250,7 +250,7 @@ impl Survey {
             None => self.stop_of_many(&at_rest, invert, |sensor| clear(sensor, side)),
         };
         // A sensor may rest far above the way that is left to its end: only with its range can it be calibrated.
-        let raw_range = raw_range.or_else(|| end.filter(|_| !invert).map(|end| range::range_to(end, lowest)));
+        let raw_range = raw_range.or_else(|| end.filter(|_| !invert).map(|end| range_to(end, lowest)));
         let pressed: Vec<Option<f64>> =
             (0..self.ids.len()).map(|sensor| clear(sensor, side).then(|| travels[sensor][side])).collect();
         let mut known: Vec<f64> = pressed.iter().copied().flatten().collect();
@@ -408,6 +408,12 @@ impl Findings {
         let end = self.raw_range.map(|[low, high]| if self.invert { low } else { high });
         found.baseline.is_none() || found.moved || found.went_other_way || found.baseline == end
     }
+}
+
+/// The raw values of sensors that rise to `end` and no further, of which `lowest` is the lowest that was seen: from 0 on, or from as
+/// far down as up.
+fn range_to(end: f64, lowest: f64) -> [f64; 2] {
+    [if lowest >= 0.0 { 0.0 } else { lowest.min(-end - 1.0) }, end]
 }
 
 #[cfg(test)]

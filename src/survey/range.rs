@@ -73,9 +73,3 @@ impl Survey {
         (there >= 3 && 10 * there >= ends.len() && !is_passed).then(|| end.into())
     }
 }
-
-/// The raw values of sensors that rise to `end` and no further, of which `lowest` is the lowest that was seen: from 0 on, or from as
-/// far down as up.
-pub(super) fn range_to(end: f64, lowest: f64) -> [f64; 2] {
-    [if lowest >= 0.0 { 0.0 } else { lowest.min(-end - 1.0) }, end]
-}

@@ -1,0 +1,47 @@
+//! What backends look up in a plan: by slot, by field, by knob.
+
+use super::super::stages::Stages;
+use super::super::{Arithmetic, Knobs};
+use super::{Plan, PlanField};
+use crate::stage::calibrate::Table;
+use crate::stage::{Sums, layout};
+
+impl Plan {
+    /// Per slot that is calibrated.
+    pub(crate) fn curve_of(&self, slot: usize) -> Table<'_> {
+        self.curves.of(self.taxels[slot].response)
+    }
+
+    pub(crate) fn members_of(&self, field: &PlanField) -> &[layout::Member] {
+        &self.members[field.first..field.first + field.count]
+    }
+
+    /// The weight of member `member` of `field`, as the layout has it.
+    pub(crate) fn weight(&self, field: &PlanField, member: usize) -> f64 {
+        field.weights.get(member).copied().unwrap_or_else(|| self.members[field.first + member].weight.into())
+    }
+
+    /// How many taxels' pressures percepts keep.
+    pub(crate) fn kept_pressures(&self) -> usize {
+        if self.stages().pressures { self.slots() } else { 0 }
+    }
+
+    /// What is traded for what.
+    #[must_use]
+    pub fn knobs(&self) -> Knobs {
+        self.knobs
+    }
+
+    /// How single precision adds up over a field of `members`, and so how far it may be off.
+    pub(crate) fn sums(&self, members: usize) -> Sums {
+        if self.is_compensated() { Sums::compensated(members) } else { Sums::OnePass }
+    }
+
+    pub(crate) fn is_compensated(&self) -> bool {
+        self.knobs.arithmetic == Some(Arithmetic::Compensated)
+    }
+
+    pub(crate) fn stages(&self) -> Stages {
+        self.stages
+    }
+}
