@@ -11,8 +11,8 @@
 
 mod figure;
 mod file;
-mod range;
 pub mod tuning;
+mod which_way;
 
 use somatic::error::{Error, Result};
 use somatic::signal::{RawValue, UnitOfP};
