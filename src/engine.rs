@@ -33,7 +33,7 @@ use crate::field::{FieldSet, NoChart, Recharted, neighbours};
 use crate::percept::Percepts;
 use crate::scene::{Cadence, Plan, Scene};
 use crate::signal::{Calibration, Frame, FrameTime, Intake, RawValue, Receptor, Unfit, Wiring};
-use crate::stage::calibrate;
+use crate::stage::{Pressed, calibrate};
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -109,6 +109,8 @@ pub struct Engine {
     /// Per taxel of the body its channel of the plan, if it has one.
     channel_of_taxel: Vec<Option<u32>>,
     links: Links,
+    /// Memory for the pressed taxels of a field, empty between calls.
+    pressed: Vec<Pressed>,
     /// Where contacts are asked for.
     contacts: Option<Contacts>,
     /// Fields that could not have the kind of chart that is asked for.
@@ -176,6 +178,9 @@ impl Engine {
                 .map(|taxel| plan.body_taxels.binary_search(&taxel).ok().and_then(|channel| channel.try_into().ok()))
                 .collect(),
             links: Links::new(body, &scene),
+            pressed: Vec::with_capacity(
+                plan.fields.iter().map(|field| plan.members_of(field).len()).max().unwrap_or(0),
+            ),
             contacts: Contacts::new(body, &plan, &scene),
             kept_charts: recharted.kept,
             plan,

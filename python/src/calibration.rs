@@ -1,7 +1,9 @@
 //! `Calibration`.
 
+use std::ffi::CString;
 use std::path::PathBuf;
 
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use somatic::Calibration;
 
@@ -30,6 +32,29 @@ impl PyCalibration {
         inner.check_body(&body.inner.name)?;
         Ok(Self { taxels: inner.taxels.len(), inner, text: text.to_owned() })
     }
+
+    /// This one laid over `own`, which comes with the file `of`, as the command does it: keys that it has replace the file's own,
+    /// others stay. With it, what stays and a unit that is replaced, a line each.
+    pub(crate) fn over(&self, own: &Self, of: &str, body: &PyBody) -> somatic::Result<(Self, Vec<String>)> {
+        let laid = Calibration::lay_over(&own.text, &self.text)?;
+        let stays = match &laid.stays[..] {
+            [] => None,
+            stays => Some(format!("{of}: of its own calibration, this stays under yours: {}", stays.join(", "))),
+        };
+        let replaced =
+            laid.replaced_unit.map(|[own, given]| format!("{of}: your calibration replaces its unit {own} by {given}"));
+        let both = Self::of_text(&laid.text, body).map_err(|e| e.at(format!("laid over the calibration of {of}")))?;
+        Ok((both, stays.into_iter().chain(replaced).collect()))
+    }
+}
+
+/// Gives each of `lines` as a Python warning.
+pub(crate) fn warn(py: Python<'_>, lines: Vec<String>) -> PyResult<()> {
+    for line in lines {
+        let line = CString::new(line).map_err(|e| PyErr::from(std::io::Error::other(e)))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)?;
+    }
+    Ok(())
 }
 
 #[pymethods]

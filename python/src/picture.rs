@@ -163,11 +163,14 @@ pub(crate) fn render(
     if uv.is_some() && (look_at.is_some() || !views.is_empty()) {
         return Err(usage(py, "uv draws a chart, which has neither views nor a part to look at"));
     }
-    let own = recording.and_then(|recording| recording.calibration.as_ref()).map(|own| own.bind(py));
+    let calibration = match recording {
+        Some(recording) => recording.calibrated(py, calibration, body.get())?,
+        None => None,
+    };
     let wish = Wish {
         body: body.get(),
         recording,
-        calibration: calibration.or(own).map(Bound::get),
+        calibration: calibration.as_ref().map(Py::get),
         at_s,
         from_s,
         to_s,

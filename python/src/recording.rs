@@ -12,7 +12,7 @@ use somatic::{Error, Frame, RawValue, bundled};
 
 use crate::arrays::array;
 use crate::body::PyBody;
-use crate::calibration::PyCalibration;
+use crate::calibration::{PyCalibration, warn};
 use crate::error::{OrRaise, usage};
 use crate::threads::free;
 
@@ -39,6 +39,8 @@ pub(crate) struct PyRecording {
     pose: Py<PyDict>,
     pub(crate) body: Option<Py<PyBody>>,
     pub(crate) calibration: Option<Py<PyCalibration>>,
+    /// Whether a calibration that is given replaces its own.
+    is_simulated: bool,
     losses: Vec<String>,
     length_s: f64,
 }
@@ -93,7 +95,8 @@ impl PyRecording {
         self.losses.clone()
     }
 
-    /// An engine for its body and its taxels, under its calibration or another one.
+    /// An engine for its body and its taxels, under its calibration. `calibration` is laid over that: keys that it has replace the
+    /// recording's own, others stay, and a warning names those. A simulation's calibration is replaced.
     #[pyo3(signature = (scene = None, calibration = None, backend = None, *, batch = 256))]
     fn engine<'py>(
         &self,
@@ -106,12 +109,12 @@ impl PyRecording {
         let Some(body) = &self.body else {
             return Err(usage(py, format!("{}: it has no body; read it with body=", self.name)));
         };
-        let own = || self.calibration.as_ref().map(|own| own.clone_ref(py));
+        let calibration = self.calibrated(py, calibration.as_ref().map(|given| given.bind(py)), body.bind(py).get())?;
         let keys = PyDict::new(py);
         keys.set_item("taxels", self.taxels.clone())?;
         keys.set_item("batch", batch)?;
         let class = py.get_type::<crate::engine::PyEngine>();
-        class.call((body, scene, calibration.or_else(own), backend), Some(&keys))
+        class.call((body, scene, calibration, backend), Some(&keys))
     }
 
     fn __len__(&self) -> usize {
@@ -130,6 +133,26 @@ impl PyRecording {
 }
 
 /// What a source delivered.
+impl PyRecording {
+    /// The calibration that holds for it on `body`: its own, with `given` laid over it.
+    pub(crate) fn calibrated(
+        &self,
+        py: Python<'_>,
+        given: Option<&Bound<'_, PyCalibration>>,
+        body: &PyBody,
+    ) -> PyResult<Option<Py<PyCalibration>>> {
+        Ok(match (given, &self.calibration) {
+            (Some(given), Some(own)) if !self.is_simulated => {
+                let (both, lines) = given.get().over(own.get(), &self.name, body).or_raise(py)?;
+                warn(py, lines)?;
+                Some(Py::new(py, both)?)
+            }
+            (Some(given), _) => Some(given.clone().unbind()),
+            (None, own) => own.as_ref().map(|own| own.clone_ref(py)),
+        })
+    }
+}
+
 #[derive(Default)]
 pub(crate) struct Frames {
     t_s: Vec<f64>,
@@ -157,6 +180,7 @@ impl Frames {
         source: &dyn Source,
         body: Option<Py<PyBody>>,
         calibration: Option<Py<PyCalibration>>,
+        is_simulated: bool,
     ) -> PyResult<PyRecording> {
         let (frames, taxels) = (self.t_s.len(), source.taxels().to_vec());
         let pose = PyDict::new(py);
@@ -177,6 +201,7 @@ impl Frames {
             pose: pose.unbind(),
             body,
             calibration,
+            is_simulated,
             losses: source.losses(),
             length_s,
         })
@@ -312,7 +337,7 @@ pub(crate) fn read(
         let mut touch = CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None).or_raise(py)?;
         let frames = gather(py, &mut touch, Path::new(""))?;
         let body = Py::new(py, PyBody::bundled_or_file("hand").or_raise(py)?)?;
-        return frames.finish(py, "bundled touch".to_owned(), &touch, Some(body), None);
+        return frames.finish(py, "bundled touch".to_owned(), &touch, Some(body), None, false);
     }
     let (options, spec) = made().or_raise(py)?;
     let given = body.as_ref().map(Py::get);
@@ -331,5 +356,5 @@ pub(crate) fn read(
         }
         _ => None,
     };
-    frames.finish(py, file.display().to_string(), &*source, body, calibration)
+    frames.finish(py, file.display().to_string(), &*source, body, calibration, false)
 }

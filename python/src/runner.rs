@@ -11,7 +11,7 @@ use somatic::source::{Cut, SourceSpec, VendorOptions};
 use somatic::{BackendKind, Engine, Error, Frame};
 
 use crate::body::PyBody;
-use crate::calibration::PyCalibration;
+use crate::calibration::{PyCalibration, warn};
 use crate::error::{OrRaise, interrupted, usage};
 use crate::recording::open;
 use crate::scene::PyScene;
@@ -70,7 +70,18 @@ pub(crate) fn run<'py>(
             return Err(Error::usage("it has no body; give body=").at(file.display()));
         };
         let its_own = text.map(|text| PyCalibration::of_text(&text, body)).transpose()?;
-        let calibration = calibration.or(its_own.as_ref());
+        let laid = match (calibration, &its_own) {
+            (Some(given), Some(own)) => Some(given.over(own, &file.display().to_string(), body)?),
+            _ => None,
+        };
+        let laid = laid.map(|(both, lines)| {
+            raised = Python::attach(|py| warn(py, lines)).err();
+            both
+        });
+        if raised.is_some() {
+            return Ok(None);
+        }
+        let calibration = laid.as_ref().or(calibration).or(its_own.as_ref());
         let mut engine = Engine::new(&body.inner, scene.options(calibration.map(|it| &it.inner), backend, BATCH)?)?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(file.display()))?;
         let text = calibration.map(|calibration| calibration.text.as_str());

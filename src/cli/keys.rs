@@ -1,5 +1,6 @@
 //! The key that ends a live table: `q`, heard at once, from a terminal that is put back as it was.
 
+use std::cell::Cell;
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::sync::{Mutex, PoisonError};
 
@@ -10,7 +11,9 @@ use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, t
 static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
 
 /// Keys as they are pressed, without an echo. The terminal is put back when this is dropped.
-pub(super) struct Keys;
+pub(super) struct Keys {
+    is_ended: Cell<bool>,
+}
 
 impl Keys {
     /// Listens on standard input, where that is a terminal that this process has in front.
@@ -28,20 +31,21 @@ impl Keys {
         keys.local_modes -= LocalModes::ICANON | LocalModes::ECHO;
         *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
         tcsetattr(terminal, OptionalActions::Now, &keys).ok()?;
-        Some(Self)
+        Some(Self { is_ended: Cell::new(false) })
     }
 
-    /// Whether `q` was pressed since the last call. Waits for nothing.
+    /// Whether `q` was pressed. Waits for nothing.
     pub(super) fn ends(&self) -> bool {
         let stdin = std::io::stdin();
         let mut pressed = [0; 64];
-        let mut ends = false;
         while has_more(stdin.as_fd())
             && let Ok(count @ 1..) = rustix::io::read(stdin.as_fd(), &mut pressed)
         {
-            ends |= pressed[..count].iter().any(|key| key.eq_ignore_ascii_case(&b'q'));
+            if pressed[..count].iter().any(|key| key.eq_ignore_ascii_case(&b'q')) {
+                self.is_ended.set(true);
+            }
         }
-        ends
+        self.is_ended.get()
     }
 }
 

@@ -26,7 +26,7 @@ use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
 use super::scene::{LIVE, RunOptions, grouped};
-use super::stdio::{DONE, FAILED, print, say, tell_losses};
+use super::stdio::{DONE, FAILED, print, say, say_lines, tell_losses};
 use super::tradeoff::{say_kept, settled};
 use super::unfit::UnfitReport;
 use super::verify::has_another_to_compare;
@@ -432,7 +432,7 @@ impl Pump {
         notices.iter().for_each(|notice| say(notice));
         let code = tell_losses(&losses);
         if let Some(agreement) = self.agreement {
-            say(&format!("backend {} {agreement}", self.engine.backend().0));
+            say_lines(&format!("backend {} {agreement}", self.engine.backend().0));
             if !agreement.holds() {
                 return Ok(FAILED);
             }

@@ -21,6 +21,11 @@ pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr(), "somatic: {line}");
 }
 
+/// As [`say`], for several lines.
+pub(super) fn say_lines(text: &str) {
+    plain::announce(&format!("somatic: {text}\n"));
+}
+
 /// Prints what the arguments are answered with, help or what is wrong with them, and gives the exit code.
 pub(crate) fn answer(answer: &clap::Error) -> ExitCode {
     let (text, code) = (answer.render(), answer.exit_code());

@@ -182,7 +182,7 @@ impl Engine {
             kept,
         };
         post.flag_restart(&raw, 0, &mut self.percepts);
-        orient_again(&self.plan, &raw, &mut self.percepts);
+        orient_again(&self.plan, &raw, &mut self.percepts, &mut self.pressed);
         let first_bound = check.as_ref().map_or(0, |check| check.bounds.len());
         post.place(frames, &raw, 0, &mut self.percepts, &self.post);
         for (offset, frame) in frames.iter().enumerate() {

@@ -16,54 +16,63 @@ use crate::stage::{Pressed, calibrate, centroid, orientation};
 /// The share of S, of all taxels but one, under which single precision does not do.
 const SHARE: f32 = 1.0 / 1024.0;
 
-/// Computes the orientations of such touches in the frames of `raw` anew.
-pub(super) fn orient_again(plan: &Plan, raw: &RawBatch<'_>, percepts: &mut Percepts) {
+/// Computes the orientations of such touches in the frames of `raw` anew. `pressed` is memory, empty before and after.
+pub(super) fn orient_again(plan: &Plan, raw: &RawBatch<'_>, percepts: &mut Percepts, pressed: &mut Vec<Pressed>) {
     if !plan.stages().orientation || !plan.outputs().contains(Outputs::ORIENTATION) {
         return;
     }
     let fields = plan.fields.len();
     for frame in 0..raw.frames {
+        let first = (raw.first + frame) * fields;
         let Values::F32(parts) = &percepts.values else { return };
-        let row = (raw.first + frame) * fields..(raw.first + frame + 1) * fields;
-        let [total, peak] = [Component::Total, Component::Peak].map(|part| &parts[part][row.clone()]);
-        let is_dominated = |heaviest: f32, total: f32, peak: f32| total - heaviest * peak < SHARE * total;
-        let cells = || plan.heaviest.iter().zip(total.iter().zip(peak));
+        let [total, peak] = [Component::Total, Component::Peak].map(|part| &parts[part][first..first + fields]);
+        let cells = plan.heaviest.iter().zip(total.iter().zip(peak));
         // All of them without a branch, as there is nearly always none.
-        if !cells().fold(false, |any, (heaviest, (total, peak))| any | is_dominated(*heaviest, *total, *peak)) {
+        if !cells.fold(false, |any, (heaviest, (total, peak))| any | is_dominated(*heaviest, *total, *peak)) {
             continue;
         }
-        let found: Vec<usize> = cells()
-            .enumerate()
-            .filter(|(_, (heaviest, (total, peak)))| is_dominated(**heaviest, **total, **peak))
-            .map(|(index, _)| index)
-            .collect();
-        for field in found {
-            orient(plan, (raw, frame), field, row.start + field, percepts);
+        for field in 0..fields {
+            let Values::F32(parts) = &percepts.values else { return };
+            let [total, peak] = [Component::Total, Component::Peak].map(|part| parts[part][first + field]);
+            if is_dominated(plan.heaviest[field], total, peak) {
+                orient(plan, (raw, frame), field, first + field, percepts, pressed);
+                pressed.clear();
+            }
         }
     }
 }
 
-fn orient(plan: &Plan, (raw, frame): (&RawBatch<'_>, usize), index: usize, cell: usize, percepts: &mut Percepts) {
+fn is_dominated(heaviest: f32, total: f32, peak: f32) -> bool {
+    total - heaviest * peak < SHARE * total
+}
+
+fn orient(
+    plan: &Plan,
+    (raw, frame): (&RawBatch<'_>, usize),
+    index: usize,
+    cell: usize,
+    percepts: &mut Percepts,
+    pressed: &mut Vec<Pressed>,
+) {
     let (field, flags) = (&plan.fields[index], percepts.flags[cell]);
     let none = Flags::NO_CONTACT | Flags::ONE_TAXEL | Flags::NO_CHART;
     if flags.intersects(none) || plan.letters()[field.letter].receptor == Receptor::Change {
         return;
     }
     let members = plan.members_of(field).iter().enumerate();
-    let pressed = members.filter_map(|(index, member)| {
+    pressed.extend(members.filter_map(|(index, member)| {
         let slot = member.slot as usize;
         let channel = plan.channel_of(slot);
         let value = raw.rows.value(frame, channel);
         let pressure = calibrate::pressure(value, &plan.calibrations[channel], plan.curve_of(slot))?;
         let (weight, place) = (plan.weight(field, index), field.places[index]);
         (pressure > 0.0).then(|| Pressed { weight, pressure, place, ..Pressed::default() })
-    });
-    let pressed: Vec<Pressed> = pressed.collect();
+    }));
     // Single precision has another set of pressed taxels only where one is at its threshold.
     if pressed.len() != percepts.active[cell] as usize {
         return;
     }
-    let line = orientation::reference(&pressed, centroid::reference(&pressed).truncate());
+    let line = orientation::reference(pressed, centroid::reference(pressed).truncate());
     // An axis that is absent may have the same reason.
     let has_axis = percepts.present(cell).intersects(Outputs::AXIS | Outputs::ANISOTROPY);
     let is_axis_together = plan.stages().axis && !has_axis && !flags.contains(Flags::ISOTROPIC);

@@ -62,11 +62,29 @@ impl LineBound {
     }
 }
 
+/// e − c of every pressed taxel.
+fn each_point(pressed: &[Pressed], centroid: DVec2) -> impl Iterator<Item = DVec2> {
+    let total: f64 = pressed.iter().map(Pressed::pull).sum();
+    pressed.iter().map(move |taxel| taxel.pull() / total * (taxel.place.truncate() - centroid))
+}
+
+/// The first three of [`points`] with their lengths; −∞ where there are fewer.
+fn three_farthest(pressed: &[Pressed], centroid: DVec2) -> [(DVec2, f64); 3] {
+    let mut farthest = [(DVec2::ZERO, f64::NEG_INFINITY); 3];
+    for point in each_point(pressed, centroid) {
+        let length = point.length();
+        // Of equal ones the earlier stays before.
+        if let Some(rank) = farthest.iter().position(|(_, other)| length > *other) {
+            farthest[rank..].rotate_right(1);
+            farthest[rank] = (point, length);
+        }
+    }
+    farthest
+}
+
 /// e − c of every pressed taxel, farthest first, equal ones in order of id; with the taxel's index.
 fn points(pressed: &[Pressed], centroid: DVec2) -> Vec<(usize, DVec2)> {
-    let total: f64 = pressed.iter().map(Pressed::pull).sum();
-    let point = |taxel: &Pressed| taxel.pull() / total * (taxel.place.truncate() - centroid);
-    let mut points: Vec<(usize, DVec2)> = pressed.iter().map(point).enumerate().collect();
+    let mut points: Vec<(usize, DVec2)> = each_point(pressed, centroid).enumerate().collect();
     // A stable sort, so that equal distances keep the order of ids.
     points.sort_by(|(_, a), (_, b)| b.length().total_cmp(&a.length()));
     points
@@ -77,13 +95,13 @@ pub(crate) fn reference(pressed: &[Pressed], centroid: DVec2) -> Line {
     if pressed.len() == 1 {
         return Line { angle: None, flags: Flags::ONE_TAXEL };
     }
-    let points = points(pressed, centroid);
-    let along = points[0].1 - points[1].1;
-    let r1 = points[0].1.length();
+    let [(first, r1), (second, r2), (_, r3)] = three_farthest(pressed, centroid);
+    let along = first - second;
     if along.length() <= NEAR * r1 {
         return Line { angle: None, flags: Flags::COINCIDENT };
     }
-    let tie = points.get(2).is_some_and(|(_, third)| points[1].1.length() - third.length() <= NEAR * r1);
+    // The third of two is −∞ away.
+    let tie = r2 - r3 <= NEAR * r1;
     Line { angle: Some(of_line(along.x, along.y)), flags: if tie { Flags::TIE } else { Flags::empty() } }
 }
 

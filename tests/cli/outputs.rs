@@ -517,6 +517,7 @@ const NO_FILES: &[&str] = &[
     "P",
     "PART,...",
     "PIXELS",
+    "RAW,...",
     "REST",
     "ROWSxCOLUMNS",
     "RADIUS",

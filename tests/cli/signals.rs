@@ -287,7 +287,7 @@ fn a_stream_that_was_closed_from_the_start_is_an_error() {
         "run --quiet --sink ndjson:/dev/stdout",
         "inspect hand",
         "info x.csv",
-        "calibrate --source x.csv -o new.toml",
+        "calibrate --body hand --source x.csv -o new.toml",
     ] {
         std::fs::write(folder.path().join("x.csv"), PRESSED).unwrap();
         let (code, said) = shell(&format!("\"$0\" {command} >&-"));
@@ -308,7 +308,7 @@ fn a_dash_is_standard_output_wherever_an_output_is_named() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("touch.csv"), PRESSED).unwrap();
     let run_in = |command: &str| {
-        let words: Vec<&str> = command.split(' ').collect();
+        let words: Vec<&str> = command.split_whitespace().collect();
         somatic(&words).current_dir(folder.path()).output().unwrap()
     };
     let out = |command: &str| {
@@ -340,7 +340,7 @@ fn a_dash_is_standard_output_wherever_an_output_is_named() {
         (format!("{run} --sink csv:- --table fileds"), "did you mean `fields`?"),
         (format!("{run} --sink out.csv --table fields"), "--sink csv:-"),
         (format!("simulate {simulation} -o -"), "give --truth a file"),
-        ("calibrate --source touch.csv -o -".to_owned(), "standard output already"),
+        ("calibrate --body hand --source touch.csv -o -".to_owned(), "standard output already"),
         ("author --grid 1x2 --pitch 5mm -o -".to_owned(), "a body is a .glb"),
         ("plot touch.csv -o -".to_owned(), ".svg or .png"),
         ("bench --dump -".to_owned(), "name one"),

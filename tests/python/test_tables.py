@@ -140,6 +140,13 @@ def test_exports(tmp_path: pathlib.Path) -> None:
     assert insoles.body is not None and insoles.calibration is not None and insoles.calibration.quantity in ("Pa", "N")
     p = insoles.engine({"outputs": ["force", "centroid"]}, backend="cpu").process(insoles.t, insoles.values)
     assert np.nanmax(p["force"]) > 50
+    given = st.Calibration("[all]\nbaseline = 1\n", insoles.body)
+    with pytest.warns(UserWarning, match=r"of its own calibration, this stays under yours: unit = "):
+        engine = insoles.engine({"outputs": ["force"]}, given, "cpu")
+    assert np.nanmax(engine.process(insoles.t, insoles.values)["force"]) > 50
+    with pytest.warns(UserWarning, match="this stays under yours"):
+        source = ROOT / "examples" / "exports" / "insoles.csv"
+        st.run(source, tmp_path / "percepts.ndjson", scene={"outputs": ["force"]}, calibration=given)
     plain = tmp_path / "plain.txt"
     plain.write_text("\n".join(" ".join(map(str, row)) for row in np.arange(24).reshape(8, 3)))
     mat = st.read(plain, grid="4x3", pitch="10mm", rate_hz=50, format="matrix", unit="kPa")
