@@ -113,6 +113,11 @@ impl Document {
         self.root.accessors.get(index).map_or(0, |accessor| accessor.count.0)
     }
 
+    /// Refuses an accessor that says of itself what the file does not hold.
+    pub(crate) fn check(&self, index: usize) -> Result<()> {
+        self.elements(index).map(drop)
+    }
+
     /// Whether accessor `index` holds single floats, as every attribute of a layout must.
     pub(crate) fn is_scalar_float(&self, index: usize) -> bool {
         self.root.accessors.get(index).is_some_and(|accessor| {
