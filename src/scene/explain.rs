@@ -170,13 +170,13 @@ impl Plan {
     /// Bytes of results that a frame brings back from a device: a status, and the numbers of the outputs, a field.
     #[must_use]
     pub fn bytes_down(&self) -> usize {
-        let numbers = numbers().filter(|(_, wanted_for)| self.outputs().intersects(*wanted_for)).count();
+        let numbers = numbers().filter(|(_, wanted_for)| self.read_back().intersects(*wanted_for)).count();
         self.fields.len() * (1 + numbers) * size_of::<f32>() + self.kept_pressures() * size_of::<f32>()
     }
 
     /// What of [`Plan::bytes_down`] is there for the sake of `stage`.
     fn bytes_from(&self, stage: &str) -> usize {
-        let own = numbers().filter(|(by, wanted_for)| *by == stage && self.outputs().intersects(*wanted_for));
+        let own = numbers().filter(|(by, wanted_for)| *by == stage && self.read_back().intersects(*wanted_for));
         let numbers = own.count();
         let status = usize::from(stage == "contact");
         let keeps = if self.stages().touches { "touches" } else { "force" };

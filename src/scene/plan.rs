@@ -278,10 +278,7 @@ impl Plan {
         if plan.stages().position || plan.stages().filter {
             plan.columns |= Outputs::CENTROID;
         }
-        if plan.stages().orientation {
-            // Whether one taxel is nearly all of a touch.
-            plan.columns |= Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
-        }
+        plan.columns |= plan.read_back();
         if plan.stages().motion || plan.stages().filter {
             plan.columns |= Outputs::ACTIVE;
         }

@@ -23,7 +23,7 @@ pub(super) struct Columns {
 
 impl Columns {
     pub(super) fn new(plan: &Plan) -> Self {
-        let (outputs, stages) = (plan.outputs, plan.stages());
+        let (outputs, stages) = (plan.read_back(), plan.stages());
         let mut all = vec![Column::Status];
         let own = [(Column::Active, Outputs::ACTIVE | Outputs::FILTERED), (Column::Motion, Outputs::MOTION)];
         let parts = Component::ALL.iter().map(|&part| match part {

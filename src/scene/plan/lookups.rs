@@ -3,6 +3,7 @@
 use super::super::stages::Stages;
 use super::super::{Arithmetic, Knobs};
 use super::{Plan, PlanField};
+use crate::percept::Outputs;
 use crate::stage::calibrate::Table;
 use crate::stage::{Sums, layout};
 
@@ -24,6 +25,12 @@ impl Plan {
     /// How many taxels' pressures percepts keep.
     pub(crate) fn kept_pressures(&self) -> usize {
         if self.stages().pressures { self.slots() } else { 0 }
+    }
+
+    /// What a device gives back: the outputs, and what tells the host of which touches one taxel is nearly all.
+    pub(crate) fn read_back(&self) -> Outputs {
+        let of_orientation = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
+        if self.outputs.contains(Outputs::ORIENTATION) { self.outputs | of_orientation } else { self.outputs }
     }
 
     /// What is traded for what.
