@@ -59,6 +59,7 @@ fn a_touch_that_rests_on_a_turning_link_moves_in_the_world_alone() {
 /// The bundled humanoid, with a pose of each link in every frame that is nowhere near its rest, and touches on several limbs.
 struct Moving {
     body: Body,
+    fields: FieldSet,
     frames: Vec<Frame>,
 }
 
@@ -83,7 +84,8 @@ impl Moving {
             frame
         };
         let frames = (0..9).map(frame_at).collect();
-        Self { body, frames }
+        let fields = FieldSet::new(&body).unwrap();
+        Self { body, fields, frames }
     }
 
     fn engine(&self, scene: Scene, backend: BackendKind) -> Engine {
@@ -105,8 +107,7 @@ impl Moving {
 
     /// Σ wP x / Σ wP over the members of field `name` where they are in `frame`, and how many links they lie on.
     fn mean(&self, name: &str, frame: &Frame) -> (Option<DVec3>, usize) {
-        let fields = FieldSet::new(&self.body).unwrap().fields;
-        let field = fields.iter().find(|field| field.name == name).unwrap();
+        let field = self.fields.fields.iter().find(|field| field.name == name).unwrap();
         let (mut total, mut moment, mut is_known, mut links) = (0.0, DVec3::ZERO, true, BTreeSet::new());
         for member in &field.members {
             let taxel = &self.body.taxels[member.taxel];
