@@ -101,7 +101,8 @@ pub(super) fn csv_skin() -> Target {
         let flat = read_taxel_table(case.bytes, true);
         told(flat)?;
         match read {
-            Ok(taxels) if taxels.len() + 1 > rows(&case.text()) => {
+            // A carriage return alone ends a row too.
+            Ok(taxels) if taxels.len() + 1 > rows(&case.text().replace('\r', "\n")) => {
                 Err(format!("{} taxels of fewer rows", taxels.len()))
             }
             read => told(read),

@@ -274,8 +274,8 @@ pub(super) fn way_out(separator: Separator, head: &[u8]) -> Error {
         let first = head.split(|&byte| byte == b'\n').find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
         let first = super::text::shortened(super::text::decoded(first).trim());
         return failed!(
-            "this is no recording that is known: no line is a row of numbers, such as `{first}`; leave only the numbers, the time \
-             before them, and give the rows and columns of a frame with --grid; {table}"
+            "this is no recording that is known: no line is a row of numbers, such as `{first}`; say what it is with --format, or \
+             leave only the numbers, the time before them, and give the rows and columns of a frame with --grid; {table}"
         );
     };
     let (height, blocks) = blocks(separator, head, is_narrow);
