@@ -89,8 +89,11 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let options = arguments.export.options()?;
     let from = source_of(&arguments.from, Some(&["csv", "mcap", "export", "sim"]), &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
-    let to = SourceSpec::one_of(to_name, &["csv", "mcap"]);
-    let to = to.map_err(|e| e.at(format!("output `{to_name}`")))?;
+    let to = match to_name {
+        // Of a source it is another kind.
+        "csv:-" => SourceSpec::Csv("-".into()),
+        _ => SourceSpec::one_of(to_name, &["csv", "mcap"]).map_err(|e| e.at(format!("output `{to_name}`")))?,
+    };
     let (SourceSpec::Csv(to_path) | SourceSpec::Mcap(to_path)) = &to else {
         unreachable!("it is of one of these kinds");
     };
