@@ -55,7 +55,8 @@ impl PySimulation {
         }
         let calibration = PyCalibration::of_text(&source.calibration(), &body).or_raise(py)?;
         let width = source.taxels().len();
-        let recording = frames.finish(py, name, &source, Some(Py::new(py, body)?), Some(Py::new(py, calibration)?), true)?;
+        let recording =
+            frames.finish(py, name, &source, Some(Py::new(py, body)?), Some(Py::new(py, calibration)?), true)?;
         Ok(Self {
             recording: Py::new(py, recording)?,
             truth: truth(py, &rows)?,
