@@ -49,7 +49,7 @@ impl PyCalibration {
 }
 
 /// Gives each of `lines` as a Python warning.
-pub(crate) fn warn(py: Python<'_>, lines: Vec<String>) -> PyResult<()> {
+pub(crate) fn warn(py: Python<'_>, lines: impl IntoIterator<Item = String>) -> PyResult<()> {
     for line in lines {
         let line = CString::new(line).map_err(|e| PyErr::from(std::io::Error::other(e)))?;
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)?;

@@ -13,7 +13,7 @@ use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts};
 use crate::agreement::told;
 use crate::arrays::{Values, poses, times, values};
 use crate::body::PyBody;
-use crate::calibration::PyCalibration;
+use crate::calibration::{PyCalibration, warn};
 use crate::error::{OrRaise, interrupted, usage};
 use crate::percepts::PyPercepts;
 use crate::scene::PyScene;
@@ -63,8 +63,8 @@ struct Inner {
 }
 
 impl Inner {
-    /// The percepts of the last call, to keep.
-    fn take(&mut self) -> Arc<Percepts> {
+    /// The percepts of the last call, to keep, and what the engine has to say: a GPU that was lost.
+    fn take(&mut self) -> (Arc<Percepts>, Option<String>) {
         let free = self.lent.iter().position(|lent| Arc::strong_count(lent) == 1);
         let spare = free.and_then(|free| Arc::into_inner(self.lent.swap_remove(free)));
         let percepts = Arc::new(self.engine.take_percepts(spare));
@@ -72,7 +72,7 @@ impl Inner {
             self.lent.remove(0);
         }
         self.lent.push(Arc::clone(&percepts));
-        percepts
+        (percepts, self.engine.notice())
     }
 
     /// Shows the last frame of a call that began at `began`, where somebody looks.
@@ -94,8 +94,11 @@ impl PyEngine {
         free(py, || work(&mut self.lock()))
     }
 
-    fn wrap(&self, percepts: Arc<Percepts>) -> PyPercepts {
-        PyPercepts::new(percepts, Arc::clone(&self.run))
+    /// What `taken` holds, for Python; its notice is a warning.
+    fn wrap(&self, py: Python<'_>, taken: (Arc<Percepts>, Option<String>)) -> PyResult<PyPercepts> {
+        let (percepts, notice) = taken;
+        warn(py, notice)?;
+        Ok(PyPercepts::new(percepts, Arc::clone(&self.run)))
     }
 
     /// The values of `frames` frames, where Python has them if they can be read there.
@@ -196,7 +199,7 @@ impl PyEngine {
                 inner.show(&block, began);
                 Ok(inner.take())
             });
-            return done.or_raise(py).map(|percepts| self.wrap(percepts));
+            return self.wrap(py, done.or_raise(py)?);
         }
         let mut raised = None;
         let done = self.without_python(py, |inner| {
@@ -216,7 +219,7 @@ impl PyEngine {
             Ok(is_whole.then(|| inner.take()))
         });
         match done.or_raise(py)? {
-            Some(percepts) => Ok(self.wrap(percepts)),
+            Some(taken) => self.wrap(py, taken),
             None => Err(interrupted(raised)),
         }
     }
@@ -249,7 +252,7 @@ impl PyEngine {
             inner.show(&block, began);
             Ok(inner.take())
         });
-        done.or_raise(py).map(|percepts| self.wrap(percepts))
+        self.wrap(py, done.or_raise(py)?)
     }
 
     /// The address at which `process` reads these values: that of the array itself where nothing is converted. For tests.
