@@ -1,6 +1,6 @@
 //! The program as a process, for what only the command reads.
 
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -19,14 +19,18 @@ pub(super) fn succeeds(arguments: &[&str]) {
 /// Whether the program takes `arguments`: it must end by itself, and say in a line why it does not.
 pub(super) fn verdict(arguments: &[&str]) -> Result<bool, String> {
     let limited = if cfg!(target_os = "linux") { format!("ulimit -v {MAX_KIB}; ") } else { String::new() };
-    let mut child = Command::new("sh")
+    let started = Command::new("sh")
         .args(["-c", &format!("{limited}exec \"$0\" \"$@\""), PROGRAM])
         .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
-        .spawn()
-        .map_err(|e| format!("cannot start the program: {e}"))?;
+        .spawn();
+    let mut child = match started {
+        // Nobody can give so many.
+        Err(e) if e.kind() == ErrorKind::ArgumentListTooLong => return Ok(false),
+        started => started.map_err(|e| format!("cannot start the program: {e}"))?,
+    };
     let mut stderr = child.stderr.take().ok_or("no standard error")?;
     let reader = std::thread::spawn(move || {
         let mut text = Vec::new();
