@@ -49,7 +49,7 @@ pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
 pub use icub_body::author_icub;
 #[cfg(feature = "meshes")]
 pub(crate) use lint::drawn_position;
-pub use lint::{DrawnPoses, Finding, FindingKind, LinkShare, lint, lint_in_poses};
+pub use lint::{DrawnPoses, Finding, FindingKind, LinkShare, lint, lint_in_poses, lint_with_progress};
 pub use place::{place_apart, place_by_density, place_evenly, widest_radius};
 pub use placed::{Placed, Progress, SurfacePoint};
 pub use recipe::Recipe;

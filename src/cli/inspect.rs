@@ -8,12 +8,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use somatic::author::mesh::Up;
-use somatic::author::{coverage, lint, lint_in_poses};
+use somatic::author::{DrawnPoses, coverage, lint_with_progress};
 use somatic::error::{Error, Result};
 use somatic::field::{ContactTolerance, FieldSet, rest_overlaps};
 use somatic::robot::{Kinematics, drawn_poses};
 
 use self::inspection::Inspection;
+use super::bar::Bar;
 use super::bodies::load_body;
 use super::stdio::{DONE, FAILED, print};
 
@@ -67,15 +68,15 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
             Vec::new()
         }
     };
-    let odd = match &arguments.joints {
-        None => lint(&body, &fields),
-        Some(urdf) => {
-            let poses = Kinematics::load(urdf).and_then(|robot| {
-                drawn_poses(&robot, &body, arguments.up.unwrap_or(Up::Z)).map_err(|e| e.at(urdf.display()))
-            })?;
-            lint_in_poses(&body, &fields, Some(&poses))
-        }
+    let poses = match &arguments.joints {
+        None => DrawnPoses::of_own_joints(&body),
+        Some(urdf) => Some(Kinematics::load(urdf).and_then(|robot| {
+            drawn_poses(&robot, &body, arguments.up.unwrap_or(Up::Z)).map_err(|e| e.at(urdf.display()))
+        })?),
     };
+    let mut bar = Bar::new("looking for what is odd");
+    let odd = lint_with_progress(&body, &fields, poses.as_ref(), &mut |share| bar.show(share));
+    drop(bar);
     findings.extend(odd.iter().map(ToString::to_string));
     let coverage = coverage(&body);
     let overlaps = rest_overlaps(&body, &ContactTolerance::new(&body, arguments.contact_tolerance));

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use somatic::Body;
-use somatic::author::{Finding, FindingKind, lint};
+use somatic::author::{Finding, FindingKind, lint, lint_with_progress};
 use somatic::body::{Glb, LinkJoint, LinkMotion, MeshData, Modality, Skinning, Taxel};
 
 /// Corners and triangles of a box, outside out.
@@ -238,4 +238,16 @@ fn a_rest_pose_that_runs_into_itself_is_found() {
     let built = body(vec![base(), part(cube(DVec3::Z * 0.3, 0.05), Vec::new()), tip(slide([0.0, 0.001]))]);
     assert_eq!(found(&built), [(FindingKind::HiddenTaxel, (0..6).collect::<Vec<u32>>())]);
     assert_eq!(found(&body(vec![base(), tip(slide([0.5, 0.6]))])), []);
+}
+
+#[test]
+fn the_search_reports_how_far_it_is() {
+    let taxels = (0..100).flat_map(|k| on_cube(6 * k, DVec3::ZERO, 0.1)).collect();
+    let body = body(vec![part(cube(DVec3::ZERO, 0.1), taxels)]);
+    let mut shares = Vec::new();
+    let found = lint_with_progress(&body, &[], None, &mut |share| shares.push(share));
+    assert_eq!(found, lint(&body, &[]));
+    assert!(shares.is_sorted() && shares.iter().all(|share| (0.0..1.0).contains(share)), "{shares:?}");
+    // What is after the comparison with the surface: rays, on a machine of many cores in one piece.
+    assert!(shares.last().is_some_and(|last| *last >= 0.4), "{shares:?}");
 }

@@ -26,6 +26,10 @@ const NORMAL_TOLERANCE_RAD: f64 = 1e-5;
 const UV_TOLERANCE_M: f64 = 1e-6;
 const UV_TOLERANCE_SHARE: f64 = 1e-5;
 
+/// Progress when taxels are compared with the surface, and when charts are.
+const SURFACE_DONE: f64 = 0.1;
+const CHARTS_DONE: f64 = 0.4;
+
 /// All problems of the layout of `body`, whose fields are `fields`.
 ///
 /// A taxel is compared with the body's surface at rest, a skinned one with the mesh at bind. It is on the surface within
@@ -40,15 +44,29 @@ pub fn lint(body: &Body, fields: &[Field]) -> Vec<Finding> {
 /// As [`lint`]; taxels that nothing can touch are looked for in `poses`, at rest alone without them.
 #[must_use]
 pub fn lint_in_poses(body: &Body, fields: &[Field], poses: Option<&DrawnPoses>) -> Vec<Finding> {
+    lint_with_progress(body, fields, poses, &mut |_| {})
+}
+
+/// As [`lint_in_poses`]; `progress` gets the share that is done.
+#[must_use]
+pub fn lint_with_progress(
+    body: &Body,
+    fields: &[Field],
+    poses: Option<&DrawnPoses>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Finding> {
     let mut findings = Vec::new();
     findings.extend(empty(body));
     findings.extend(small(fields));
     findings.extend(unused(body, fields));
     findings.extend(crowding(body));
     findings.extend(against_surface(body));
-    findings.extend(stale_charts(body));
+    progress(SURFACE_DONE);
+    let mut of_charts = |share: f64| progress(SURFACE_DONE + (CHARTS_DONE - SURFACE_DONE) * share);
+    findings.extend(stale_charts(body, &mut of_charts));
     findings.extend(large(body));
-    findings.extend(hidden_findings::hidden(body, poses));
+    let mut of_rays = |share: f64| progress(CHARTS_DONE + (1.0 - CHARTS_DONE) * share);
+    findings.extend(hidden_findings::hidden(body, poses, &mut of_rays));
     findings
 }
 
@@ -241,12 +259,14 @@ impl<'a> Worst<'a> {
 }
 
 /// Fields whose stored (u, v) differ from a newly computed chart, or that cannot have one any more.
-fn stale_charts(body: &Body) -> Option<Finding> {
+fn stale_charts(body: &Body, progress: &mut dyn FnMut(f64)) -> Option<Finding> {
     let mut unroller = Unroller::new(body);
     let mut stale: Vec<String> = Vec::new();
     let mut worst: Option<(f64, String)> = None;
-    let geodesic = |spec: &&FieldSpec| spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
-    for spec in body.fields.iter().filter(geodesic).filter(|_| !body.surfaces.is_empty()) {
+    let geodesic = |spec: &FieldSpec| spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
+    for (index, spec) in body.fields.iter().enumerate().filter(|(_, spec)| geodesic(spec) && !body.surfaces.is_empty())
+    {
+        progress(index as f64 / body.fields.len() as f64);
         match drift(&mut unroller, spec) {
             Some(0.0) => continue,
             Some(most) if worst.as_ref().is_none_or(|(known, _)| most > *known) => {

@@ -24,6 +24,10 @@ const INSIDE: f64 = 0.5;
 /// Every so many directions for whether a taxel is inside another link.
 const COARSE: usize = 8;
 
+/// Taxels that a thread takes at a time, and how often it does between two reports of progress.
+const PER_TASK: usize = 16;
+const TASKS_PER_THREAD: usize = 4;
+
 /// Links run into each other at rest if this share of one's taxels is inside the other, and at least so many.
 const RUNS_INTO_SHARE: f64 = 0.05;
 const RUNS_INTO_TAXELS: usize = 3;
@@ -67,8 +71,9 @@ pub(super) struct Hidden {
     pub(super) other_poses: Option<usize>,
 }
 
-/// Looks for the taxels of `body` that nothing can touch, in the poses of its joints if there are any.
-pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>) -> Hidden {
+/// Looks for the taxels of `body` that nothing can touch, in the poses of its joints if there are any. `progress` gets the share
+/// that is done.
+pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn FnMut(f64)) -> Hidden {
     let rest;
     let drawn = match poses {
         Some(poses) => poses,
@@ -85,12 +90,16 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>) -> Hidden {
     let checked: Vec<usize> = (0..count).map(|index| index * body.taxels.len() / count).collect();
     let search = Search { body, surface: &surface, directions: directions(), has_joints: poses.is_some() };
     let mut seen: Vec<Option<Seen>> = (0..count).map(|_| None).collect();
-    let tasks = seen.chunks_mut(16).zip(checked.chunks(16));
-    parallel::for_each(parallel::threads(), tasks, |(seen, taxels): (&mut [Option<Seen>], &[usize])| {
-        for (seen, &taxel) in seen.iter_mut().zip(taxels) {
-            *seen = Some(search.look(&body.taxels[taxel]));
-        }
-    });
+    let at_once = PER_TASK * TASKS_PER_THREAD * parallel::threads();
+    for (index, (seen, taxels)) in seen.chunks_mut(at_once).zip(checked.chunks(at_once)).enumerate() {
+        progress((index * at_once) as f64 / count as f64);
+        let tasks = seen.chunks_mut(PER_TASK).zip(taxels.chunks(PER_TASK));
+        parallel::for_each(parallel::threads(), tasks, |(seen, taxels): (&mut [Option<Seen>], &[usize])| {
+            for (seen, &taxel) in seen.iter_mut().zip(taxels) {
+                *seen = Some(search.look(&body.taxels[taxel]));
+            }
+        });
+    }
     let mut hidden = Hidden { other_poses: poses.map(|_| surface.poses() - 1), ..Hidden::default() };
     let mut shells = ShellsOfLinks::new(body);
     let mut inside: BTreeMap<(usize, usize), Vec<u32>> = BTreeMap::new();

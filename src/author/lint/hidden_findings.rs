@@ -10,9 +10,9 @@ use crate::body::{Body, listed};
 /// Runs of ids of a link in a line.
 const MAX_RUNS: usize = 6;
 
-/// Findings on hidden taxels of `body`, in the poses of its joints if there are any.
-pub(super) fn hidden(body: &Body, poses: Option<&DrawnPoses>) -> Vec<Finding> {
-    let seen = find(body, poses);
+/// Findings on hidden taxels of `body`, in the poses of its joints if there are any. `progress` gets the share that is done.
+pub(super) fn hidden(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn FnMut(f64)) -> Vec<Finding> {
+    let seen = find(body, poses, progress);
     let of = |reach: Reach| seen.checked.iter().filter(|(_, own)| *own == reach).map(|(index, _)| *index).collect();
     let where_looked = match seen.other_poses {
         Some(poses) => format!(" at rest and in {poses} other poses"),

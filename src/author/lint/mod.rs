@@ -10,7 +10,7 @@ mod posed_surface;
 mod shells;
 
 pub(super) use checks::{SurfaceFit, drift};
-pub use checks::{lint, lint_in_poses};
+pub use checks::{lint, lint_in_poses, lint_with_progress};
 pub use drawn_poses::DrawnPoses;
 #[cfg(feature = "meshes")]
 pub(crate) use drawn_poses::drawn_position;
