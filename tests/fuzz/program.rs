@@ -130,7 +130,7 @@ impl Page {
             match stream.read(&mut part) {
                 Ok(0) => return Ok(answer),
                 Ok(length) => answer.extend(&part[..length]),
-                Err(e) if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {
+                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
                     // It waits for more: there is none.
                     let _ = stream.shutdown(Shutdown::Write);
                     let since = ended.get_or_insert_with(Instant::now);

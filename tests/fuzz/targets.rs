@@ -275,6 +275,9 @@ fn mesh(name: &'static str, file: &'static str, seeds: Vec<Vec<u8>>) -> Target {
 
 pub(super) fn urdf() -> Target {
     target("urdf", "a.urdf", [seeds::URDF], |case| {
+        if is_large(&case.text(), &["rows=\"", "cols=\""]) {
+            return Ok(false);
+        }
         let opened = somatic::author::mesh::open(case.path, &MeshOptions::default());
         let skin = author_urdf_skin(case.path, &MeshOptions::default());
         told(skin)?;
@@ -488,8 +491,22 @@ fn sheet(text: &str, arguments: impl Fn(&str) -> Vec<String>) -> Verdict {
     program::verdict(&[&["author"][..], &arguments].concat())
 }
 
+/// Whether `text` asks for more taxels than are made in a moment without optimisation, and not for more than are allowed: that takes
+/// its time, in proportion. The taxels are the product of the numbers after each of `marks`, or of all numbers.
+fn is_large(text: &str, marks: &[&str]) -> bool {
+    let number = |text: &str| text.split(|c: char| !c.is_ascii_digit()).next().and_then(|digits| digits.parse().ok());
+    let numbers: Vec<u64> = match marks {
+        [] => text.split(|c: char| !c.is_ascii_digit()).filter_map(|digits| digits.parse().ok()).collect(),
+        marks => marks.iter().filter_map(|mark| number(text.split_once(mark)?.1)).collect(),
+    };
+    (20_000..=1_000_000).contains(&numbers.into_iter().fold(1, u64::saturating_mul))
+}
+
 pub(super) fn grid() -> Target {
     names("grid", &["31x11", "2x3", "8 X 8"], |text| {
+        if is_large(text, &[]) {
+            return Ok(false);
+        }
         sheet(text, |grid| [&format!("--grid={grid}"), "--pitch", "8.6mm,5mm"].map(str::to_owned).to_vec())
     })
 }
