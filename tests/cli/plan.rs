@@ -104,8 +104,8 @@ fn a_plan_counts_what_a_scene_needs_and_leaves_out_the_rest() {
     };
     assert_eq!(running(&palm), ["calibrate", "contact", "centroid", "orientation"]);
     assert_eq!(palm["bytes_up"].as_u64().unwrap(), 4 * palm["taxels"].as_u64().unwrap());
-    // A status, u, v and the orientation.
-    assert_eq!(palm["bytes_down"].as_u64().unwrap(), 16 * palm["fields"].as_u64().unwrap());
+    // A status, u, v and the orientation; and total, peak and the active taxels, which tell if one taxel is nearly all of a touch.
+    assert_eq!(palm["bytes_down"].as_u64().unwrap(), 28 * palm["fields"].as_u64().unwrap());
     assert!(palm["taxels"].as_u64() < palm["of_taxels"].as_u64());
     assert!(palm["us"].as_f64().unwrap() > 0.0 && palm["agrees"] == true);
     assert!(palm["worst_errors"]["centroid"].as_f64().unwrap() < 1e-6);

@@ -295,9 +295,9 @@ fn a_search_that_knows_enough_ends_and_what_it_knows_is_the_same() {
         let whole = LogMap::new(&topology, start, DVec3::Y, limit_m).unwrap();
         let from = start.position(&topology);
         let near: Vec<SurfacePlace> =
-            places(&topology).filter(|it| it.position(&topology).distance(from) < 0.4 * limit_m).collect();
+            places(&topology).filter(|it| it.position(&topology).distance(from) < 0.25 * limit_m).collect();
         for margin_m in [0.0, 0.3] {
-            let near = near.iter().step_by(7);
+            let near = near.iter().step_by(2);
             let wanted: Vec<Wanted> = near.map(|&place| Wanted { place, margin_m }).collect();
             let mut left = MAX_WINDOWS;
             let ended = LogMap::towards(&topology, start, DVec3::Y, limit_m, &wanted, &mut left).unwrap();
