@@ -6,19 +6,15 @@ use glam::{DVec2, DVec3};
 
 use super::chart::{NoChart, frame};
 use super::distortion::Distortion;
-use super::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace, Wanted};
+use super::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
 use super::link_surface::Surfaces;
-use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology, area_vector, point_tree};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology, area_vector};
 
 /// Maximum bend of a path at one point, 20°.
 const MAX_BEND: f64 = PI / 9.0;
 
 /// Maximum stretch of the distance of neighbours.
 const MAX_STRETCH: f64 = 3.0;
-
-/// How much longer than the shortest a second path may be that makes a place ambiguous, share of the distance to the nearest
-/// member.
-const RIVAL_MARGIN: f64 = 0.5;
 
 /// How often the limit is doubled before a member counts as unreachable.
 const MAX_DOUBLINGS: u32 = 6;
@@ -122,19 +118,6 @@ impl Patch<'_> {
         self.places[middle.unwrap_or(0)]
     }
 
-    /// The members' places, and up to what length second paths to them are looked for.
-    fn wanted(&self) -> Vec<Wanted> {
-        let tree = point_tree(self.members.iter().map(|(position, _)| *position));
-        let wanted = |(&place, (position, _)): (&SurfacePlace, &(DVec3, DVec3))| {
-            let mut others =
-                tree.nearest_neighbor_iter_with_distance_2(position.to_array()).map(|(_, squared)| squared);
-            // Without another member there is nothing to mistake it for.
-            let nearest_m = others.find(|squared| *squared > 0.0).map_or(0.0, f64::sqrt);
-            Wanted { place, margin_m: RIVAL_MARGIN * nearest_m * (1.0 + 1e-9) }
-        };
-        self.places.iter().zip(&self.members).map(wanted).collect()
-    }
-
     /// `spec` with a geodesic chart around `origin`.
     fn chart_around(
         &self,
@@ -154,11 +137,10 @@ impl Patch<'_> {
         let from = origin.position(topology);
         let farthest = members.iter().map(|(position, _)| position.distance(from)).fold(0.0, f64::max);
         let mut limit = farthest * FIRST_LIMIT;
-        let wanted = self.wanted();
         let mut doublings = 0;
         let (map, reached) = loop {
             let mut own = MAX_WINDOWS;
-            let map = LogMap::towards(topology, origin, u, limit, &wanted, left.as_mut().unwrap_or(&mut own));
+            let map = LogMap::with_windows(topology, origin, u, limit, left.as_mut().unwrap_or(&mut own));
             let map = map.map_err(|why| NoChart::TooRough(why.to_string()))?;
             let reached: Vec<_> = places.iter().map(|place| map.reach(place)).collect();
             // A path beyond the limit may not be the shortest.
@@ -183,7 +165,7 @@ impl Patch<'_> {
             }
             // The taxel's place in the chart is ambiguous by more than the distance to its neighbour.
             if let Some(rival) = way.rival
-                && rival.distance_m - way.distance_m < RIVAL_MARGIN * nearest(i)
+                && rival.distance_m - way.distance_m < 0.5 * nearest(i)
                 && 2.0 * way.distance_m * (rival.apart_rad / 2.0).sin() > nearest(i)
             {
                 return Err(NoChart::CutLocus { taxel: id(i), distance_m: way.distance_m });

@@ -9,9 +9,8 @@ use std::rc::Rc;
 
 use glam::{DVec2, DVec3};
 
-use crate::body::Topology;
 use crate::field::LinkSurface;
-use crate::field::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace, Wanted};
+use crate::field::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
 
 /// Taxels without a surface are neighbours up to this many median distances to the nearest.
 const NEIGHBOUR_DISTANCE: f64 = 2.0;
@@ -21,16 +20,6 @@ const MAX_JOINED_ON_TRIANGLE: usize = 8;
 
 /// How often the limit is doubled before it is dropped.
 const MAX_DOUBLINGS: u32 = 4;
-
-/// The places on the part of `start`, if paths up to `limit_m` may lead to all of them.
-fn wanted_near(topology: &Topology, places: &[SurfacePlace], start: &SurfacePlace, limit_m: f64) -> Vec<Wanted> {
-    let (part, from) = (|place: &SurfacePlace| topology.part[place.triangle as usize], start.position(topology));
-    let same = || places.iter().filter(|place| part(place) == part(start));
-    if same().any(|place| place.position(topology).distance(from) > limit_m) {
-        return Vec::new();
-    }
-    same().map(|&place| Wanted { place, margin_m: 0.0 }).collect()
-}
 
 /// The distance to a taxel, m, infinite beyond the limit, and its (u, v) around the start, m, if known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,8 +92,7 @@ impl LinkDistances {
         if self.too_long_m.is_none_or(|too_long_m| limit_m < too_long_m) {
             let mut own = MAX_WINDOWS;
             let left = self.windows_left.as_mut().unwrap_or(&mut own);
-            let wanted = wanted_near(&self.surface.topology, &self.places, place, limit_m);
-            match LogMap::towards(&self.surface.topology, *place, DVec3::X, limit_m, &wanted, left) {
+            match LogMap::with_windows(&self.surface.topology, *place, DVec3::X, limit_m, left) {
                 Ok(map) => {
                     let reach = |to: &SurfacePlace| match map.reach(to) {
                         Some(way) if way.distance_m <= limit_m => {

@@ -6,9 +6,8 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::SurfacePlace;
-use super::enough::{Enough, Wanted};
 use super::queue::{QueueEntry, VERTEX_FLAG};
-use super::source::{Fan, Source, Start, Wedge, angle, direction};
+use super::source::{Fan, Source, Start, Wedge, angle, towards};
 use crate::body::{NONE, Topology, next};
 use crate::error::{Error, Result, failed};
 
@@ -131,21 +130,18 @@ impl<'a> LogMap<'a> {
     /// # Errors
     /// `place` is on no triangle, or the surface is too rough, with too many windows.
     pub fn new(topology: &'a Topology, place: SurfacePlace, u: DVec3, limit_m: f64) -> Result<Self> {
-        Self::towards(topology, place, u, limit_m, &[], &mut { MAX_WINDOWS })
+        Self::with_windows(topology, place, u, limit_m, &mut { MAX_WINDOWS })
     }
 
-    /// The same with at most `left` windows, from which those that it takes are subtracted. With places that are `wanted` it
-    /// ends as soon as it has the shortest paths to all of them, and all others up to their margins; these are the same as
-    /// without.
+    /// The same with at most `left` windows, from which those that it takes are subtracted.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn towards(
+    pub(crate) fn with_windows(
         topology: &'a Topology,
         place: SurfacePlace,
         u: DVec3,
         limit_m: f64,
-        wanted: &[Wanted],
         left: &mut usize,
     ) -> Result<Self> {
         let prepared = (topology.positions.len() + topology.triangles.len()) / PREPARED_PER_WINDOW;
@@ -182,11 +178,7 @@ impl<'a> LogMap<'a> {
             map.start_windows(&wedge, 0);
         }
         let mut done = Ok(());
-        let mut enough = Enough::new(topology, &place, wanted);
         while let Some(waiting) = map.queue.pop() {
-            if enough.is_known(waiting.distance_m, |place| Some(map.reach(place)?.distance_m)) {
-                break;
-            }
             match waiting.what & VERTEX_FLAG {
                 0 => done = map.follow(waiting.what),
                 _ => map.start_at_vertex(waiting.what & !VERTEX_FLAG, waiting.distance_m),
@@ -251,7 +243,7 @@ impl<'a> LogMap<'a> {
         };
         let rival = ways.iter().filter(|way| way.is_straight && apart(way) > MIN_RIVAL_ANGLE).min_by(shortest);
         let rival = rival.map(|way| Rival { distance_m: way.distance_m, apart_rad: apart(way) });
-        Some(Reached { uv: direction(angle_rad) * distance_m, distance_m, bend_rad, rival })
+        Some(Reached { uv: towards(angle_rad) * distance_m, distance_m, bend_rad, rival })
     }
 
     /// The path through `window` to the unfolded point `to`.

@@ -5,13 +5,11 @@
 //! lines reach through one sequence of triangles. Paths bend only at vertices with more than a full turn of surface around
 //! them, and at the surface's edge; new windows start there.
 
-mod enough;
 mod log_map;
 mod place;
 mod queue;
 mod source;
 
-pub(crate) use enough::Wanted;
 pub(crate) use log_map::{FIRST_LIMIT, MAX_WINDOWS};
 pub use log_map::{LogMap, Reached, Rival};
 pub use place::SurfacePlace;

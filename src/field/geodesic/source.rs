@@ -155,7 +155,7 @@ pub(super) fn angle(p: DVec2) -> f64 {
 }
 
 /// The unit vector in the direction `angle_rad`.
-pub(super) fn direction(angle_rad: f64) -> DVec2 {
+pub(super) fn towards(angle_rad: f64) -> DVec2 {
     let (sin, cos) = libm::sincos(angle_rad);
     DVec2::new(cos, sin)
 }

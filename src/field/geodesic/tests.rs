@@ -2,7 +2,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{LogMap, MAX_WINDOWS, SurfacePlace, Wanted};
+use super::{LogMap, SurfacePlace};
 use crate::body::Topology;
 
 /// A sheet of `columns` × `rows` squares over [0, 1]², two triangles each with diagonals that alternate, bent by `shape`.
@@ -262,9 +262,9 @@ fn a_map_stops_when_its_windows_are_used_up_and_counts_them() {
     let place = find(&topology, DVec3::new(0.6, 0.0, 0.8));
     let whole = LogMap::new(&topology, place, DVec3::X, 1.0).unwrap();
     let (mut few, mut many) = (100, 1_000_000);
-    assert!(LogMap::towards(&topology, place, DVec3::X, 1.0, &[], &mut few).is_err());
+    assert!(LogMap::with_windows(&topology, place, DVec3::X, 1.0, &mut few).is_err());
     assert_eq!(few, 0);
-    let bounded = LogMap::towards(&topology, place, DVec3::X, 1.0, &[], &mut many).unwrap();
+    let bounded = LogMap::with_windows(&topology, place, DVec3::X, 1.0, &mut many).unwrap();
     // Besides its windows, preparing the map takes some.
     assert!(many < 1_000_000 - whole.windows() && many > 1_000_000 - 2 * whole.windows(), "{many}");
     for place in places(&topology) {
@@ -284,42 +284,4 @@ fn a_vertex_that_two_parts_share_leads_to_no_way_between_them() {
         let map = LogMap::new(&topology, place(from), DVec3::X, 9.0).unwrap();
         assert!(map.reach(&place(from)).is_some() && map.reach(&place(to)).is_none());
     }
-}
-
-#[test]
-fn a_search_that_knows_enough_ends_and_what_it_knows_is_the_same() {
-    let tube = |p: DVec2| DVec3::new((TAU * p.x).cos(), 8.0 * p.y, (TAU * p.x).sin());
-    let bumpy = |p: DVec2| DVec3::new(p.x, p.y, 0.05 * (31.0 * p.x).sin() * (29.0 * p.y).cos());
-    for (topology, limit_m) in [(sheet(60, 60, bumpy), 2.0), (sheet(24, 40, tube), 4.5)] {
-        let start = SurfacePlace { triangle: 2345 % topology.triangles.len() as u32, barycentric: [0.2, 0.5, 0.3] };
-        let whole = LogMap::new(&topology, start, DVec3::Y, limit_m).unwrap();
-        let from = start.position(&topology);
-        let near: Vec<SurfacePlace> =
-            places(&topology).filter(|it| it.position(&topology).distance(from) < 0.25 * limit_m).collect();
-        for margin_m in [0.0, 0.3] {
-            let near = near.iter().step_by(2);
-            let wanted: Vec<Wanted> = near.map(|&place| Wanted { place, margin_m }).collect();
-            let mut left = MAX_WINDOWS;
-            let ended = LogMap::towards(&topology, start, DVec3::Y, limit_m, &wanted, &mut left).unwrap();
-            for Wanted { place, .. } in &wanted {
-                let (all, some) = (whole.reach(place).unwrap(), ended.reach(place).unwrap());
-                assert_eq!((all.uv, all.distance_m, all.bend_rad), (some.uv, some.distance_m, some.bend_rad));
-                let within = |rival: &super::Rival| rival.distance_m < all.distance_m + margin_m;
-                assert_eq!(all.rival.filter(within), some.rival.filter(within));
-            }
-            assert!(wanted.len() > 50, "{}", wanted.len());
-            assert!(ended.windows() * 10 < whole.windows() * 8, "{} of {}", ended.windows(), whole.windows());
-            assert_eq!(left, MAX_WINDOWS - ended.windows());
-        }
-    }
-}
-
-#[test]
-fn a_search_for_a_place_that_it_cannot_reach_goes_to_its_limit() {
-    let topology = sheet(20, 20, |p| DVec3::new(p.x, p.y, 0.0));
-    let at = |triangle| SurfacePlace { triangle, barycentric: [0.3, 0.3, 0.4] };
-    let whole = LogMap::new(&topology, at(0), DVec3::X, 0.5).unwrap();
-    let wanted = [Wanted { place: at(799), margin_m: 0.0 }];
-    let map = LogMap::towards(&topology, at(0), DVec3::X, 0.5, &wanted, &mut { MAX_WINDOWS }).unwrap();
-    assert_eq!(map.windows(), whole.windows());
 }
