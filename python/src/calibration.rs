@@ -1,9 +1,7 @@
 //! `Calibration`.
 
-use std::ffi::CString;
 use std::path::PathBuf;
 
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use somatic::Calibration;
 
@@ -46,15 +44,6 @@ impl PyCalibration {
         let both = Self::of_text(&laid.text, body).map_err(|e| e.at(format!("laid over the calibration of {of}")))?;
         Ok((both, stays.into_iter().chain(replaced).collect()))
     }
-}
-
-/// Gives each of `lines` as a Python warning.
-pub(crate) fn warn(py: Python<'_>, lines: impl IntoIterator<Item = String>) -> PyResult<()> {
-    for line in lines {
-        let line = CString::new(line).map_err(|e| PyErr::from(std::io::Error::other(e)))?;
-        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)?;
-    }
-    Ok(())
 }
 
 #[pymethods]

@@ -1,8 +1,9 @@
 //! Errors of the library as Python's exceptions.
 
+use std::ffi::CString;
 use std::path::Path;
 
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
@@ -80,6 +81,15 @@ impl<T> OrRaise<T> for somatic::Result<T> {
     fn or_raise_of(self, py: Python<'_>, file: &Path) -> PyResult<T> {
         self.map_err(|error| raised(py, &error, Some(file)))
     }
+}
+
+/// Gives each of `lines` as a Python warning.
+pub(crate) fn warn(py: Python<'_>, lines: impl IntoIterator<Item = String>) -> PyResult<()> {
+    for line in lines {
+        let line = CString::new(line).map_err(|e| PyErr::from(std::io::Error::other(e)))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)?;
+    }
+    Ok(())
 }
 
 /// What Python raised between the parts of a long call: Ctrl-C, unless a handler raised something else.

@@ -12,8 +12,8 @@ use somatic::{Error, Frame, RawValue, bundled};
 
 use crate::arrays::array;
 use crate::body::PyBody;
-use crate::calibration::{PyCalibration, warn};
-use crate::error::{OrRaise, usage};
+use crate::calibration::PyCalibration;
+use crate::error::{OrRaise, usage, warn};
 use crate::threads::free;
 
 /// Frames that are read until Ctrl-C is heard.

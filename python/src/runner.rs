@@ -11,8 +11,8 @@ use somatic::source::{Cut, SourceSpec, VendorOptions};
 use somatic::{BackendKind, Engine, Error, Frame};
 
 use crate::body::PyBody;
-use crate::calibration::{PyCalibration, warn};
-use crate::error::{OrRaise, interrupted, usage};
+use crate::calibration::PyCalibration;
+use crate::error::{OrRaise, interrupted, usage, warn};
 use crate::recording::open;
 use crate::scene::PyScene;
 use crate::session::Run;
@@ -100,8 +100,10 @@ pub(crate) fn run<'py>(
             }
             let (Flow::Open | Flow::Closed) = sink.write(engine.process(&frames[..filled])?)?;
             count += filled;
+            let notice = engine.notice();
             let heard = Python::attach(|py| {
                 py.check_signals()?;
+                warn(py, notice)?;
                 progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (count,)).map(drop))
             });
             if let Err(error) = heard {

@@ -113,7 +113,7 @@ impl Document {
         self.root.accessors.get(index).map_or(0, |accessor| accessor.count.0)
     }
 
-    /// Refuses an accessor that says of itself what the file does not hold.
+    /// Refuses an accessor that claims more than the file holds.
     pub(crate) fn check(&self, index: usize) -> Result<()> {
         self.elements(index).map(drop)
     }

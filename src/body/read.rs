@@ -114,7 +114,7 @@ fn check_size(document: &Document, nodes: &Nodes<'_>) -> Result<()> {
         triangles = triangles.saturating_add(own);
         for (count, most, what) in [(vertices, MAX_VERTICES, "vertices"), (triangles, MAX_TRIANGLES, "triangles")] {
             if count > most as u64 {
-                // What it claims and does not have is the mistake to tell of.
+                // One that claims more than the file holds has a message of its own.
                 document.check(positions)?;
                 return Err(failed!("it has over {most} {what}, the most that a body may have; simplify its meshes"));
             }

@@ -90,7 +90,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let from = source_of(&arguments.from, Some(&["csv", "mcap", "export", "sim"]), &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
     let to = match to_name {
-        // Of a source it is another kind.
+        // As a source it is another kind.
         "csv:-" => SourceSpec::Csv("-".into()),
         _ => SourceSpec::one_of(to_name, &["csv", "mcap"]).map_err(|e| e.at(format!("output `{to_name}`")))?,
     };

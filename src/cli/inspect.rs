@@ -74,7 +74,7 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
             drawn_poses(&robot, &body, arguments.up.unwrap_or(Up::Z)).map_err(|e| e.at(urdf.display()))
         })?),
     };
-    let mut bar = Bar::new("looking for what is odd");
+    let mut bar = Bar::new("looking for defects");
     let odd = lint_with_progress(&body, &fields, poses.as_ref(), &mut |share| bar.show(share));
     drop(bar);
     findings.extend(odd.iter().map(ToString::to_string));
