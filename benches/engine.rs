@@ -84,7 +84,7 @@ fn stages(frames: usize) -> Vec<Case> {
         ("1 contact", Outputs::TOTAL),
         ("2 centroid", Outputs::CENTROID),
         ("3 centroid, orientation", paper()),
-        ("3 centroid, axis", Outputs::CENTROID | Outputs::AXIS | Outputs::ANISOTROPY),
+        ("3 centroid, principal_axis", Outputs::CENTROID | Outputs::PRINCIPAL_AXIS | Outputs::ANISOTROPY),
         ("3 centroid, motion", Outputs::CENTROID | Outputs::DISPLACEMENT | Outputs::DIRECTION | Outputs::SPEED),
         ("3 centroid, position", Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL),
         ("4 all but touches", Outputs::USUAL),

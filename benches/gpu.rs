@@ -39,7 +39,7 @@ const MOST_COMPARED: u128 = 4_000_000;
 /// Touches of a call, a frame each.
 const TOUCHES: [usize; 3] = [1, 256, 9984];
 /// A rod that turns over the nine sensors of the hand's back.
-const ROD: &str = "rate_hz = 100\nduration_s = 2.56\n[skin]\nthickness_m = 0.007\n[sensor]\nkind = \"fsr\"\nnoise_sigma = 1\n\
+const ROD: &str = "rate_hz = 100\nduration_s = 2.56\n[layer]\nthickness_m = 0.007\n[sensor]\nkind = \"fsr\"\nnoise_sigma = 1\n\
                    [[touch]]\non = \"hand/back\"\nindenter = \"rod\"\nradius_m = 0.0127\nlength_m = 0.05\n\
                    angle_deg = [[0, 0], [2.56, 180]]\npath = [[0, 0.002]]\nhold = { newton = 30 }\n";
 const OUTPUTS: Outputs = Outputs::CENTROID.union(Outputs::ORIENTATION);
@@ -145,7 +145,7 @@ fn fits(count: usize) -> Result<Value> {
     }
     let frames: Vec<Frame> = turn.iter().cycle().take(count).cloned().collect();
     let engine = |backend: BackendKind| {
-        let scene = Scene::default().outputs(Outputs::FOOTPRINT).fields(["hand/back"]);
+        let scene = Scene::default().outputs(Outputs::FIT).fields(["hand/back"]);
         let options = Options::default().scene(scene).calibration(calibration.clone()).backend(backend);
         let mut engine = Engine::new(&body, options.batch(count.min(256)))?;
         engine.set_channels(source.taxels())?;

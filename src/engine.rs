@@ -4,27 +4,27 @@ mod advance;
 mod block;
 mod cadence;
 mod check;
-mod contacts;
 mod dominated;
+mod drift_state;
 mod fit;
 mod ids;
 mod input;
 mod links;
 mod place;
 mod post;
+mod self_contacts;
 mod spread;
 mod state;
-mod upkeep_state;
 
 use self::cadence::OnChange;
 use self::check::Check;
-use self::contacts::Contacts;
+use self::drift_state::DriftState;
 use self::ids::ranges;
 use self::input::Input;
 use self::links::Links;
 use self::post::PostState;
+use self::self_contacts::SelfContacts;
 pub use self::state::EngineState;
-use self::upkeep_state::UpkeepState;
 use crate::backend::agreement::{Agreement, ComparedColumn, compare, compare_columns};
 use crate::backend::{self, Backend, BackendKind, Picks, Step};
 use crate::body::Body;
@@ -93,14 +93,14 @@ pub struct Engine {
     percepts: Percepts,
     /// The reference's side of the last comparison, if no frame was processed without one since.
     check: Option<Box<Check>>,
-    /// If the calibration asks for any upkeep.
-    upkeep: Option<UpkeepState>,
+    /// If the calibration asks for any drift compensation.
+    drift: Option<DriftState>,
     post: PostState,
     /// With cadence `on-change`.
     cadence: Option<OnChange>,
     /// Whether the first frame is still to be taken as the baselines.
     tare: bool,
-    /// Whether the calibration may change while the engine runs, by upkeep or tare.
+    /// Whether the calibration may change while the engine runs, by drift compensation or tare.
     recalibrates: bool,
     frames_done: u64,
     /// Times and poses of frames that came in one slice, for the next such call.
@@ -111,8 +111,8 @@ pub struct Engine {
     links: Links,
     /// Memory for the pressed taxels of a field, empty between calls.
     pressed: Vec<Pressed>,
-    /// Where contacts are asked for.
-    contacts: Option<Contacts>,
+    /// Where self-contacts are asked for.
+    self_contacts: Option<SelfContacts>,
     /// Fields that could not have the kind of chart that is asked for.
     kept_charts: Vec<(String, NoChart)>,
 }
@@ -144,10 +144,10 @@ impl Engine {
         let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
         // Of a large skin these take as much memory as the plan.
         drop(recharted.fields);
-        let upkeep = UpkeepState::new(&plan, calibration.upkeep, body);
-        if upkeep.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
+        let drift = DriftState::new(&plan, calibration.drift, body);
+        if drift.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
             return Err(Error::usage(
-                "the calibration's [upkeep] must know what is touched; ask for letter `sustained` too",
+                "the calibration's [drift] must know what is touched; ask for letter `sustained` too",
             ));
         }
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
@@ -162,8 +162,8 @@ impl Engine {
                 .with_names((0..plan.fields.len()).map(|field| plan.label(field)).collect()),
             check: None,
             post: PostState::initial(&plan),
-            recalibrates: upkeep.is_some() || tare,
-            upkeep,
+            recalibrates: drift.is_some() || tare,
+            drift,
             cadence: (scene.knobs.cadence == Cadence::OnChange).then(|| OnChange::new(&plan, scene.max_gap_s)),
             backend: chosen.backend,
             why: chosen.why,
@@ -181,7 +181,7 @@ impl Engine {
             pressed: Vec::with_capacity(
                 plan.fields.iter().map(|field| plan.members_of(field).len()).max().unwrap_or(0),
             ),
-            contacts: Contacts::new(body, &plan, &scene),
+            self_contacts: SelfContacts::new(body, &plan, &scene),
             kept_charts: recharted.kept,
             plan,
         };
@@ -242,16 +242,16 @@ impl Engine {
     /// untouched taxels, where there are three. Without, it is that of its link's, else of the body's. For before the first
     /// frame.
     pub fn wire(&mut self, wiring: &Wiring) {
-        if let Some(kept) = &mut self.upkeep {
+        if let Some(kept) = &mut self.drift {
             kept.wire(&self.plan, wiring, |channel| self.ids[self.plan.body_taxels[channel]]);
         }
     }
 
-    /// Finds out whether values can be read where they are. Upkeep looks at all of them, gathered.
+    /// Finds out whether values can be read where they are. Drift compensation looks at all of them, gathered.
     fn pick(&mut self) {
         let picks = self.intake.picks(&self.plan.body_taxels).filter(|picks| !picks.is_empty());
         let (width, calibrated) = (self.intake.width(), self.plan.calibrated());
-        self.picks = picks.filter(|_| self.upkeep.is_none()).map(|picks| Picks::new(&picks, calibrated, width));
+        self.picks = picks.filter(|_| self.drift.is_none()).map(|picks| Picks::new(&picks, calibrated, width));
     }
 
     /// A frame for all of the body's taxels by ascending id, every value missing.
@@ -269,9 +269,9 @@ impl Engine {
     /// What is to be known before the first frame, a line each: taxels that no letter reads, and drift that no taxel can tell.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
-        let drift = self.upkeep.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
+        let drift = self.drift.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
             "no taxel can tell the drift of a touched field: fewer than 3 are in other fields. While a touch lasts, baselines stay, \
-             and drift is taken for pressure; give the body more fields, or leave `time_constant_s` of [upkeep] out"
+             and drift is taken for pressure; give the body more fields, or leave `time_constant_s` of [drift] out"
                 .to_owned()
         });
         self.plan.left_out.remark().into_iter().chain(drift).collect()
@@ -356,9 +356,9 @@ impl Engine {
         compare_columns(&check.right.get(frame, field), bound, &self.percepts.get(frame, field))
     }
 
-    /// Taxels that are not used at present, by id, and why: those that upkeep has found unfit.
+    /// Taxels that are not used at present, by id, and why: those that drift compensation has found unfit.
     pub fn unfit(&self) -> impl Iterator<Item = (u32, Unfit)> + '_ {
-        let judged = self.upkeep.iter().flat_map(|kept| kept.upkeep.taxels());
+        let judged = self.drift.iter().flat_map(|kept| kept.compensation.taxels());
         judged.zip(&self.plan.body_taxels).filter_map(|((_, unfit), &taxel)| Some((self.ids[taxel], unfit?)))
     }
 }

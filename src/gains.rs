@@ -1,7 +1,7 @@
 //! What ordinary touches tell of a skin: every taxel's gain, and how wide the layer makes a contact.
 //!
 //! A touch that moves over the skin is felt by other taxels in each frame. Where a fit of the contact explains them all but one,
-//! that one's gain is off. Contacts are fitted under the gains found so far (`docs/footprint.md`), each taxel's gain is
+//! that one's gain is off. Contacts are fitted under the gains found so far (`docs/fit.md`), each taxel's gain is
 //! moved to what makes it agree with the contacts that pressed it, and both are repeated:
 //!
 //! ln γᵢ ← ln γᵢ + Σ w ln(Pᵢ/mᵢ) / (Σ w + 1/s²), w = 1/((σᵢ/mᵢ)² + e²), of the touches that press taxel i
@@ -19,14 +19,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 
 use crate::backend::BackendKind;
-use crate::backend::cpu::footprint::fit_each;
+use crate::backend::cpu::fit::fit_each;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result, failed};
 use crate::percept::Outputs;
 use crate::scene::{Knobs, Plan, Scene};
 use crate::signal::{Calibration, Frame, Letter};
-use crate::stage::footprint::{Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
+use crate::stage::fit::{Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
 
 /// Gains are taken to differ by about this share.
 const SPREAD: f64 = 0.2;
@@ -51,7 +51,7 @@ const START: f64 = 0.5;
 /// What touches told.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
-pub struct SkinEstimate {
+pub struct GainsEstimate {
     /// By taxel in the body's order the factor by which it feels more than others, 1 in the (geometric) mean; `None` where too few
     /// touches pressed it.
     pub gains: Vec<Option<f64>>,
@@ -76,7 +76,7 @@ struct Observed {
 }
 
 /// Gathers touches frame by frame.
-pub struct SkinSurvey {
+pub struct GainsSurvey {
     engine: Engine,
     taxels: usize,
     /// Index in a frame by taxel of the body.
@@ -88,7 +88,7 @@ pub struct SkinSurvey {
     spacing_m: f64,
 }
 
-impl SkinSurvey {
+impl GainsSurvey {
     /// Begins with a calibration that knows baselines and dead bands, for frames of the taxels `ids`.
     ///
     /// # Errors
@@ -155,7 +155,7 @@ impl SkinSurvey {
     ///
     /// # Errors
     /// Too few touches press enough taxels at once; it was stopped.
-    pub fn finish(self, progress: &mut dyn FnMut(f64) -> bool) -> Result<SkinEstimate> {
+    pub fn finish(self, progress: &mut dyn FnMut(f64) -> bool) -> Result<GainsEstimate> {
         estimate(&self.touches, self.taxels, START * self.spacing_m, progress)
     }
 }
@@ -188,7 +188,7 @@ fn estimate(
     taxels: usize,
     start_m: f64,
     progress: &mut dyn FnMut(f64) -> bool,
-) -> Result<SkinEstimate> {
+) -> Result<GainsEstimate> {
     const LEAST: usize = 50;
     if touches.len() < LEAST {
         return Err(failed!(
@@ -257,7 +257,7 @@ fn estimate(
     }
     let told = |(gain, count): (&f64, &u32)| (*count >= LEAST_TOUCHES).then(|| gain.exp());
     let gains = gains.iter().zip(&pressed).map(told).collect();
-    Ok(SkinEstimate { gains, pressed, width_m, sigma_m, left, touches: used })
+    Ok(GainsEstimate { gains, pressed, width_m, sigma_m, left, touches: used })
 }
 
 /// Takes off the logarithms of `gains` of the taxels that are `known`, with their places, what touches cannot tell.

@@ -111,8 +111,8 @@ pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{
-    COLUMNS, Column, Contact, ContactKind, ContactSide, Flags, Footprint, FootprintSigma, Outputs, Percept, Percepts,
-    Precision, Touch,
+    COLUMNS, Column, ContactKind, Fit, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact,
+    SelfContactSide, Touch,
 };
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, FrameTime, Letter, Pose, RawValue, Receptor};

@@ -30,12 +30,12 @@ mod batch;
 mod cells;
 mod columns;
 mod contact_kind;
-mod contacts;
 mod export;
+mod fit;
 mod flags;
-mod footprint;
 mod keep;
 mod presence;
+mod self_contacts;
 mod typed;
 
 pub use batch::Percepts;
@@ -44,10 +44,10 @@ pub(crate) use cells::{CellsMut, PlaceCells};
 pub use columns::{COLUMNS, Column, Measure, Outputs, Percept, Unit};
 pub(crate) use columns::{Component, Host, Store};
 pub use contact_kind::ContactKind;
-pub use contacts::{Contact, ContactSide};
 pub use export::ColumnValues;
+pub use fit::{Fit, FitSigma};
 pub use flags::Flags;
-pub use footprint::{Footprint, FootprintSigma};
+pub use self_contacts::{SelfContact, SelfContactSide};
 
 /// The arithmetic that made the numbers, and so the digits worth printing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,18 +72,18 @@ pub struct Touch {
     /// The same point on the surface, as [`Percept::position`] and in the same frame, m; absent where that is a field over
     /// several links, and the frame does not say where this touch's link is ([`Flags::NO_POSE`]).
     pub position: Option<[f64; 3]>,
-    /// What presses, where an output of the footprint was asked for and it has one.
-    pub footprint: Option<Footprint>,
-    /// Why the footprint, or a part of it, is absent.
+    /// What presses, where an output of the fit was asked for and it has one.
+    pub fit: Option<Fit>,
+    /// Why the fit, or a part of it, is absent.
     pub flags: Flags,
 }
 
 impl Touch {
-    /// The quantity of `column`, an output of the footprint, its components first, if it is present.
+    /// The quantity of `column`, an output of the fit, its components first, if it is present.
     #[must_use]
     pub fn value(&self, column: &Column) -> Option<[f64; 3]> {
         match column.store {
-            Store::Host(host) => self.footprint?.components(host),
+            Store::Host(host) => self.fit?.components(host),
             _ => None,
         }
     }

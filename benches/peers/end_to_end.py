@@ -21,7 +21,7 @@ OUTPUTS = "total,peak,active,centroid,orientation"
 U = 2.0**-24
 
 SENSOR = """
-[skin]
+[layer]
 thickness_m = 0.008
 
 [sensor]

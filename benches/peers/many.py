@@ -34,7 +34,7 @@ def main() -> None:
     asked = words.parse_args()
     folder = pathlib.Path(tempfile.mkdtemp())
     body = st.Body.grid(25, 40, 0.005, name="skin", regions=(5, 5))
-    scene = {"outputs": ["total", "peak", "centroid", "axis", "speed"]}
+    scene = {"outputs": ["total", "peak", "centroid", "principal_axis", "speed"]}
     random = np.random.default_rng(1)
     rows, columns = np.divmod(np.arange(1000), 40)
     one = folder / "0.csv"

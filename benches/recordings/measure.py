@@ -9,7 +9,7 @@ import sys
 somatic, recording, place, rounds = sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4])
 info = json.loads(subprocess.run([somatic, "info", recording, "--json"], check=True, capture_output=True).stdout)
 length = info["frames"] / info["rate_hz"]
-every = ("total,peak,active,area,centroid,position,normal,orientation,axis,anisotropy,displacement,direction,distance,"
+every = ("total,peak,active,area,centroid,position,normal,orientation,principal_axis,anisotropy,displacement,direction,distance,"
          "radial_distance,speed,radial_speed,touches,filtered_displacement,filtered_direction,filtered_speed")
 
 

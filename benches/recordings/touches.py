@@ -8,7 +8,7 @@ rate_hz = 250
 duration_s = {seconds}
 seed = 11
 
-[skin]
+[layer]
 thickness_m = 0.004
 
 [sensor]

@@ -5,7 +5,7 @@
 #define BITS 10
 
 extern uint16_t read_channel(unsigned channel);
-extern int set_tap(unsigned channel, uint8_t tap); /* 0 when that worked */
+extern int set_wiper(unsigned channel, uint8_t wiper); /* 0 when that worked */
 extern uint32_t micros(void);
 extern int next_byte(void); /* from the line, -1 when there is none */
 extern void send(const uint8_t *bytes, size_t length); /* returns when all have left */
@@ -39,11 +39,11 @@ static void obey(const struct somatic_command *command)
     case SOMATIC_RATE:
         value = rate_mhz = command->rate_mhz;
         break;
-    case SOMATIC_TAP:
-        value = command->tap;
+    case SOMATIC_WIPER:
+        value = command->wiper;
         if (command->channel >= CHANNELS)
             status = SOMATIC_BAD;
-        else if (set_tap(command->channel, command->tap) != 0)
+        else if (set_wiper(command->channel, command->wiper) != 0)
             status = SOMATIC_FAILED;
         break;
     case SOMATIC_START:

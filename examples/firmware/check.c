@@ -4,7 +4,7 @@
  *   partial BOARD BOOT SEQUENCE TIME BITS CHANNELS CHANNEL=VALUE...
  *   identity BOARD BOOT SEQUENCE TIME REQUEST RUNNING CHANNELS BITS LAYOUT RATE [TEXT]
  *   answer BOARD BOOT SEQUENCE TIME REQUEST COMMAND STATUS VALUE
- *   hear HEX                                                 KIND BOARD REQUEST RATE CHANNEL TAP, once a command
+ *   hear HEX                                                 KIND BOARD REQUEST RATE CHANNEL WIPER, once a command
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,7 +46,7 @@ int main(void)
                 struct somatic_command c = {0, 0, 0, 0, 0, 0};
                 char two[3] = {hex[0], hex[1], 0};
                 if (somatic_hear(&ear, (uint8_t)strtoul(two, NULL, 16), &c))
-                    printf("%u %u %u %lu %u %u ", c.kind, c.board, c.request, (unsigned long)c.rate_mhz, c.channel, c.tap);
+                    printf("%u %u %u %lu %u %u ", c.kind, c.board, c.request, (unsigned long)c.rate_mhz, c.channel, c.wiper);
             }
             printf("\n");
             continue;

@@ -187,9 +187,9 @@ static int understand(const uint8_t *bytes, size_t length, struct somatic_comman
         command->rate_mhz = read32(bytes + 5);
         return length == 13;
     }
-    if (command->kind == SOMATIC_TAP) {
+    if (command->kind == SOMATIC_WIPER) {
         command->channel = (uint16_t)(bytes[5] | bytes[6] << 8);
-        command->tap = bytes[7];
+        command->wiper = bytes[7];
         return length == 12;
     }
     return length == 9 || command->kind > SOMATIC_STOP;

@@ -24,7 +24,7 @@ extern "C" {
 enum { SOMATIC_ANY_BOARD = 0xFFFF };
 enum somatic_kind {
     SOMATIC_FRAME = 0x01, SOMATIC_PARTIAL = 0x02, SOMATIC_IDENTITY = 0x03, SOMATIC_ANSWER = 0x04,
-    SOMATIC_IDENTIFY = 0x10, SOMATIC_RATE = 0x11, SOMATIC_TAP = 0x12, SOMATIC_START = 0x13, SOMATIC_STOP = 0x14
+    SOMATIC_IDENTIFY = 0x10, SOMATIC_RATE = 0x11, SOMATIC_WIPER = 0x12, SOMATIC_START = 0x13, SOMATIC_STOP = 0x14
 };
 enum somatic_status { SOMATIC_DONE = 0, SOMATIC_UNKNOWN = 1, SOMATIC_BAD = 2, SOMATIC_FAILED = 3 };
 
@@ -57,8 +57,8 @@ struct somatic_command {
     uint16_t board;
     uint8_t request, kind;
     uint32_t rate_mhz;  /* SOMATIC_RATE */
-    uint16_t channel;   /* SOMATIC_TAP */
-    uint8_t tap;        /* SOMATIC_TAP */
+    uint16_t channel;   /* SOMATIC_WIPER */
+    uint8_t wiper;      /* SOMATIC_WIPER */
 };
 
 /* What has been heard of a command; all zero at first. */

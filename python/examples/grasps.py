@@ -31,7 +31,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 ROWS, COLUMNS, PADS = 14, 6, 6
 PITCH_M = 0.0034
 REST_FRAMES = 20
-OUTPUTS = ["total", "peak", "active", "centroid", "axis", "anisotropy"]
+OUTPUTS = ["total", "peak", "active", "centroid", "principal_axis", "anisotropy"]
 # Counts above rest from which on a taxel is pressed: some times the sensors' noise.
 CALIBRATION = "[all]\ndead_band = 8\n"
 
@@ -68,7 +68,7 @@ def features(p: st.Percepts) -> dict[str, list[float]]:
         held = force > 0.5 * top
         weight = force[held] / force[held].sum()
         active, peak = p["active"][held, pad], p["peak"][held, pad]
-        axis, anisotropy = np.nan_to_num(p["axis"][held, pad]), np.nan_to_num(p["anisotropy"][held, pad])
+        axis, anisotropy = np.nan_to_num(p["principal_axis"][held, pad]), np.nan_to_num(p["anisotropy"][held, pad])
         centroid = p["centroid"][held, pad]
         rise = [p.t[np.argmax(force > share * top)] for share in (0.1, 0.8)]
         pressed = force > 0.05 * top

@@ -12,7 +12,7 @@ touch = st.simulate(
     rate_hz = 100
     duration_s = 2
     body = "hand"
-    [skin]
+    [layer]
     thickness_m = 0.004
     [[touch]]
     on = "{field.anchor}"

@@ -16,7 +16,7 @@ from ._flags import Flags
 from ._native import (
     Body,
     Calibration,
-    Contacts,
+    SelfContacts,
     Engine,
     EngineState,
     Field,
@@ -40,7 +40,7 @@ from ._native import (
 __all__ = [
     "Body",
     "Calibration",
-    "Contacts",
+    "SelfContacts",
     "Engine",
     "EngineState",
     "Field",

@@ -37,7 +37,7 @@ class Flags(enum.IntFlag):
     OFF_FIELD = 1 << 21
     POOR_FIT = 1 << 22
     CURVED = 1 << 23
-    NO_SKIN = 1 << 24
+    NO_LAYER = 1 << 24
     NOISE_UNKNOWN = 1 << 25
     UNSURE = 1 << 26
     STALE_POSE = 1 << 27

@@ -8,7 +8,7 @@ import numpy.typing as npt
 __all__ = [
     "Body",
     "Calibration",
-    "Contacts",
+    "SelfContacts",
     "Engine",
     "EngineState",
     "Field",
@@ -205,7 +205,7 @@ class Percepts:
     @property
     def touches(self) -> Touches: ...
     @property
-    def contacts(self) -> Contacts: ...
+    def self_contacts(self) -> SelfContacts: ...
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> Any: ...
     def to_arrow(self, *, all_fields: bool = False) -> Any: ...
     def to_pandas(self, *, all_fields: bool = False) -> Any: ...
@@ -236,7 +236,7 @@ class Touches:
     def __len__(self) -> int: ...
 
 @final
-class Contacts:
+class SelfContacts:
     @property
     def frame(self) -> npt.NDArray[np.int64]: ...
     @property

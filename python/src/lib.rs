@@ -5,7 +5,7 @@ mod arrays;
 mod author;
 mod body;
 mod calibration;
-mod contacts;
+mod self_contacts;
 #[cfg(feature = "gpu")]
 mod drawing;
 mod engine;
@@ -38,7 +38,7 @@ mod native {
     #[pymodule_export]
     use calibration::PyCalibration;
     #[pymodule_export]
-    use contacts::PyContacts;
+    use self_contacts::PySelfContacts;
     #[pymodule_export]
     use engine::PyEngine;
     #[pymodule_export]

@@ -11,7 +11,7 @@ use somatic::sink::TableKind;
 use somatic::{COLUMNS, Column, Flags, Outputs, Percepts};
 
 use crate::arrays::array;
-use crate::contacts::PyContacts;
+use crate::self_contacts::PySelfContacts;
 use crate::error::usage;
 use crate::session::Run;
 use crate::stream::stream;
@@ -53,7 +53,7 @@ impl PyPercepts {
         Err(usage(
             py,
             match name {
-                "touches" | "contacts" => format!("{name} are no column; see `.{name}`"),
+                "touches" | "self_contacts" => format!("{name} are no column; see `.{name}`"),
                 _ if COLUMNS.iter().any(|column| column.name == name) => {
                     format!("`{name}` was not asked for; add it to the scene's outputs")
                 }
@@ -107,8 +107,8 @@ impl PyPercepts {
     /// The names of its columns.
     ///
     /// >>> import somatic_touch as st
-    /// >>> st.Engine(st.Body.bundled("hand"), {"outputs": ["total", "axis"]}, backend="cpu").step(0.0, [0] * 40).keys()
-    /// ['total', 'axis']
+    /// >>> st.Engine(st.Body.bundled("hand"), {"outputs": ["total", "principal_axis"]}, backend="cpu").step(0.0, [0] * 40).keys()
+    /// ['total', 'principal_axis']
     fn keys(&self) -> Vec<&'static str> {
         self.inner.outputs().columns().map(|column| column.name).collect()
     }
@@ -210,13 +210,13 @@ impl PyPercepts {
         Ok(PyTouches { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
     }
 
-    /// The contacts between links, with output `contacts`: where the robot touches itself.
+    /// The self-contacts, with output `self_contacts`: where the robot touches itself.
     #[getter]
-    fn contacts(&self, py: Python<'_>) -> PyResult<PyContacts> {
-        if !self.inner.outputs().contains(Outputs::CONTACTS) {
-            return Err(usage(py, "`contacts` were not asked for; add them to the scene's outputs"));
+    fn self_contacts(&self, py: Python<'_>) -> PyResult<PySelfContacts> {
+        if !self.inner.outputs().contains(Outputs::SELF_CONTACTS) {
+            return Err(usage(py, "`self_contacts` were not asked for; add them to the scene's outputs"));
         }
-        Ok(PyContacts { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
+        Ok(PySelfContacts { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
     }
 
     /// Arrow's C stream of the table that docs/tables.md describes: a row per frame and field in contact.

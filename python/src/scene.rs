@@ -26,7 +26,6 @@ const OF_THE_COMMAND: [&str; 31] = [
     "budget",
     "calibration",
     "centroid",
-    "force",
     "format",
     "from_s",
     "grid",
@@ -35,13 +34,14 @@ const OF_THE_COMMAND: [&str; 31] = [
     "live_rate_hz",
     "loop",
     "orientation",
+    "overwrite",
     "pitch",
+    "playback_speed",
     "quiet",
     "rate_hz",
     "record",
     "sink",
     "source",
-    "speed",
     "strict",
     "to_s",
     "unit",
@@ -69,8 +69,7 @@ pub(crate) struct Keys {
     tare: bool,
     #[serde(deserialize_with = "word")]
     coordinates: Option<Coordinates>,
-    #[serde(rename = "in")]
-    in_link: Option<String>,
+    relative_to: Option<String>,
     max_gap_s: Option<f64>,
     contact_tolerance_m: Option<f64>,
     max_age_s: Option<f64>,
@@ -281,7 +280,7 @@ impl PyScene {
             .filter(self.keys.filter()?)
             .knobs(knobs)
             .contact_tolerance_m(self.keys.contact_tolerance_m)
-            .in_link(self.keys.in_link.clone())
+            .relative_to(self.keys.relative_to.clone())
             .coordinates(self.keys.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)

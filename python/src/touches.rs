@@ -100,20 +100,20 @@ impl PyTouches {
         self.column(py, 3, |(_, _, touch), to| to.extend(touch.position.unwrap_or([f64::NAN; 3])))
     }
 
-    /// Why the footprint of each, or a part of it, is absent, uint32 [touches]; the bits are those of `Flags`.
+    /// Why the fit of each, or a part of it, is absent, uint32 [touches]; the bits are those of `Flags`.
     #[getter]
     fn flags(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.column(py, 1, |(_, _, touch), to| to.push(touch.flags.bits()))
     }
 
-    /// An output of each touch's own footprint, such as `touches["footprint_place"]`, float64 [touches] or [touches, components];
-    /// NaN where it is absent. `footprint_kind` is 0 for a point, 1 for a line, 2 for a segment and 3 for a blob.
+    /// An output of each touch's own fit, such as `touches["fit_place"]`, float64 [touches] or [touches, components];
+    /// NaN where it is absent. `fit_kind` is 0 for a point, 1 for a line, 2 for a segment and 3 for a blob.
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
         let asked = self.percepts.outputs().of_each_touch();
         let Some(column) = asked.columns().find(|column| column.name == name) else {
             let names: Vec<&str> = asked.columns().map(|column| column.name).collect();
             let has = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            return Err(usage(py, format!("no output of the footprint `{name}` was asked for; there are: {has}")));
+            return Err(usage(py, format!("no output of the fit `{name}` was asked for; there are: {has}")));
         };
         self.column(py, column.components, |(_, _, touch), to| {
             to.extend_from_slice(&touch.value(column).unwrap_or([f64::NAN; 3])[..column.components]);

@@ -1,4 +1,4 @@
-// What the stages from contact to axis have in common, as they go over members together: a member's pressures are read
+// What the stages from contact to principal_axis have in common, as they go over members together: a member's pressures are read
 // once for the sums and the centroid, and once more for what needs the centroid.
 
 @group(0) @binding(0) var<uniform> batch: Batch;

@@ -426,7 +426,7 @@ mod tests {
         let Values::F64(mut columns) = percepts.values.clone() else { unreachable!("made so") };
         (columns[Component::Total][0], columns[Component::Peak][0], columns[Component::Area][0]) = (10.0, 5.0, 1.0);
         (columns[Component::CentroidU][0], columns[Component::CentroidV][0]) = (0.1, 0.2);
-        (columns[Component::Orientation][0], columns[Component::Axis][0], columns[Component::Anisotropy][0]) =
+        (columns[Component::Orientation][0], columns[Component::PrincipalAxis][0], columns[Component::Anisotropy][0]) =
             (0.001, 1.0, 0.5);
         columns[Component::Direction][0] = 3.139;
         change(&mut percepts, &mut columns);
@@ -474,7 +474,7 @@ mod tests {
             ("speed", |_, c| c[Component::Speed][0] = f64::INFINITY),
             ("filtered_speed", |p, _| p.remove_present(0, Outputs::FILTERED_SPEED)),
             ("direction", |p, _| p.remove_present(0, Outputs::DIRECTION)),
-            ("axis", |p, _| p.remove_present(0, Outputs::AXIS)),
+            ("principal_axis", |p, _| p.remove_present(0, Outputs::PRINCIPAL_AXIS)),
             ("flags", |p, _| p.flags[0] |= Flags::TIE),
         ];
         for (name, change) in changes {
@@ -491,7 +491,7 @@ mod tests {
             active: 3,
             centroid: Some([0.1, 0.2]),
             position: Some([0.0; 3]),
-            footprint: None,
+            fit: None,
             flags: Flags::empty(),
         };
         let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
@@ -552,7 +552,7 @@ mod tests {
              0 not compared"
         );
         let mut loose = bound();
-        loose.set([(Outputs::AXIS, Limit::TooClose), (Outputs::SPEED, Limit::Unread)]);
+        loose.set([(Outputs::PRINCIPAL_AXIS, Limit::TooClose), (Outputs::SPEED, Limit::Unread)]);
         assert_eq!(
             first(loose, |_, c| c[Component::Speed][0] = 9.0),
             "agrees with the reference: of 39 values in 1 percept, 37 agreeing, 0 different, 1 too close to call, \

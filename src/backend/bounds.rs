@@ -11,8 +11,8 @@ use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::touches::TouchBound;
 use crate::stage::{
-    Given, GivenLimit, Pressed, U, axis, centroid, contact, difference, filter, force, hysteresis, motion, orientation,
-    touches,
+    Given, GivenLimit, Pressed, U, centroid, contact, difference, filter, force, hysteresis, motion, orientation,
+    principal_axis, touches,
 };
 
 /// How far a single-precision percept may be off in one cell.
@@ -272,9 +272,9 @@ impl BoundedReference {
             bound.set(line.limits(cell.present));
             bound.in_doubt |= line.in_doubt;
         }
-        if self.reference.plan.stages().axis {
+        if self.reference.plan.stages().principal_axis {
             let how = self.reference.plan.sums(self.reference.plan.fields[cell.index].count);
-            let axis = axis::bound(pressed, how, c, c_bound);
+            let axis = principal_axis::bound(pressed, how, c, c_bound);
             bound.set(axis.limits(cell.present));
             bound.in_doubt |= axis.line.in_doubt;
         }

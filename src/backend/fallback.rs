@@ -4,7 +4,7 @@ use super::{Backend, BackendState, FieldState, RawBatch, cpu};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
-use crate::stage::footprint::{Ends, Touch};
+use crate::stage::fit::{Ends, Touch};
 
 /// The backend that runs, and what the other one needs to go on.
 pub(super) struct Fallback {

@@ -19,7 +19,7 @@ pub(crate) use self::state::{BackendState, FieldState};
 use crate::error::{Error, Result};
 use crate::percept::{Percepts, Precision};
 use crate::scene::{Arithmetic, Plan};
-use crate::stage::footprint::{Ends, Touch};
+use crate::stage::fit::{Ends, Touch};
 
 words! {"backend",
     /// Which backend is asked for.

@@ -7,7 +7,9 @@ use crate::scene::{Plan, PlanField};
 use crate::signal::RawValue;
 use crate::stage::calibrate::{Pressure, UNUSABLE};
 use crate::stage::change::Heard;
-use crate::stage::{Given, Pressed, U, axis, calibrate, centroid, change, contact, hysteresis, motion, orientation};
+use crate::stage::{
+    Given, Pressed, U, calibrate, centroid, change, contact, hysteresis, motion, orientation, principal_axis,
+};
 
 /// The backend.
 pub(crate) struct Reference {
@@ -162,8 +164,8 @@ impl Reference {
             made.flags |= line.flags;
             made.give(&line.outputs());
         }
-        if stages.axis {
-            let axis = axis::reference(&pressed, c.truncate());
+        if stages.principal_axis {
+            let axis = principal_axis::reference(&pressed, c.truncate());
             made.flags |= axis.line.flags;
             made.give(&axis.outputs());
         }

@@ -1,6 +1,6 @@
 //! `somatic calibrate`: from a rest and a press to a calibration file.
 
-mod skin;
+mod gains;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -30,11 +30,11 @@ Examples:
   robot-driver | somatic calibrate --body robot.glb --source - --bits 10 -o robot.toml
   somatic calibrate --body robot.glb --source serial:/dev/ttyUSB0 --wiring hand.toml -o robot.toml
   somatic run --body robot.glb --source session.csv --calibration robot.toml
-  somatic calibrate --body robot.glb --skin touches.csv --calibration robot.toml -o skin.toml
+  somatic calibrate --body robot.glb --gains-from touches.csv --calibration robot.toml -o skin.toml
 
 First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one
 after the other or many at once, until the recording ends, --press seconds are over, or Ctrl-C.
---skin needs no rest and no order: a finger that wanders over the skin for two minutes.
+--gains-from needs no rest and no order: a finger that wanders over the skin for two minutes.
 
 The file is TOML; its keys may be edited:
 
@@ -56,22 +56,22 @@ pub(super) struct Arguments {
     body: String,
 
     /// Where frames come from: as for `somatic run`; serial lines may be several.
-    #[arg(long = "source", value_name = "SOURCE", required_unless_present = "skin")]
+    #[arg(long = "source", value_name = "SOURCE", required_unless_present = "gains_from")]
     sources: Vec<String>,
 
     /// Find each sensor's gain and how wide the layer makes a contact, from ordinary touches that move about; writes them into
     /// the calibration that --calibration names.
     #[arg(long, value_name = "RECORDING", requires = "calibration",
         conflicts_with_all = ["sources", "plot", "press", "bits", "missing", "equalise", "mask_moved"])]
-    skin: Option<String>,
+    gains_from: Option<String>,
 
-    /// For --skin: the calibration with baselines and dead bands, which gains are added to.
-    #[arg(long, value_name = "FILE.toml", requires = "skin")]
+    /// For --gains-from: the calibration with baselines and dead bands, which gains are added to.
+    #[arg(long, value_name = "FILE.toml", requires = "gains_from")]
     calibration: Option<PathBuf>,
 
-    /// For --skin: the touches are all by the flat end of a stamp of this radius, such as 6mm, so that the layer's own σ is told
+    /// For --gains-from: the touches are all by the flat end of a stamp of this radius, such as 6mm, so that the layer's own σ is told
     /// apart from the contact's size.
-    #[arg(long, value_name = "RADIUS", requires = "skin", value_parser = length)]
+    #[arg(long, value_name = "RADIUS", requires = "gains_from", value_parser = length)]
     stamp: Option<f64>,
 
     #[command(flatten)]
@@ -124,7 +124,7 @@ pub(super) struct Arguments {
 
 pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let output = &arguments.output;
-    let sources: Vec<String> = arguments.sources.iter().chain(&arguments.skin).cloned().collect();
+    let sources: Vec<String> = arguments.sources.iter().chain(&arguments.gains_from).cloned().collect();
     let read = FilesRead::default().bodies([&arguments.body]).sources(&sources).files(&arguments.lines.wiring);
     let read = read.files(&arguments.calibration);
     let mut outputs = read.outputs(arguments.force);
@@ -136,10 +136,10 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     outputs.add_standard_output()?;
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let body = load_body(&arguments.body)?;
-    if let Some(recording) = &arguments.skin {
+    if let Some(recording) = &arguments.gains_from {
         let touches =
-            skin::Touches { recording, calibration: arguments.calibration.as_deref(), rate_hz: arguments.rate };
-        return skin::calibrate(&touches, &body, arguments.stamp, to, arguments.json);
+            gains::Touches { recording, calibration: arguments.calibration.as_deref(), rate_hz: arguments.rate };
+        return gains::calibrate(&touches, &body, arguments.stamp, to, arguments.json);
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let ports = arguments.lines.lines(&arguments.sources)?;

@@ -1,7 +1,7 @@
 //! `run --describe`: the columns of the tables that sinks write.
 
 use comfy_table::Cell;
-use somatic::sink::{Session, SinkSpec, TableColumn, contact_columns, percept_columns, touch_columns};
+use somatic::sink::{Session, SinkSpec, TableColumn, percept_columns, self_contact_columns, touch_columns};
 use somatic::{Error, Outputs, Result};
 
 use super::table::{plain, shown};
@@ -29,9 +29,9 @@ pub(super) fn describe(sinks: &[SinkSpec], session: &Session<'_>, wide: bool) ->
         text += "\nin a second file, one row per frame, field in contact and separate touch\n";
         text += &table(&touch_columns(session));
     }
-    if session.outputs.contains(Outputs::CONTACTS) {
-        text += "\nin a third file, one row per frame and contact\n";
-        text += &table(&contact_columns(session));
+    if session.outputs.contains(Outputs::SELF_CONTACTS) {
+        text += "\nin a third file, one row per frame and self-contact\n";
+        text += &table(&self_contact_columns(session));
     }
     Ok(text)
 }

@@ -92,9 +92,9 @@ impl Doubts {
     fn of_poses(&self, plan: &Plan) -> Option<String> {
         let asked = plan.outputs();
         let what = [
-            (asked.contains(Outputs::CONTACTS), "contacts"),
+            (asked.contains(Outputs::SELF_CONTACTS), "self_contacts"),
             (asked.contains(Outputs::SPEED_IN_WORLD), "speed_in_world"),
-            (plan.in_link().is_some(), "--in"),
+            (plan.relative_to().is_some(), "--relative-to"),
         ];
         let needs: Vec<&str> = what.into_iter().filter_map(|(is_asked, what)| is_asked.then_some(what)).collect();
         (!self.has_poses && self.begin_s.is_some() && !needs.is_empty()).then(|| {

@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     strict: bool,
 
     /// How near taxels of two links must be to be told as near at rest, in metres [default: by the taxels' spacing, as for
-    /// contacts].
+    /// self_contacts].
     #[arg(long, value_name = "M")]
     contact_tolerance: Option<f64>,
 

@@ -86,22 +86,22 @@ impl LineFlags {
         })
     }
 
-    /// Refuses a calibration whose circuit has another tap than the wiring sets. `ids` are the body's.
-    pub(super) fn check_taps(&self, calibration: Option<&Calibration>, ids: &[u32]) -> Result<()> {
+    /// Refuses a calibration whose circuit has another wiper position than the wiring sets. `ids` are the body's.
+    pub(super) fn check_wipers(&self, calibration: Option<&Calibration>, ids: &[u32]) -> Result<()> {
         let (Some(wiring), Some(calibration), Some(path)) = (self.wiring()?, calibration, &self.wiring) else {
             return Ok(());
         };
         for board in wiring.boards() {
-            for (taxel, tap) in board.taxels.iter().zip(&board.taps) {
-                let (Some(taxel), Some(tap)) = (*taxel, *tap) else { continue };
+            for (taxel, wiper) in board.taxels.iter().zip(&board.wipers) {
+                let (Some(taxel), Some(wiper)) = (*taxel, *wiper) else { continue };
                 let Ok(index) = ids.binary_search(&taxel) else { continue };
                 if let Response::Fsr(fsr) = calibration.taxels[index].response
-                    && fsr.tap != tap
+                    && fsr.wiper != wiper
                 {
                     let what = format!(
-                        "it sets tap {tap} on taxel {taxel}, and the calibration has tap {}; make them one, as \
+                        "it sets wiper {wiper} on taxel {taxel}, and the calibration has wiper {}; make them one, as \
                          `somatic tune --fsr-calibration` does",
-                        fsr.tap
+                        fsr.wiper
                     );
                     return Err(Error::failed(what).at(path.display()));
                 }

@@ -80,7 +80,7 @@ pub(super) struct Arguments {
     #[arg(long, help_heading = "Output")]
     wide: bool,
 
-    /// The table that csv:- puts on standard output: fields, touches or contacts [default: touches if they are computed, else
+    /// The table that csv:- puts on standard output: fields, touches or self_contacts [default: touches if they are computed, else
     /// fields].
     #[arg(long, value_name = "TABLE", help_heading = "Output")]
     table: Option<TableName>,
@@ -148,7 +148,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let settled = settled(&asked, Some(&input), &body, batch)?;
     let is_raw = settled.options.calibration.is_none() && !settled.options.tare;
-    asked.line_flags().check_taps(settled.options.calibration.as_ref(), &ids)?;
+    asked.line_flags().check_wipers(settled.options.calibration.as_ref(), &ids)?;
     #[cfg(feature = "page")]
     let options = settled.options.clone();
     let mut engine = Engine::new(&body, settled.options)?;

@@ -67,7 +67,7 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches, contacts, speed_in_world, filtered_*, footprint_* and *_sigma;
+    /// Compute only these quantities [default: all but touches, self_contacts, speed_in_world, filtered_*, fit_* and *_sigma;
     /// force only where P has a unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
@@ -88,6 +88,7 @@ pub(super) struct RunOptions {
 
     /// Play a recording at this many times its own speed [default: as fast as possible; 1 with a page].
     #[arg(long, value_name = "X")]
+    #[serde(rename = "playback_speed")]
     pub(super) speed: Option<f64>,
 
     /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
@@ -96,6 +97,7 @@ pub(super) struct RunOptions {
 
     /// Replace output files that exist; a file that is read is never replaced.
     #[arg(long)]
+    #[serde(rename = "overwrite")]
     pub(super) force: bool,
 
     /// Compute the fields from pressures (sustained), from their change per second (change), or once from each [default:
@@ -126,10 +128,9 @@ pub(super) struct RunOptions {
     #[schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS))]
     pub(super) coordinates: Option<Coordinates>,
 
-    /// Put positions, normals and contacts into the frame of this link instead of the world, where frames carry poses.
-    #[arg(long = "in", help_heading = COMPUTED, value_name = "LINK")]
-    #[serde(rename = "in")]
-    pub(super) in_link: Option<String>,
+    /// Put positions, normals and self-contacts into the frame of this link instead of the world, where frames carry poses.
+    #[arg(long, help_heading = COMPUTED, value_name = "LINK")]
+    pub(super) relative_to: Option<String>,
 
     /// How far the places of two touches may be apart that are one contact, in metres [default: by the taxels' spacing].
     #[arg(long, help_heading = COMPUTED, value_name = "M")]
@@ -161,7 +162,7 @@ pub(super) struct RunOptions {
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
 
-    /// Measure footprint_speed (0.2 s without this) and the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
+    /// Measure fit_speed (0.2 s without this) and the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
     /// --filter-window, of which the high end still counts. 0.2 is steady where few sensors feel a touch.
     #[arg(long, help_heading = COMPUTED, value_name = "S", allow_hyphen_values = true)]
     #[serde(rename = "filter_over_s")]
@@ -362,7 +363,7 @@ impl RunOptions {
         }
         let asked = merged! {
             values: zenoh_config ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap contact_tolerance
-                coordinates in_link filter_window filter_by filter_time filter_over,
+                coordinates relative_to filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet
         };
@@ -408,7 +409,7 @@ impl RunOptions {
             .filter(self.filter(outputs)?)
             .knobs(self.accuracy.knobs())
             .contact_tolerance_m(self.contact_tolerance)
-            .in_link(self.in_link.clone())
+            .relative_to(self.relative_to.clone())
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
             .scene(scene)

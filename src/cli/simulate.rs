@@ -21,7 +21,7 @@ A simulation is TOML: the body, the rate, and touches, which move along paths in
   body = \"hand\"
   rate_hz = 50
   duration_s = 4
-  [skin]                        # the layer over the sensors; without it they feel contacts as they are
+  [layer]                       # the layer over the sensors; without it they feel contacts as they are
   thickness_m = 0.007
   stiffness_pa = 400e3
   [sensor]                      # ideal, linear or fsr; ideal ones give newton

@@ -36,7 +36,7 @@ Examples:
   somatic tradeoff --body mat --source night.csv --json | jq '.rows[] | select(.front)'
 
 Methods are held against the truth of touches that are simulated on the body, under the layer that the
-calibration names in [skin], or of the source where it is a simulation. The knobs of rounding are held
+calibration names in [layer], or of the source where it is a simulation. The knobs of rounding are held
 against the reference. Combinations take turns, so that a machine that slows down slows all of them.
 A front is what no other combination beats: none is as true and faster. What is measured is kept, and
 `somatic run` and `somatic plan` choose by it, on the same recording or live, where a scene leaves
@@ -201,10 +201,10 @@ fn truth(report: &Report) -> String {
     let of = if report.touches.is_empty() { "touches of the source" } else { &report.touches };
     let mut text = format!("\n{}: {of}\n", style("from the truth").bold());
     text += &rungs(report, &|row| row.truth.as_ref());
-    let fitted = report.rows.iter().find_map(|row| row.truth_with_footprint.as_ref());
+    let fitted = report.rows.iter().find_map(|row| row.truth_with_fit.as_ref());
     if let Some(fitted) = fitted.filter(|fitted| fitted.touches > 0) {
-        text += &format!("\nof these the {} touches that have a footprint\n", fitted.touches);
-        text += &rungs(report, &|row| row.truth_with_footprint.as_ref());
+        text += &format!("\nof these the {} touches that have a fit\n", fitted.touches);
+        text += &rungs(report, &|row| row.truth_with_fit.as_ref());
     }
     text
 }

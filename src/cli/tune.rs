@@ -28,10 +28,11 @@ Examples:
   somatic run --source serial:/dev/ttyUSB0 --wiring tuned.toml --calibration calibration.toml
 
 First nothing touches the robot, for --rest seconds; then every sensor is pressed as firmly as it
-ever will be. From that follows which tap lets it use most of the range and leaves a sixteenth;
-the taps are set, and the sensors pressed again to see it, until all fit, in at most five rounds.
+ever will be. From that follows which wiper position lets it use most of the range and leaves a
+sixteenth; the wipers are set, and the sensors pressed again to see it, until all fit, in at most
+five rounds.
 What stands in the file written by -o is set again by every command that has it as its --wiring,
-whenever a board starts. Ctrl-C puts all taps back.";
+whenever a board starts. Ctrl-C puts all wipers back.";
 
 /// Set the boards' potentiometers so that their sensors use the converters' range.
 #[derive(Args)]
@@ -48,17 +49,17 @@ pub(super) struct Arguments {
     #[command(flatten)]
     lines: LineFlags,
 
-    /// The wiring with its taps, to write as TOML: what --wiring has with `taps`.
+    /// The wiring with its wipers, to write as TOML: what --wiring has with `wipers`.
     #[arg(short, long, value_name = "FILE.toml")]
     output: Option<PathBuf>,
 
-    /// A calibration for the paper's circuit at these taps, to write as TOML.
+    /// A calibration for the paper's circuit at these wiper positions, to write as TOML.
     #[arg(long, value_name = "FILE.toml")]
     fsr_calibration: Option<PathBuf>,
 
-    /// The tap to begin with, where the wiring has none: a board cannot be asked which it has.
-    #[arg(long, value_name = "TAP", default_value_t = FsrCircuit::MIDDLE_TAP)]
-    tap: u8,
+    /// The wiper to begin with, where the wiring has none: a board cannot be asked which it has.
+    #[arg(long, value_name = "WIPER", default_value_t = FsrCircuit::MIDDLE_WIPER)]
+    wiper: u8,
 
     /// How long nothing touches the robot, in seconds.
     #[arg(long, value_name = "S", default_value_t = 3.0)]
@@ -102,8 +103,8 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
         Some(wiring) => wiring,
         None => Wiring::in_order(&ids, 1, ports.len()).map_err(|e| e.at("no --wiring is given"))?,
     };
-    let own = |board: u16, channel: u16| wiring.board(board)?.taps.get(usize::from(channel)).copied()?;
-    let start = wiring.with_taps(|board, channel| Some(own(board, channel).unwrap_or(arguments.tap)));
+    let own = |board: u16, channel: u16| wiring.board(board)?.wipers.get(usize::from(channel)).copied()?;
+    let start = wiring.with_wipers(|board, channel| Some(own(board, channel).unwrap_or(arguments.wiper)));
     let stop = stop_on_signal()?;
     let source = arguments.lines.open_as(Some(start.clone()), &ports, &ids, None)?;
     let mut session = TuningSession::new(source, &start, stop);
@@ -113,9 +114,9 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     let tuned = rounds(&mut session, rest, press, &mut tuning);
     let tuning = match (tuned, tuning) {
         (Ok(PhaseEnd::Completed), Some(tuning)) => tuning,
-        (Ok(_), _) => return Err(Error::failed(format!("ended before all was tuned; {}", session.restore_taps()))),
+        (Ok(_), _) => return Err(Error::failed(format!("ended before all was tuned; {}", session.restore_wipers()))),
         (Err(error), _) => {
-            say(&session.restore_taps());
+            say(&session.restore_wipers());
             return Err(error);
         }
     };
@@ -124,11 +125,11 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
 
     let tapped = |board: u16, channel: u16| {
         let sensor = now.iter().zip(tuning.sensors()).find(|(place, _)| (place.id, place.channel) == (board, channel));
-        // A tap that was not confirmed is unknown.
-        sensor.filter(|(place, _)| place.is_set).map(|(_, sensor)| sensor.tap).or_else(|| own(board, channel))
+        // A wiper that was not confirmed is unknown.
+        sensor.filter(|(place, _)| place.is_set).map(|(_, sensor)| sensor.wiper).or_else(|| own(board, channel))
     };
     if let Some(output) = output {
-        output.write(report::wiring(&wiring.with_taps(tapped)).as_bytes())?;
+        output.write(report::wiring(&wiring.with_wipers(tapped)).as_bytes())?;
     }
     print(&if arguments.json { report::json(&tuning, &now) } else { report::table(&tuning, &now) })?;
     if let Some(output) = fsr_calibration {
@@ -139,19 +140,19 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
         .flatten()
         .for_each(|path| say(&format!("wrote {}", path.display())));
     if arguments.output.is_none() {
-        say("a board that starts again forgets its taps; with -o FILE they can be set again");
+        say("a board that starts again forgets its wipers; with -o FILE they can be set again");
     }
     Ok(if tuning.outcomes().any(|(_, tuned, _)| tuned == Tuned::NotSet) { FAILED } else { DONE })
 }
 
-/// Runs rounds of measuring and setting taps until every sensor fits.
+/// Runs rounds of measuring and setting wipers until every sensor fits.
 fn rounds(
     session: &mut TuningSession,
     rest: Duration,
     press: PhaseLimit,
     done: &mut Option<Tuning>,
 ) -> Result<PhaseEnd> {
-    session.guide.say("setting the taps to begin with");
+    session.guide.say("setting the wipers to begin with");
     if session.settle()? == PhaseEnd::Stopped {
         return Ok(PhaseEnd::Stopped);
     }
@@ -169,16 +170,20 @@ fn rounds(
         if session.observe(press, &mut tuning, |tuning, frame| tuning.press(&frame.values))? == PhaseEnd::Stopped {
             return Ok(PhaseEnd::Stopped);
         }
-        let taps = tuning.next_round()?;
-        if taps.is_empty() {
+        let wipers = tuning.next_round()?;
+        if wipers.is_empty() {
             break;
         }
-        session.guide.say(&format!("round {} of at most {MAX_ROUNDS}: setting {} taps", tuning.rounds(), taps.len()));
-        session.set(&taps);
+        session.guide.say(&format!(
+            "round {} of at most {MAX_ROUNDS}: setting {} wipers",
+            tuning.rounds(),
+            wipers.len()
+        ));
+        session.set(&wipers);
         if session.settle()? == PhaseEnd::Stopped {
             return Ok(PhaseEnd::Stopped);
         }
-        session.mark_failed_taps(&mut tuning);
+        session.mark_failed_wipers(&mut tuning);
     }
     *done = Some(tuning);
     Ok(PhaseEnd::Completed)

@@ -1,4 +1,4 @@
-//! Which taxels upkeep leaves out.
+//! Which taxels drift compensation leaves out.
 
 use somatic::Engine;
 use somatic::signal::Unfit;

@@ -19,7 +19,7 @@ const FIRST_PART: usize = 256;
 const PART: Duration = Duration::from_millis(100);
 
 impl Engine {
-    /// All of `input`, epoch by epoch where there is upkeep; with `check`, on the reference too. `false` if `go_on` said so.
+    /// All of `input`, epoch by epoch where there is drift compensation; with `check`, on the reference too. `false` if `go_on` said so.
     pub(super) fn advance(
         &mut self,
         input: Input<'_>,
@@ -39,16 +39,16 @@ impl Engine {
         }
         let mut start = 0;
         for index in 0..frames.len() {
-            if self.upkeep.as_ref().is_some_and(|state| state.upkeep.is_due(frames[index].t_s)) {
+            if self.drift.as_ref().is_some_and(|state| state.compensation.is_due(frames[index].t_s)) {
                 if !self.segments(input, start..index, check.as_deref_mut(), &mut go_on)? {
                     return Ok(false);
                 }
                 self.close_epoch(check.as_deref_mut());
                 start = index;
             }
-            if let Some(state) = &mut self.upkeep {
+            if let Some(state) = &mut self.drift {
                 let channels = self.plan.channels();
-                state.upkeep.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
+                state.compensation.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
             }
         }
         if !self.segments(input, start..frames.len(), check.as_deref_mut(), &mut go_on)? {
@@ -177,7 +177,7 @@ impl Engine {
         let post = Post {
             plan: &self.plan,
             links: &self.links,
-            contacts: self.contacts.as_ref(),
+            self_contacts: self.self_contacts.as_ref(),
             cadence: self.cadence.as_ref(),
             kept,
         };
@@ -198,11 +198,11 @@ impl Engine {
         if let Some(check) = &mut check {
             check.finish(&post, &raw, first_bound)?;
         }
-        if let Some(upkeep) = &mut self.upkeep {
+        if let Some(drift) = &mut self.drift {
             let cells = range.start * self.plan.fields.len()..range.end * self.plan.fields.len();
-            upkeep.note_contact(&self.percepts.flags[cells.clone()]);
-            upkeep.flag_unknown_drift(&mut self.percepts.flags[cells.clone()]);
-            check.into_iter().for_each(|check| upkeep.flag_unknown_drift(&mut check.right.flags[cells.clone()]));
+            drift.note_contact(&self.percepts.flags[cells.clone()]);
+            drift.flag_unknown_drift(&mut self.percepts.flags[cells.clone()]);
+            check.into_iter().for_each(|check| drift.flag_unknown_drift(&mut check.right.flags[cells.clone()]));
         }
         Ok(())
     }
@@ -217,15 +217,15 @@ impl Engine {
                 self.plan.keep_up(channel, value as f32, false, &made);
             }
         }
-        if let Some(upkeep) = &mut self.upkeep {
-            upkeep.restart(&self.plan);
+        if let Some(drift) = &mut self.drift {
+            drift.restart(&self.plan);
         }
         self.recalibrate(check);
     }
 
-    /// Ends an epoch of upkeep, and calibrates from now on with its outcome.
+    /// Ends an epoch of drift compensation, and calibrates from now on with its outcome.
     fn close_epoch(&mut self, check: Option<&mut Check>) {
-        if self.upkeep.as_mut().is_some_and(|upkeep| upkeep.close(&mut self.plan)) {
+        if self.drift.as_mut().is_some_and(|drift| drift.close(&mut self.plan)) {
             self.recalibrate(check);
         }
     }

@@ -291,8 +291,8 @@ mod tests {
                 let of = agreement.quantities[name];
                 assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
             };
-            // A footprint has no bound: tests/it/footprint.rs holds it to its bits.
-            let has_bound = |column: &&Column| column.store != Store::Active && column.stage != "footprint";
+            // A fit has no bound: tests/it/fit.rs holds it to its bits.
+            let has_bound = |column: &&Column| column.store != Store::Active && column.stage != "fit";
             for column in COLUMNS.iter().filter(has_bound) {
                 for component in 0..column.components {
                     let limit = |bound: &CellBound| match (column.measure, bound.centroid) {

@@ -74,8 +74,8 @@ fn orient(
     }
     let line = orientation::reference(pressed, centroid::reference(pressed).truncate());
     // An axis that is absent may have the same reason.
-    let has_axis = percepts.present(cell).intersects(Outputs::AXIS | Outputs::ANISOTROPY);
-    let is_axis_together = plan.stages().axis && !has_axis && !flags.contains(Flags::ISOTROPIC);
+    let has_axis = percepts.present(cell).intersects(Outputs::PRINCIPAL_AXIS | Outputs::ANISOTROPY);
+    let is_axis_together = plan.stages().principal_axis && !has_axis && !flags.contains(Flags::ISOTROPIC);
     let own = if is_axis_together { Flags::TIE } else { Flags::TIE | Flags::COINCIDENT };
     percepts.flags[cell] = (flags - own) | line.flags;
     percepts.remove_present(cell, Outputs::ORIENTATION);

@@ -1,15 +1,15 @@
-//! Contacts fitted to touches: [`crate::stage::footprint`] over a batch.
+//! Contacts fitted to touches: [`crate::stage::fit`] over a batch.
 //!
 //! It starts from the raw values in double precision, whatever the backend: which taxels are one touch is the backend's to say,
 //! and where a descent ends on a device of its own; what taxels feel, and what is made of an end, is the same on all.
 
-use crate::backend::cpu::footprint::{fit_each, judge_each};
+use crate::backend::cpu::fit::{fit_each, judge_each};
 use crate::backend::{Backend, RawBatch};
 use crate::error::Result;
 use crate::parallel;
-use crate::percept::{Column, Flags, Footprint, Host, Outputs, Percepts, Store};
+use crate::percept::{Column, Fit, Flags, Host, Outputs, Percepts, Store};
 use crate::scene::Plan;
-use crate::stage::footprint::{OVER_S, Taxel, Touch, Trail};
+use crate::stage::fit::{OVER_S, Taxel, Touch, Trail};
 use crate::stage::touches::Found;
 
 /// What makes the descents; without it the CPU, as for the reference.
@@ -129,22 +129,22 @@ pub(super) fn all(
     let touches: Vec<&Touch> = ready.iter().flatten().map(|ready| &ready.touch).collect();
     let mut fitted = fitted(&touches, on)?.into_iter();
     for (waiting, ready) in waiting.iter().zip(&ready) {
-        let mut strongest: Option<(f64, usize, Option<Footprint>, Flags)> = None;
-        for (Ready { index, total, .. }, (footprint, flags)) in ready.iter().zip(&mut fitted) {
+        let mut strongest: Option<(f64, usize, Option<Fit>, Flags)> = None;
+        for (Ready { index, total, .. }, (fit, flags)) in ready.iter().zip(&mut fitted) {
             if strongest.is_none_or(|(most, ..)| *total > most) {
-                strongest = Some((*total, *index, footprint, flags));
+                strongest = Some((*total, *index, fit, flags));
             }
             if let Some(touch) = percepts.touches_mut(waiting.cell).get_mut(*index) {
-                (touch.footprint, touch.flags) = (footprint, flags);
+                (touch.fit, touch.flags) = (fit, flags);
             }
         }
-        let Some((_, index, footprint, flags)) = strongest else { continue };
+        let Some((_, index, fit, flags)) = strongest else { continue };
         percepts.flags[waiting.cell] |= flags;
-        if let Some(footprint) = footprint {
-            put(plan, &footprint, waiting.cell, percepts);
-            if plan.outputs.intersects(Outputs::FOOTPRINT_MOTION) {
+        if let Some(fit) = fit {
+            put(plan, &fit, waiting.cell, percepts);
+            if plan.outputs.intersects(Outputs::FIT_MOTION) {
                 let (touch, _) = waiting.touches[index];
-                put_motion(plan, (waiting, touch), &footprint, &mut state.trails[waiting.field], percepts);
+                put_motion(plan, (waiting, touch), &fit, &mut state.trails[waiting.field], percepts);
             }
         }
     }
@@ -152,7 +152,7 @@ pub(super) fn all(
 }
 
 /// What each touch is fitted with, and why not: descents are those of the backend's own device, if it has one.
-fn fitted(touches: &[&Touch], on: On<'_>) -> Result<Vec<(Option<Footprint>, Flags)>> {
+fn fitted(touches: &[&Touch], on: On<'_>) -> Result<Vec<(Option<Fit>, Flags)>> {
     let ends = match on {
         Some(backend) => backend.descend(touches)?,
         None => None,
@@ -164,29 +164,23 @@ fn fitted(touches: &[&Touch], on: On<'_>) -> Result<Vec<(Option<Footprint>, Flag
 }
 
 /// Puts the motion of a cell's touch since it was fitted before.
-fn put_motion(
-    plan: &Plan,
-    (waiting, touch): (&Waiting, u64),
-    footprint: &Footprint,
-    trail: &mut Trail,
-    percepts: &mut Percepts,
-) {
+fn put_motion(plan: &Plan, (waiting, touch): (&Waiting, u64), fit: &Fit, trail: &mut Trail, percepts: &mut Percepts) {
     let (cell, over_s) = (waiting.cell, plan.fields[waiting.field].filter.over_s.unwrap_or(OVER_S));
     let t_s = percepts.t_s[cell / plan.fields.len()];
-    match trail.follow(over_s, t_s, touch, footprint) {
+    match trail.follow(over_s, t_s, touch, fit) {
         Ok(moved) => {
-            percepts.add_present(cell, plan.outputs & Outputs::FOOTPRINT_MOTION);
-            percepts.set_host(Host::FootprintDisplacement, cell, &moved.displacement.to_array());
-            percepts.set_host(Host::FootprintSpeed, cell, &[moved.speed]);
+            percepts.add_present(cell, plan.outputs & Outputs::FIT_MOTION);
+            percepts.set_host(Host::FitDisplacement, cell, &moved.displacement.to_array());
+            percepts.set_host(Host::FitSpeed, cell, &[moved.speed]);
         }
         Err(why) => percepts.flags[cell] |= why,
     }
 }
 
-fn put(plan: &Plan, footprint: &Footprint, cell: usize, percepts: &mut Percepts) {
+fn put(plan: &Plan, fit: &Fit, cell: usize, percepts: &mut Percepts) {
     for column in plan.outputs.of_each_touch().columns() {
         let &Column { output, components: count, store: Store::Host(host), .. } = column else { continue };
-        if let Some(components) = footprint.components(host) {
+        if let Some(components) = fit.components(host) {
             percepts.add_present(cell, output);
             percepts.set_host(host, cell, &components[..count]);
         }

@@ -13,7 +13,7 @@ pub(super) struct Links {
     /// Whether poses are heeded.
     pub(super) posed: bool,
     /// The link in whose frame everything is put instead of the world.
-    in_link: Option<usize>,
+    relative_to: Option<usize>,
     pub(super) index_of: HashMap<String, usize>,
     names: Vec<String>,
     parent: Vec<Option<usize>>,
@@ -26,7 +26,7 @@ impl Links {
         let index = |name: &str| body.links.iter().position(|link| link.name == *name);
         Self {
             posed: scene.coordinates == Coordinates::World,
-            in_link: scene.in_link.as_deref().and_then(index),
+            relative_to: scene.relative_to.as_deref().and_then(index),
             index_of: body.links.iter().enumerate().map(|(i, link)| (link.name.clone(), i)).collect(),
             names: body.links.iter().map(|link| link.name.clone()).collect(),
             parent: body.links.iter().map(|link| link.parent).collect(),
@@ -54,7 +54,7 @@ impl Links {
             return None;
         }
         let world_from_anchor = self.world_from(field.anchor?, frame)?;
-        match self.in_link {
+        match self.relative_to {
             None => Some(world_from_anchor),
             Some(link) => Some(self.world_from(link, frame)?.inverse() * world_from_anchor),
         }
@@ -85,7 +85,7 @@ impl Links {
         if !self.are_posed(frame) {
             return;
         }
-        let from_world = match self.in_link {
+        let from_world = match self.relative_to {
             None => Some(DAffine3::IDENTITY),
             Some(link) => self.world_from(link, frame).map(|world_from_link| world_from_link.inverse()),
         };

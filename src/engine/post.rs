@@ -3,10 +3,10 @@
 use glam::{DAffine3, DVec3};
 
 use super::cadence::{self, OnChange};
-use super::contacts::Contacts;
 use super::fit::{self, On};
 use super::links::Links;
 use super::place;
+use super::self_contacts::SelfContacts;
 use super::spread::{self, Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::error::Result;
@@ -14,7 +14,7 @@ use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::{contacts, difference, filter, force, motion, touches, world_motion};
+use crate::stage::{difference, filter, force, motion, self_contacts, touches, world_motion};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub(super) struct PostState {
     /// The percepts of the last frame, where cadence `on-change` may keep some.
     pub(super) last: Option<Percepts>,
     pub(super) fits: fit::FitState,
-    pub(super) contacts: contacts::Memory,
+    pub(super) self_contacts: self_contacts::Memory,
     /// The raw values of the last frame by channel, where changes say where fields on several links are touched.
     pub(super) raw_before: Vec<RawValue>,
 }
@@ -50,7 +50,7 @@ impl PostState {
             fields: vec![PostFieldState::default(); fields],
             last: None,
             fits: fit::FitState::initial(fields),
-            contacts: contacts::Memory::default(),
+            self_contacts: self_contacts::Memory::default(),
             raw_before: Vec::new(),
         }
     }
@@ -60,7 +60,7 @@ impl PostState {
 pub(super) struct Post<'a> {
     pub(super) plan: &'a Plan,
     pub(super) links: &'a Links,
-    pub(super) contacts: Option<&'a Contacts>,
+    pub(super) self_contacts: Option<&'a SelfContacts>,
     /// Which fields changed, where the others keep their percepts.
     pub(super) cadence: Option<&'a OnChange>,
     /// By field, whether it was in contact before the batch, where time starts again with that.
@@ -183,7 +183,7 @@ impl Post<'_> {
                 let at = Touched { field, frame, poses };
                 let found = self.touches(at, index, cell, percepts, &mut before.touches);
                 match &field.layer {
-                    _ if !stages.footprint || found.is_empty() => {}
+                    _ if !stages.fit || found.is_empty() => {}
                     Ok(_) => state.fits.waiting.push(fit::Waiting::new((number, cell, offset), found)),
                     Err(reason) => {
                         percepts.flags[cell] |= *reason;
@@ -202,8 +202,15 @@ impl Post<'_> {
                 self.sigmas(field, raw, offset, cell, percepts);
             }
         }
-        if let Some(contacts) = self.contacts {
-            contacts.find(self.plan, self.links, (frame, step.restarts()), index, percepts, &mut state.contacts);
+        if let Some(self_contacts) = self.self_contacts {
+            self_contacts.find(
+                self.plan,
+                self.links,
+                (frame, step.restarts()),
+                index,
+                percepts,
+                &mut state.self_contacts,
+            );
         }
     }
 
@@ -379,7 +386,7 @@ impl Post<'_> {
                 active: touch.active,
                 centroid: field.charted.then(|| place.truncate().to_array()),
                 position: on_skin(touch, place).map(|place| place.to_array()),
-                footprint: None,
+                fit: None,
                 flags: Flags::empty(),
             }
         }));

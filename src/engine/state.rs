@@ -2,8 +2,8 @@
 
 use super::Engine;
 use super::cadence::ChangeState;
+use super::drift_state::DriftState;
 use super::post::PostState;
-use super::upkeep_state::UpkeepState;
 use crate::backend::BackendState;
 use crate::error::{Error, Result};
 use crate::signal::{FrameTime, IntakeState, TaxelCalibration};
@@ -41,7 +41,7 @@ pub struct EngineState {
     backend: BackendState,
     post: PostState,
     cadence: Option<ChangeState>,
-    upkeep: Option<UpkeepState>,
+    drift: Option<DriftState>,
 }
 
 impl EngineState {
@@ -68,7 +68,7 @@ impl Engine {
             backend: self.backend.state()?,
             post: self.post.clone(),
             cadence: self.cadence.as_ref().map(|cadence| cadence.state.clone()),
-            upkeep: self.upkeep.clone(),
+            drift: self.drift.clone(),
         })
     }
 
@@ -83,7 +83,7 @@ impl Engine {
             && state.intake.taxels() == self.ids.len()
             && state.calibration.is_some() == self.recalibrates
             && state.cadence.is_some() == self.cadence.is_some()
-            && state.upkeep.is_some() == self.upkeep.is_some();
+            && state.drift.is_some() == self.drift.is_some();
         if !fits {
             return Err(Error::usage(
                 "the state is of an engine with another body, scene or calibration; restore it where it fits",
@@ -98,7 +98,7 @@ impl Engine {
         self.backend.restore(&state.backend)?;
         self.intake.restore(&state.intake);
         self.post.clone_from(&state.post);
-        self.upkeep.clone_from(&state.upkeep);
+        self.drift.clone_from(&state.drift);
         if let (Some(cadence), Some(state)) = (&mut self.cadence, &state.cadence) {
             cadence.state.clone_from(state);
         }

@@ -60,9 +60,9 @@ pub fn write(
 
 /// Whether `outputs` can be written.
 pub fn check(outputs: Outputs) -> Result<()> {
-    if outputs.intersects(Outputs::TOUCHES | Outputs::CONTACTS) {
+    if outputs.intersects(Outputs::TOUCHES | Outputs::SELF_CONTACTS) {
         return Err(Error::usage(
-            "--dump writes arrays, and touches and contacts are none; leave them out of --outputs",
+            "--dump writes arrays, and touches and self_contacts are none; leave them out of --outputs",
         ));
     }
     Ok(())
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn every_output_but_touches_and_contacts_is_an_array() {
-        let outputs = Outputs::all() - Outputs::TOUCHES - Outputs::CONTACTS;
+        let outputs = Outputs::all() - Outputs::TOUCHES - Outputs::SELF_CONTACTS;
         assert!(check(outputs).is_ok() && check(Outputs::all()).is_err());
         let shape = Shape { sensors: 30, fields: 2, members: 6, wide: 0, local: false, frames: 4, seed: 1 };
         let mut engine = shape.engine(&shape.body(), BackendKind::Reference, outputs).unwrap();
@@ -152,12 +152,12 @@ mod tests {
         // Bodies of this kind have no calibration, and so no noise.
         percept.total_sigma = percept.total;
         percept.centroid_sigma = percept.centroid;
-        percept.axis_sigma = percept.axis;
+        percept.principal_axis_sigma = percept.principal_axis;
         // And their frames have no poses.
         percept.speed_in_world = percept.speed;
         assert_eq!(outputs.columns().count(), outputs.iter().count());
-        // Nor are they contacts, or have a unit.
-        for column in (outputs - Outputs::FOOTPRINT - Outputs::FORCE).columns() {
+        // Nor are they self-contacts, or have a unit.
+        for column in (outputs - Outputs::FIT - Outputs::FORCE).columns() {
             let numbers = percept.value(column).unwrap_or_else(|| panic!("{}", column.name));
             assert_eq!(numbers[column.components..].iter().sum::<f64>(), 0.0, "{} has more", column.name);
         }

@@ -136,7 +136,7 @@ const WAYS: [&str; 6] = ["frame by frame", "over 0.1 s", "over 0.2 s", "Kalman",
 /// The last of them, whose places are absent where a touch is not explained.
 const FIT: usize = 5;
 /// What the sensors' noise and the layer are, for fits.
-const SKIN: &str = "noise = 1.04\n[skin]\nsigma_m = 0.004\n";
+const LAYER: &str = "noise = 1.04\n[layer]\nsigma_m = 0.004\n";
 
 /// One run's frames: percepts, and the truth's velocity.
 type Run = Vec<(f64, Percept, [f64; 2])>;
@@ -162,7 +162,7 @@ fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec
         let times: Vec<String> = points.iter().map(|[t_s, _]| format!("{t_s:.6}")).collect();
         let angle = if is_rod { format!("angle_deg = {angle_deg}\n") } else { String::new() };
         let text = format!(
-            "rate_hz = {RATE_HZ}\nduration_s = {:.6}\n[skin]\nthickness_m = 0.007\n[sensor]\nkind = \"fsr\"\ntap = 38\n\
+            "rate_hz = {RATE_HZ}\nduration_s = {:.6}\n[layer]\nthickness_m = 0.007\n[sensor]\nkind = \"fsr\"\nwiper = 38\n\
              noise_sigma = 1\n[[touch]]\non = \"hand/back\"\n{keys}\n{angle}path = [{}]\ntimes_s = [{}]\n",
             points[points.len() - 1][0],
             path.join(", "),
@@ -182,9 +182,9 @@ fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec
         }
     }
     let dead_band = if onset == "soft" { THRESHOLD } else { 0.5 * THRESHOLD };
-    let keys = format!("[all]\nsensor = \"fsr\"\ntap = 38\ndead_band = {dead_band}\nonset = \"{onset}\"\n{SKIN}");
+    let keys = format!("[all]\nsensor = \"fsr\"\nwiper = 38\ndead_band = {dead_band}\nonset = \"{onset}\"\n{LAYER}");
     let scene = Scene::default()
-        .outputs(Outputs::CENTROID | Outputs::MOTION | Outputs::FILTERED | Outputs::FOOTPRINT_MOTION)
+        .outputs(Outputs::CENTROID | Outputs::MOTION | Outputs::FILTERED | Outputs::FIT_MOTION)
         .filter(MotionFilter::default().over_s(OVER_S))
         .fields(vec!["hand/back".to_owned()]);
     let calibration = Calibration::parse(&keys, &ids)?;
@@ -223,7 +223,7 @@ fn judge(run: &Run, across: Option<[f64; 2]>, is_soft: bool, errors: &mut [Error
             Some([0, 1].map(|axis| (now[axis] - then[axis]) / (t_s - before_s)))
         };
         let steady = velocity(percept.filtered_displacement, percept.filtered_speed);
-        let fitted = velocity(percept.footprint_displacement, percept.footprint_speed);
+        let fitted = velocity(percept.fit_displacement, percept.fit_speed);
         let ways: Vec<(usize, Option<[f64; 2]>)> = if is_soft {
             vec![(4, steady)]
         } else {

@@ -112,8 +112,8 @@ impl Case {
         let duration_s = 2.0 * HALF_PATH_MM / self.speed_mm_s;
         format!(
             "rate_hz = {RATE_HZ}\nduration_s = {duration_s}\n\
-             [skin]\nthickness_m = 0.007\nstiffness_pa = 400e3\n\
-             [sensor]\nkind = \"fsr\"\ntap = 38\nnoise_sigma = {}\n\
+             [layer]\nthickness_m = 0.007\nstiffness_pa = 400e3\n\
+             [sensor]\nkind = \"fsr\"\nwiper = 38\nnoise_sigma = {}\n\
              [[touch]]\non = \"hand/back\"\n{}\npath = [{}, {}]\ntimes_s = [0, {duration_s}]\n",
             self.noise_counts,
             self.toucher.keys(self.angle_deg),
@@ -132,10 +132,10 @@ struct Scores {
     centroid: Errors,
     /// Degrees.
     two_points: Errors,
-    axis: Errors,
+    principal_axis: Errors,
     /// The place of the fitted contact, as `centroid`, and its angle.
-    footprint_place: Errors,
-    footprint: Errors,
+    fit_place: Errors,
+    fit: Errors,
     fitted: u64,
     /// Frames flagged `tie`; those of them in which two points are over [`ACROSS_DEG`] off; and all such frames.
     tied: u64,
@@ -162,21 +162,21 @@ impl Scores {
         let percept = &moment.percepts[signal];
         self.frames += 1;
         self.felt += u64::from(percept.contact);
-        self.fitted += u64::from(percept.footprint_place.is_some());
+        self.fitted += u64::from(percept.fit_place.is_some());
         let place = |errors: &mut Errors, seen: Option<[f64; 2]>| {
             let Some((seen, right)) = seen.zip(truth.uv) else { return };
             let error = [(seen[0] - right[0]) * 1e3, (seen[1] - right[1]) * 1e3];
             errors.add(truth.angle.map_or_else(|| libm::hypot(error[0], error[1]), |angle| across(error, angle)));
         };
         place(&mut self.centroid, percept.centroid);
-        place(&mut self.footprint_place, percept.footprint_place);
+        place(&mut self.fit_place, percept.fit_place);
         if let Some(right) = truth.angle {
             let compare = |errors: &mut Errors, seen: Option<f64>| {
                 seen.into_iter().for_each(|seen| errors.add(between_lines(seen, right).to_degrees()));
             };
             compare(&mut self.two_points, percept.orientation);
-            compare(&mut self.axis, percept.axis);
-            compare(&mut self.footprint, percept.footprint_angle);
+            compare(&mut self.principal_axis, percept.principal_axis);
+            compare(&mut self.fit, percept.fit_angle);
             let tied = percept.flags.contains(Flags::TIE);
             let is_across = |seen: f64| between_lines(seen, right).to_degrees() > ACROSS_DEG;
             let across = percept.orientation.is_some_and(is_across);
@@ -201,9 +201,9 @@ impl Scores {
         self.felt += other.felt;
         self.centroid.merge(&other.centroid);
         self.two_points.merge(&other.two_points);
-        self.axis.merge(&other.axis);
-        self.footprint_place.merge(&other.footprint_place);
-        self.footprint.merge(&other.footprint);
+        self.principal_axis.merge(&other.principal_axis);
+        self.fit_place.merge(&other.fit_place);
+        self.fit.merge(&other.fit);
         self.fitted += other.fitted;
         self.tied += other.tied;
         self.tied_across += other.tied_across;
@@ -230,10 +230,10 @@ struct TableRow {
     felt_percent: f64,
     centroid_mm: Option<Spread>,
     two_points_deg: Option<Spread>,
-    axis_deg: Option<Spread>,
+    principal_axis_deg: Option<Spread>,
     /// Of the fitted contacts, and in how many of the frames in contact there is one.
-    footprint_mm: Option<Spread>,
-    footprint_deg: Option<Spread>,
+    fit_mm: Option<Spread>,
+    fit_deg: Option<Spread>,
     fitted_percent: Option<f64>,
     speed_percent: Option<Spread>,
     speed_over_100_ms_percent: Option<Spread>,
@@ -271,9 +271,9 @@ impl TableRow {
             felt_percent: 100.0 * scores.felt as f64 / scores.frames.max(1) as f64,
             centroid_mm: spread(|scores| &scores.centroid),
             two_points_deg: spread(|scores| &scores.two_points),
-            axis_deg: spread(|scores| &scores.axis),
-            footprint_mm: spread(|scores| &scores.footprint_place),
-            footprint_deg: spread(|scores| &scores.footprint),
+            principal_axis_deg: spread(|scores| &scores.principal_axis),
+            fit_mm: spread(|scores| &scores.fit_place),
+            fit_deg: spread(|scores| &scores.fit),
             fitted_percent: (scores.fitted > 0).then(|| 100.0 * scores.fitted as f64 / scores.felt.max(1) as f64),
             speed_percent: spread(|scores| &scores.speed),
             speed_over_100_ms_percent: spread(|scores| &scores.steady_speed),
@@ -332,8 +332,8 @@ impl Table {
         let mut text = format!(
             "Each cell is RMS / worst over all frames of all angles and, with noise, of {SEEDS} seeds; in brackets the\n\
              lowest and the highest RMS of a seed, where they differ.\n\n\
-             | indenter | signal | speed mm/s | noise counts | felt % | centroid mm | footprint mm | two points ° | \
-             principal axis ° | footprint ° | footprint in % | speed % | speed over 0.1 s % |\n\
+             | indenter | signal | speed mm/s | noise counts | felt % | centroid mm | fit mm | two points ° | \
+             principal axis ° | fit ° | fit in % | speed % | speed over 0.1 s % |\n\
              |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
         );
         for row in &self.over_all_angles {
@@ -346,10 +346,10 @@ impl Table {
                 row.noise_counts,
                 row.felt_percent,
                 cell(row.centroid_mm, 2),
-                cell(row.footprint_mm, 2),
+                cell(row.fit_mm, 2),
                 cell(row.two_points_deg, 1),
-                cell(row.axis_deg, 1),
-                cell(row.footprint_deg, 1),
+                cell(row.principal_axis_deg, 1),
+                cell(row.fit_deg, 1),
                 row.fitted_percent.map_or_else(|| "–".to_owned(), |share| format!("{share:.0}")),
                 cell(row.speed_percent, 0),
                 cell(row.speed_over_100_ms_percent, 0),
@@ -358,7 +358,7 @@ impl Table {
         let _ = write!(
             text,
             "\nRods by angle, {DEFAULT_SPEED_MM_S} mm/s, noise of {DEFAULT_NOISE_COUNTS} count, RMS / worst.\n\n\
-             | rod ° | two points °, raw | linearised | principal axis °, raw | linearised | footprint °, linearised | \
+             | rod ° | two points °, raw | linearised | principal axis °, raw | linearised | fit °, linearised | \
              centroid mm, raw | linearised |\n|---|---|---|---|---|---|---|---|\n",
         );
         for rows in self.rods_by_angle.chunks(2) {
@@ -369,9 +369,9 @@ impl Table {
                 raw.angle_deg.unwrap_or(0.0),
                 cell(raw.two_points_deg, 1),
                 cell(linearised.two_points_deg, 1),
-                cell(raw.axis_deg, 1),
-                cell(linearised.axis_deg, 1),
-                cell(linearised.footprint_deg, 1),
+                cell(raw.principal_axis_deg, 1),
+                cell(linearised.principal_axis_deg, 1),
+                cell(linearised.fit_deg, 1),
                 cell(raw.centroid_mm, 2),
                 cell(linearised.centroid_mm, 2),
             );

@@ -7,7 +7,7 @@ use somatic::body::Body;
 use somatic::error::Result;
 use somatic::percept::{Outputs, Percept};
 use somatic::scene::{FilterBy, MotionFilter, Scene};
-use somatic::signal::{Calibration, Frame, FsrCircuit, RawValue, SkinResponse};
+use somatic::signal::{Calibration, Frame, FsrCircuit, LayerResponse, RawValue};
 use somatic::source::{SimulatedSource, Source as _, Truth};
 use somatic::{Engine, Options};
 
@@ -57,7 +57,7 @@ fn calibration(signal: Signal, taxels: usize) -> Option<Calibration> {
     // The smallest value that is not 0: below it, one of 0 says nothing.
     let least = signal.value(FsrCircuit::OPEN_COUNTS - Signal::DEAD_BAND_COUNTS - 1);
     calibration.taxels.iter_mut().for_each(|taxel| taxel.dead_band = (1.0 - 1e-6) * least);
-    calibration.skin = Some(SkinResponse { sigma_m: SIGMA_M, gain_spread: SkinResponse::GAIN_SPREAD });
+    calibration.layer = Some(LayerResponse { sigma_m: SIGMA_M, gain_spread: LayerResponse::GAIN_SPREAD });
     Some(calibration)
 }
 
@@ -151,8 +151,8 @@ impl Series {
         let mut percepts = Vec::with_capacity(2);
         for (signal, frames) in Signal::ALL.into_iter().zip(&self.signals) {
             let calibration = calibration(signal, source.body().taxels.len());
-            let fitted = if calibration.is_some() { Outputs::FOOTPRINT } else { Outputs::empty() };
-            let moments = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS;
+            let fitted = if calibration.is_some() { Outputs::FIT } else { Outputs::empty() };
+            let moments = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
             let scene = Scene::default()
                 .outputs(moments | fitted | Outputs::MOTION | Outputs::FILTERED)
                 .filter(filter())

@@ -6,7 +6,7 @@ use super::readings::{Reading, Readings};
 use super::scale::Scale;
 use super::scene::PageScene;
 use super::snapshot::Snapshot;
-use crate::percept::{Column, Contact, Percept, Touch};
+use crate::percept::{Column, Percept, SelfContact, Touch};
 
 /// The newest frame, read when the first viewer wants it.
 #[derive(Debug)]
@@ -21,10 +21,10 @@ pub(super) struct Current {
     touches: Vec<(u32, Touch)>,
     /// 0 where there never was any.
     touch_changes: u64,
-    contacts: Vec<Contact>,
-    contacts_are_known: bool,
+    self_contacts: Vec<SelfContact>,
+    self_contacts_are_known: bool,
     /// 0 where none were ever known.
-    contact_changes: u64,
+    self_contact_changes: u64,
     scale: Scale,
     scale_changes: u64,
     counts: Counts,
@@ -43,9 +43,9 @@ impl Current {
             percept_changes: 0,
             touches: Vec::new(),
             touch_changes: 0,
-            contacts: Vec::new(),
-            contacts_are_known: false,
-            contact_changes: 0,
+            self_contacts: Vec::new(),
+            self_contacts_are_known: false,
+            self_contact_changes: 0,
             scale: scene.scale,
             scale_changes: 0,
             counts: scene.counts.clone(),
@@ -76,10 +76,12 @@ impl Current {
             self.touches.clone_from(&self.snapshot.touches);
             self.touch_changes += 1;
         }
-        if self.contacts_are_known != self.snapshot.contacts_are_known || self.contacts != self.snapshot.contacts {
-            self.contacts_are_known = self.snapshot.contacts_are_known;
-            self.contacts.clone_from(&self.snapshot.contacts);
-            self.contact_changes += 1;
+        if self.self_contacts_are_known != self.snapshot.self_contacts_are_known
+            || self.self_contacts != self.snapshot.self_contacts
+        {
+            self.self_contacts_are_known = self.snapshot.self_contacts_are_known;
+            self.self_contacts.clone_from(&self.snapshot.self_contacts);
+            self.self_contact_changes += 1;
         }
     }
 
@@ -103,8 +105,8 @@ impl Current {
         self.touch_changes
     }
 
-    pub(super) fn contact_changes(&self) -> u64 {
-        self.contact_changes
+    pub(super) fn self_contact_changes(&self) -> u64 {
+        self.self_contact_changes
     }
 
     pub(super) fn scale(&self) -> Scale {

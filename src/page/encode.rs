@@ -16,10 +16,10 @@ pub(super) mod section {
     pub(in super::super) const TOUCHES: u16 = 1 << 3;
     pub(in super::super) const SERIES: u16 = 1 << 4;
     /// Before the series, whose number only the viewer knows.
-    pub(in super::super) const CONTACTS: u16 = 1 << 5;
+    pub(in super::super) const SELF_CONTACTS: u16 = 1 << 5;
 }
 
-/// In place of the number of contacts that are not known.
+/// In place of the number of self-contacts that are not known.
 pub(super) const UNKNOWN: u32 = u32::MAX;
 
 /// A link's index, or that of none.

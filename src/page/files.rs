@@ -28,7 +28,7 @@ const FILES: &[PageFile] = files![
     "camera.js",
     "chart.js",
     "choices.js",
-    "contacts.js",
+    "self_contacts.js",
     "dirty.js",
     "dom.js",
     "explain.js",

@@ -245,7 +245,7 @@ mod tests {
             r#"{"type":"drawn","seq":4294967296}"#,
             r#"{"type":"hello","version":2,"token":"a","after_event":null}"#,
             r#"{"type":"hello","version":1,"token":7,"after_event":null}"#,
-            r#"{"type":"columns","columns":["axis","nothing"]}"#,
+            r#"{"type":"columns","columns":["principal_axis","nothing"]}"#,
             r#"{"type":"series","series":[{"field":3,"column":"total","component":0}]}"#,
             r#"{"type":"series","series":[{"field":0,"column":"total","component":1}]}"#,
             r#"{"type":"series","series":[{"field":0,"column":"total","component":0,"x":0}]}"#,

@@ -133,10 +133,10 @@ impl Publisher {
                 snapshot.touches.extend(touches.map(|touch| (percept.field as u32, *touch)));
             }
         }
-        let contacts = percepts.contacts(last);
-        snapshot.contacts_are_known = contacts.is_some();
-        snapshot.contacts.clear();
-        snapshot.contacts.extend(contacts.into_iter().flatten());
+        let self_contacts = percepts.self_contacts(last);
+        snapshot.self_contacts_are_known = self_contacts.is_some();
+        snapshot.self_contacts.clear();
+        snapshot.self_contacts.extend(self_contacts.into_iter().flatten());
         for frame in 0..if self.series.is_empty() { 0 } else { percepts.frames() } {
             let values = self.series.iter().map(|series| [series.value(percepts, frame); 2]);
             self.trail.push([percepts.t_s(frame); 2], values);

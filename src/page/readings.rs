@@ -17,7 +17,7 @@ pub(super) enum Health {
     Faulty,
     Saturated,
     OutOfRange,
-    /// By the calibration, by upkeep, or because no field of the run holds it.
+    /// By the calibration, by drift compensation, or because no field of the run holds it.
     LeftOut,
 }
 

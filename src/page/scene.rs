@@ -103,7 +103,7 @@ impl PageScene {
             "fields": fields(body, plan),
             "columns": columns.iter().map(|column| column_json(column, plan)).collect::<Vec<_>>(),
             "flags": flag_names(),
-            "contacts": plan.outputs().contains(Outputs::CONTACTS),
+            "self_contacts": plan.outputs().contains(Outputs::SELF_CONTACTS),
             "colours": pressure_colours().to_vec(),
         });
         Self {

@@ -35,11 +35,11 @@ impl Server {
     ///
     /// # Errors
     /// The address is taken, or the system has no random numbers for a token; or places are not in the world
-    /// ([`crate::Scene::in_link`]).
+    /// ([`crate::Scene::relative_to`]).
     pub fn start(listen: &Listen, scene: PageScene) -> Result<(Self, Publisher)> {
-        if let Some(link) = scene.plan.in_link() {
+        if let Some(link) = scene.plan.relative_to() {
             return Err(Error::usage(format!(
-                "a page shows the world, and `in` puts places into `{link}`; leave one of them out"
+                "a page shows the world, and `relative_to` puts places into `{link}`; leave one of them out"
             )));
         }
         let listener = listen.bind()?;

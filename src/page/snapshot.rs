@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::percept::{Contact, Percept, Touch};
+use crate::percept::{Percept, SelfContact, Touch};
 use crate::scene::Plan;
 use crate::signal::{Pose, RawValue};
 
@@ -31,8 +31,8 @@ pub(super) struct Snapshot {
     /// Of these fields, in their order.
     pub(super) touches: Vec<(u32, Touch)>,
     /// Between links, where they are asked for and known.
-    pub(super) contacts: Vec<Contact>,
-    pub(super) contacts_are_known: bool,
+    pub(super) self_contacts: Vec<SelfContact>,
+    pub(super) self_contacts_are_known: bool,
 }
 
 impl Snapshot {
@@ -50,8 +50,8 @@ impl Snapshot {
             poses: Vec::new(),
             percepts: Vec::with_capacity(plan.fields.len()),
             touches: Vec::new(),
-            contacts: Vec::new(),
-            contacts_are_known: false,
+            self_contacts: Vec::new(),
+            self_contacts_are_known: false,
         };
         snapshot.take_baselines(plan);
         snapshot

@@ -183,7 +183,7 @@ impl Book {
 const ALL_LETTERS: [Receptor; 2] = [Receptor::Sustained, Receptor::Change];
 
 fn book() -> Book {
-    let outputs = Outputs::USUAL | Outputs::TOUCHES | Outputs::CONTACTS;
+    let outputs = Outputs::USUAL | Outputs::TOUCHES | Outputs::SELF_CONTACTS;
     let mut bench = Bench::new(outputs, &ALL_LETTERS, "[all]\np_max = 100\n[taxel.9]\nmask = true");
     let mut viewer = Viewer::new(0);
     let mut book = Book::default();
@@ -318,9 +318,9 @@ fn frames_hold_what_the_engine_computed() {
     let posed = &messages["posed, and what is wrong with taxels"];
     assert_eq!(posed["health"], json!([1, 3, 2, 0, 6]));
     assert!(posed["pose"].is_array() && posed["p50"].as_f64().is_some_and(|ms| (ms - 5.0).abs() < 1e-3));
-    let meeting = &messages["two links touch"]["contacts"];
+    let meeting = &messages["two links touch"]["selfContacts"];
     let contact = &meeting["list"][0];
-    assert!(welcome["contacts"] == true && meeting["known"] == true, "{meeting}");
+    assert!(welcome["self_contacts"] == true && meeting["known"] == true, "{meeting}");
     assert_eq!((&contact["sides"][0]["field"], &contact["sides"][1]["field"]), (&2.into(), &4.into()));
     // Weights are 1 and 2: the totals are those of the one taxel on each side.
     assert_eq!((&contact["sides"][0]["total"], &contact["sides"][1]["total"]), (&5.0.into(), &6.0.into()));
@@ -330,7 +330,7 @@ fn frames_hold_what_the_engine_computed() {
         assert!((told - place).abs() < 1e-6, "{contact}");
     }
     // Its frame has no pose: where touches are in the world is not known.
-    assert_eq!((&everything["contacts"]["known"], &unchanged["contacts"]), (&false.into(), &Value::Null));
+    assert_eq!((&everything["selfContacts"]["known"], &unchanged["selfContacts"]), (&false.into(), &Value::Null));
     let events = &messages["events"]["events"];
     assert!(events.as_array().unwrap().iter().any(|event| event["text"] == "all/arm · sustained is touched"));
     assert_eq!((&events[0]["kind"], &events[0]["seq"]), (&"onset".into(), &1.into()));

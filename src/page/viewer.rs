@@ -63,7 +63,7 @@ struct Sent {
     poses: u64,
     percepts: Option<u64>,
     touches: u64,
-    contacts: u64,
+    self_contacts: u64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -184,12 +184,12 @@ impl Viewer {
         let poses = self.sent.poses != current.poses().changes();
         let percepts = self.sent.percepts != Some(current.percept_changes());
         let touches = self.sent.touches != current.touch_changes();
-        let contacts = self.sent.contacts != current.contact_changes();
+        let self_contacts = self.sent.self_contacts != current.self_contact_changes();
         set(section::PRESSURES, pressures);
         set(section::POSES, poses);
         set(section::PERCEPTS, percepts);
         set(section::TOUCHES, touches);
-        set(section::CONTACTS, contacts);
+        set(section::SELF_CONTACTS, self_contacts);
         set(section::SERIES, !self.trail.is_empty());
         let head = FrameHead {
             sections,
@@ -222,8 +222,8 @@ impl Viewer {
         if touches {
             write_touches(&mut to, current);
         }
-        if contacts {
-            write_contacts(&mut to, current);
+        if self_contacts {
+            write_self_contacts(&mut to, current);
         }
         if sections & section::SERIES != 0 {
             write_series(&mut to, &self.trail);
@@ -235,7 +235,7 @@ impl Viewer {
             poses: current.poses().changes(),
             percepts: Some(current.percept_changes()),
             touches: current.touch_changes(),
-            contacts: current.contact_changes(),
+            self_contacts: current.self_contact_changes(),
         };
         let arrived = is_new.then_some(snapshot.arrived);
         self.under_way.push_back(UnderWay { seq: self.seq, sent_at: Instant::now(), arrived });
@@ -289,10 +289,10 @@ fn write_touches(to: &mut Writer, current: &Current) {
     to.pad();
 }
 
-fn write_contacts(to: &mut Writer, current: &Current) {
-    let Snapshot { contacts, contacts_are_known, .. } = current.snapshot();
-    to.u32(if *contacts_are_known { contacts.len() as u32 } else { UNKNOWN });
-    for contact in contacts {
+fn write_self_contacts(to: &mut Writer, current: &Current) {
+    let Snapshot { self_contacts, self_contacts_are_known, .. } = current.snapshot();
+    to.u32(if *self_contacts_are_known { self_contacts.len() as u32 } else { UNKNOWN });
+    for contact in self_contacts {
         to.u32(contact.id as u32);
         for side in &contact.sides {
             to.u32(side.field as u32);

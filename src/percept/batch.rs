@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::columns::{Column, Component, Host, Store};
-use super::{Contact, Flags, Outputs, Percept, Precision, Touch};
+use super::{Flags, Outputs, Percept, Precision, SelfContact, Touch};
 
 /// Backends' numbers in one precision, part by part, each a value per cell; a cell is `frame · fields + field`.
 ///
@@ -71,9 +71,9 @@ pub struct Percepts {
     touches: Vec<Touch>,
     /// Per cell, the end of its touches.
     touch_ends: Vec<u32>,
-    contacts: Vec<Contact>,
-    /// Per frame, the end of its contacts, and whether they are known.
-    contact_ends: Vec<(u32, bool)>,
+    self_contacts: Vec<SelfContact>,
+    /// Per frame, the end of its self-contacts, and whether they are known.
+    self_contact_ends: Vec<(u32, bool)>,
 }
 
 impl Percepts {
@@ -102,8 +102,8 @@ impl Percepts {
             pressures: Vec::new(),
             touches: Vec::new(),
             touch_ends: Vec::new(),
-            contacts: Vec::new(),
-            contact_ends: Vec::new(),
+            self_contacts: Vec::new(),
+            self_contact_ends: Vec::new(),
         }
     }
 
@@ -165,8 +165,8 @@ impl Percepts {
         refill(&mut self.pressures, frames * self.slots, 0.0);
         self.touches.clear();
         self.touch_ends.clear();
-        self.contacts.clear();
-        self.contact_ends.clear();
+        self.self_contacts.clear();
+        self.self_contact_ends.clear();
         match &mut self.values {
             Values::F32(columns) => columns.resize(self.columns, cells),
             Values::F64(columns) => {
@@ -304,19 +304,19 @@ impl Percepts {
         &mut self.touches[of_cell]
     }
 
-    /// The contacts of the batch's frame `frame`: touches of two links at one place in the world. `None` where it is touched and
-    /// no touched field's place in the world is known ([`Flags::NO_POSE`]), and unless [`Outputs::CONTACTS`] was asked for.
+    /// The self-contacts of the batch's frame `frame`: touches of two links at one place in the world. `None` where it is touched and
+    /// no touched field's place in the world is known ([`Flags::NO_POSE`]), and unless [`Outputs::SELF_CONTACTS`] was asked for.
     #[must_use]
-    pub fn contacts(&self, frame: usize) -> Option<&[Contact]> {
-        let &(end, is_known) = self.contact_ends.get(frame)?;
-        let start = if frame == 0 { 0 } else { self.contact_ends[frame - 1].0 };
-        is_known.then(|| &self.contacts[start as usize..end as usize])
+    pub fn self_contacts(&self, frame: usize) -> Option<&[SelfContact]> {
+        let &(end, is_known) = self.self_contact_ends.get(frame)?;
+        let start = if frame == 0 { 0 } else { self.self_contact_ends[frame - 1].0 };
+        is_known.then(|| &self.self_contacts[start as usize..end as usize])
     }
 
-    /// Adds the contacts of the next frame.
-    pub(crate) fn push_contacts(&mut self, contacts: impl IntoIterator<Item = Contact>, are_known: bool) {
-        self.contacts.extend(contacts);
-        self.contact_ends.push((self.contacts.len() as u32, are_known));
+    /// Adds the self-contacts of the next frame.
+    pub(crate) fn push_self_contacts(&mut self, self_contacts: impl IntoIterator<Item = SelfContact>, are_known: bool) {
+        self.self_contacts.extend(self_contacts);
+        self.self_contact_ends.push((self.self_contacts.len() as u32, are_known));
     }
 
     /// All percepts of the batch's frame `frame`, in field order.

@@ -117,7 +117,7 @@ macro_rules! columns {
                 const TOUCHES = 1 << 16;
                 /// Touches of two links at one place in the world, each with an identity; only on request, and with
                 /// [`Outputs::TOUCHES`].
-                const CONTACTS = 1 << 37;
+                const SELF_CONTACTS = 1 << 37;
             }
         }
 
@@ -138,7 +138,7 @@ macro_rules! columns {
             )*
             /// Why quantities are absent, or in doubt.
             pub flags: Flags,
-            /// Whether position and normal are in the world (or in [`crate::Scene::in_link`]), because the frame carried a pose, or
+            /// Whether position and normal are in the world (or in [`crate::Scene::relative_to`]), because the frame carried a pose, or
             /// in the field's anchor.
             pub in_world: bool,
         }
@@ -226,7 +226,7 @@ macro_rules! columns {
             };)*
         }
 
-        /// Every output but [`Outputs::TOUCHES`] and [`Outputs::CONTACTS`], which are tables of their own.
+        /// Every output but [`Outputs::TOUCHES`] and [`Outputs::SELF_CONTACTS`], which are tables of their own.
         pub const COLUMNS: &[Column] = &[$(Column::$output),*];
     };
 }
@@ -257,9 +257,9 @@ columns! {
     #[doc = "Angle of the line through the two farthest points, rad in [0, π) (eq. 9–19)."]
     ORIENTATION 7 orientation: f64, Radian, Line, orientation, parts [Orientation] host [];
     #[doc = "Principal axis of the pressure-weighted second moments, rad in [0, π)."]
-    AXIS 8 axis: f64, Radian, Line, axis, parts [Axis] host [];
+    PRINCIPAL_AXIS 8 principal_axis: f64, Radian, Line, principal_axis, parts [PrincipalAxis] host [];
     #[doc = "(λ₁ − λ₂)/(λ₁ + λ₂) of those moments, in [0, 1]."]
-    ANISOTROPY 9 anisotropy: f64, One, Number, axis, parts [Anisotropy] host [];
+    ANISOTROPY 9 anisotropy: f64, One, Number, principal_axis, parts [Anisotropy] host [];
     #[doc = "(Δu, Δv) of the centroid since the frame before, m (eq. 3–4)."]
     DISPLACEMENT 10 displacement: [f64; 2], Metre, Vector, motion, parts [DisplacementU DisplacementV] host [];
     #[doc = "Its direction, rad in (−π, π] (eq. 5)."]
@@ -272,7 +272,7 @@ columns! {
     SPEED 14 speed: f64, MetrePerSecond, Number, motion, parts [Speed] host [];
     #[doc = "Radial distance over time, m/s (eq. 8)."]
     RADIAL_SPEED 15 radial_speed: f64, MetrePerSecond, Number, motion, parts [RadialSpeed] host [];
-    #[doc = "How fast the position moves in the world (or in --in LINK), over the skin and with its link, m/s; only on request."]
+    #[doc = "How fast the position moves in the world (or in --relative-to LINK), over the skin and with its link, m/s; only on request."]
     SPEED_IN_WORLD 38 speed_in_world: f64, MetrePerSecond, Number, world_motion, parts [] host [SpeedInWorld];
     #[doc = "(Δu, Δv) since the last centroid that counted, m, where this one counts too; only on request, as is all filtered motion."]
     FILTERED_DISPLACEMENT 17 filtered_displacement: [f64; 2], Metre, Vector, filter, parts [] host [FilteredDisplacement];
@@ -282,49 +282,49 @@ columns! {
     FILTERED_SPEED 19 filtered_speed: f64, MetrePerSecond, Number, filter, parts [] host [FilteredSpeed];
     #[doc = "Force in newtons, unweighted: Σ PᵢAᵢ where P is in Pa, Σ Pᵢ where it is in N; given by default where the calibration has a unit."]
     FORCE 20 force: f64, Newton, Number, force, parts [] host [Force];
-    #[doc = "What kind of contact presses: point, line, segment or blob; only on request, as is all of the footprint."]
-    FOOTPRINT_KIND 21 footprint_kind: ContactKind, Kind, Number, footprint, parts [] host [FootprintKind];
+    #[doc = "What kind of contact presses: point, line, segment or blob; only on request, as is all of the fit."]
+    FIT_KIND 21 fit_kind: ContactKind, Kind, Number, fit, parts [] host [FitKind];
     #[doc = "Where it presses, (u, v) in the field's chart, m; of a line its point nearest to the touch's mean."]
-    FOOTPRINT_PLACE 22 footprint_place: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlace];
+    FIT_PLACE 22 fit_place: [f64; 2], Metre, Vector, fit, parts [] host [FitPlace];
     #[doc = "The standard deviation of that, m; of a line only what it is off across."]
-    FOOTPRINT_PLACE_SIGMA 23 footprint_place_sigma: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintPlaceSigma];
+    FIT_PLACE_SIGMA 23 fit_place_sigma: [f64; 2], Metre, Vector, fit, parts [] host [FitPlaceSigma];
     #[doc = "How hard it presses in all, taxels or not, in N where P is in Pa, else in the unit of P; absent where it goes on beyond the sensors."]
-    FOOTPRINT_FORCE 24 footprint_force: f64, Force, Number, footprint, parts [] host [FootprintForce];
+    FIT_FORCE 24 fit_force: f64, Force, Number, fit, parts [] host [FitForce];
     #[doc = "The standard deviation of that, in the same unit."]
-    FOOTPRINT_FORCE_SIGMA 25 footprint_force_sigma: f64, Force, Number, footprint, parts [] host [FootprintForceSigma];
+    FIT_FORCE_SIGMA 25 fit_force_sigma: f64, Force, Number, fit, parts [] host [FitForceSigma];
     #[doc = "Its direction along, rad in [0, π); absent for a point."]
-    FOOTPRINT_ANGLE 26 footprint_angle: f64, Radian, Line, footprint, parts [] host [FootprintAngle];
+    FIT_ANGLE 26 fit_angle: f64, Radian, Line, fit, parts [] host [FitAngle];
     #[doc = "The standard deviation of that, rad."]
-    FOOTPRINT_ANGLE_SIGMA 27 footprint_angle_sigma: f64, Radian, Number, footprint, parts [] host [FootprintAngleSigma];
+    FIT_ANGLE_SIGMA 27 fit_angle_sigma: f64, Radian, Number, fit, parts [] host [FitAngleSigma];
     #[doc = "The standard deviation of its pressure across, at the sensors, m."]
-    FOOTPRINT_WIDTH 28 footprint_width: f64, Metre, Number, footprint, parts [] host [FootprintWidth];
+    FIT_WIDTH 28 fit_width: f64, Metre, Number, fit, parts [] host [FitWidth];
     #[doc = "The standard deviation of the width, m."]
-    FOOTPRINT_WIDTH_SIGMA 33 footprint_width_sigma: f64, Metre, Number, footprint, parts [] host [FootprintWidthSigma];
+    FIT_WIDTH_SIGMA 33 fit_width_sigma: f64, Metre, Number, fit, parts [] host [FitWidthSigma];
     #[doc = "How long a segment is, m; of a blob the standard deviation of its pressure along."]
-    FOOTPRINT_LENGTH 29 footprint_length: f64, Metre, Number, footprint, parts [] host [FootprintLength];
+    FIT_LENGTH 29 fit_length: f64, Metre, Number, fit, parts [] host [FitLength];
     #[doc = "The standard deviation of the length, m."]
-    FOOTPRINT_LENGTH_SIGMA 34 footprint_length_sigma: f64, Metre, Number, footprint, parts [] host [FootprintLengthSigma];
+    FIT_LENGTH_SIGMA 34 fit_length_sigma: f64, Metre, Number, fit, parts [] host [FitLengthSigma];
     #[doc = "How far its place has moved in --filter-over (0.2 s), (Δu, Δv), m; of a line across it."]
-    FOOTPRINT_DISPLACEMENT 35 footprint_displacement: [f64; 2], Metre, Vector, footprint, parts [] host [FootprintDisplacement];
+    FIT_DISPLACEMENT 35 fit_displacement: [f64; 2], Metre, Vector, fit, parts [] host [FitDisplacement];
     #[doc = "The length of that over its time, m/s."]
-    FOOTPRINT_SPEED 36 footprint_speed: f64, MetrePerSecond, Number, footprint, parts [] host [FootprintSpeed];
+    FIT_SPEED 36 fit_speed: f64, MetrePerSecond, Number, fit, parts [] host [FitSpeed];
     #[doc = "The standard deviation of the total by the sensors' noise, in the unit of P; only on request, as are all sigmas."]
     TOTAL_SIGMA 30 total_sigma: f64, P, Number, sigma, parts [] host [TotalSigma];
     #[doc = "The standard deviations of the centroid by the sensors' noise, along u and v, m."]
     CENTROID_SIGMA 31 centroid_sigma: [f64; 2], Metre, Vector, sigma, parts [] host [CentroidSigma];
-    #[doc = "The standard deviation of the axis by the sensors' noise, rad."]
-    AXIS_SIGMA 32 axis_sigma: f64, Radian, Number, sigma, parts [] host [AxisSigma];
+    #[doc = "The standard deviation of the principal axis by the sensors' noise, rad."]
+    PRINCIPAL_AXIS_SIGMA 32 principal_axis_sigma: f64, Radian, Number, sigma, parts [] host [PrincipalAxisSigma];
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::CONTACTS`], [`Outputs::FILTERED`],
-    /// [`Outputs::SIGMAS`], [`Outputs::FOOTPRINT`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the
+    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::SELF_CONTACTS`], [`Outputs::FILTERED`],
+    /// [`Outputs::SIGMAS`], [`Outputs::FIT`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the
     /// calibration.
     pub const USUAL: Self = Self::all()
-        .difference(Self::TOUCHES.union(Self::CONTACTS))
+        .difference(Self::TOUCHES.union(Self::SELF_CONTACTS))
         .difference(Self::FILTERED)
         .difference(Self::SIGMAS)
-        .difference(Self::FOOTPRINT)
+        .difference(Self::FIT)
         .difference(Self::SPEED_IN_WORLD)
         .difference(Self::FORCE);
 
@@ -335,10 +335,10 @@ impl Outputs {
     pub const FILTERED: Self = Self::of_stage("filter");
 
     /// What presses, fitted under the skin's own response.
-    pub const FOOTPRINT: Self = Self::of_stage("footprint");
+    pub const FIT: Self = Self::of_stage("fit");
 
     /// Motion of fitted contacts, which has a memory: of a field, not of each of its touches.
-    pub const FOOTPRINT_MOTION: Self = Self::FOOTPRINT_DISPLACEMENT.union(Self::FOOTPRINT_SPEED);
+    pub const FIT_MOTION: Self = Self::FIT_DISPLACEMENT.union(Self::FIT_SPEED);
 
     /// What the stage *motion* gives.
     pub const MOTION: Self = Self::of_stage("motion");
@@ -366,16 +366,16 @@ impl Outputs {
         (name == name.to_lowercase()).then(|| Self::from_name(&name.to_uppercase())).flatten()
     }
 
-    /// These, and those that they refer to: contacts name touches.
+    /// These, and those that they refer to: self-contacts name touches.
     #[must_use]
     pub const fn with_needed(self) -> Self {
-        if self.contains(Self::CONTACTS) { self.union(Self::TOUCHES) } else { self }
+        if self.contains(Self::SELF_CONTACTS) { self.union(Self::TOUCHES) } else { self }
     }
 
     /// Those that each separate touch has for itself.
     #[must_use]
     pub const fn of_each_touch(self) -> Self {
-        self.intersection(Self::FOOTPRINT).difference(Self::FOOTPRINT_MOTION)
+        self.intersection(Self::FIT).difference(Self::FIT_MOTION)
     }
 
     /// The columns of these outputs, in the table's order.

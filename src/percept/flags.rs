@@ -60,9 +60,9 @@ bitflags! {
         const POOR_FIT = 1 << 22;
         /// The field's chart is too far from flat to fit a contact in it.
         const CURVED = 1 << 23;
-        /// What the skin makes of a contact is not known: the calibration has no `[skin]`, a taxel has no area, or the letter
+        /// What the layer makes of a contact is not known: the calibration has no `[layer]`, a taxel has no area, or the letter
         /// is no pressure.
-        const NO_SKIN = 1 << 24;
+        const NO_LAYER = 1 << 24;
         /// The calibration does not say how noisy a pressed taxel is: there are no sigmas.
         const NOISE_UNKNOWN = 1 << 25;
         /// Noise alone may switch a taxel on or off, or turn the axis anyhow: what depends on it has no sigma.

@@ -169,7 +169,7 @@ impl Mark {
             normal: turned(DVec3::from_array(percept.normal?)),
             axes,
             orientation: percept.orientation,
-            axis: percept.axis.zip(percept.anisotropy),
+            axis: percept.principal_axis.zip(percept.anisotropy),
             motion,
             radius_m: field.radius_m(),
         })

@@ -36,7 +36,7 @@ impl Curves {
             Response::Linear => return Ok(layout::STRAIGHT),
             Response::Fsr(fsr) => {
                 let kind = usize::from(signal.unwrap_or(fsr.signal) == FsrSignal::Linear);
-                (kind, fsr.tap, fsr.full_scale_newton.to_bits(), gain, threshold)
+                (kind, fsr.wiper, fsr.full_scale_newton.to_bits(), gain, threshold)
             }
             Response::Curve(index) => (2 + index, 0, 0, gain, threshold),
         };
@@ -74,8 +74,8 @@ mod tests {
 
     #[test]
     fn taxels_that_respond_alike_share_a_curve() {
-        let text = "[curve.a]\nraw = [0, 2]\np = [0, 8]\n[all]\nsensor = \"fsr\"\n[taxel.1]\ntap = 7\n[taxel.2]\n\
-                    curve = \"a\"\n[taxel.3]\ncurve = \"a\"\ninvert = true\n[taxel.4]\ntap = 7\n[taxel.5]\nmask = true\n\
+        let text = "[curve.a]\nraw = [0, 2]\np = [0, 8]\n[all]\nsensor = \"fsr\"\n[taxel.1]\nwiper = 7\n[taxel.2]\n\
+                    curve = \"a\"\n[taxel.3]\ncurve = \"a\"\ninvert = true\n[taxel.4]\nwiper = 7\n[taxel.5]\nmask = true\n\
                     [taxel.6]\nsensor = \"linear\"";
         let calibration = Calibration::parse(text, &[0, 1, 2, 3, 4, 5, 6]).unwrap();
         let mut curves = Curves::default();

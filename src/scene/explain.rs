@@ -85,7 +85,7 @@ impl Serialize for Plan {
 }
 
 /// The stages that run on the host, whatever the backend.
-const ON_HOST: [&str; 8] = ["position", "world_motion", "touches", "contacts", "force", "filter", "sigma", "footprint"];
+const ON_HOST: [&str; 8] = ["position", "world_motion", "touches", "self_contacts", "force", "filter", "sigma", "fit"];
 
 impl Plan {
     /// All stages, in the order that they run in.
@@ -108,22 +108,22 @@ impl Plan {
             ("contact", true, of(&all), ""),
             ("centroid", stages.centroid, of(&all), ""),
             ("orientation", stages.orientation, of(&charted), ""),
-            ("axis", stages.axis, of(&charted), ""),
+            ("principal_axis", stages.principal_axis, of(&charted), ""),
             ("hysteresis", stages.hysteresis, found, "the calibration has no thresholds"),
             ("motion", stages.motion, found_charted, ""),
             ("position", stages.position, found, ""),
             ("world_motion", stages.world_motion, found, ""),
             ("touches", stages.touches, of(&all), ""),
-            ("contacts", stages.contacts, found, ""),
+            ("self_contacts", stages.self_contacts, found, ""),
             ("force", stages.force, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
-            ("footprint", stages.footprint, found_charted, ""),
+            ("fit", stages.fit, found_charted, ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = match name {
                 "touches" => Outputs::TOUCHES,
-                "contacts" => Outputs::CONTACTS,
+                "self_contacts" => Outputs::SELF_CONTACTS,
                 _ => Outputs::of_stage(name),
             };
             let asked: Vec<String> = (self.outputs() & gives).names().collect();
@@ -156,7 +156,7 @@ impl Plan {
             "contact" => "says which fields are touched",
             "hysteresis" => "the calibration has thresholds",
             "centroid" | "position" => "later stages need it",
-            "touches" => "a footprint is one touch's",
+            "touches" => "a fit is one touch's",
             _ => "others need it",
         }
     }
@@ -237,7 +237,7 @@ mod tests {
         let why = |name: &str| explained.iter().find(|stage| stage.name == name).unwrap().why.clone();
         assert_eq!(why("orientation"), "asked for: orientation");
         assert_eq!(why("centroid"), "later stages need it");
-        assert_eq!(why("axis"), "no output needs it");
+        assert_eq!(why("principal_axis"), "no output needs it");
         assert_eq!(why("change"), "no letter is `change`");
     }
 

@@ -7,7 +7,7 @@ use crate::body::{Body, ChartKind};
 use crate::error::{Error, Result};
 use crate::field::{FieldSet, Recharted};
 use crate::percept::Outputs;
-use crate::stage::footprint;
+use crate::stage::fit;
 
 /// What is traded for what; the default is as accurate as single precision is without pains, and as fast as it is.
 ///
@@ -66,20 +66,20 @@ words! {"way to orientation",
     /// What is given to somebody who wants the orientation of a touch, and does not mind how it is found.
     #[derive(Default)]
     OrientationBy {
-        /// What is asked for by name: outputs `orientation`, `axis` or both.
+        /// What is asked for by name: outputs `orientation`, `principal_axis` or both.
         #[default]
         AsAsked = "as-asked",
         /// The line through the two farthest points: output `orientation`.
         TwoPoints = "two-points",
-        /// The principal axis of the second moments: output `axis`.
+        /// The principal axis of the second moments: output `principal_axis`.
         SecondMoments = "second-moments",
-        /// The contact fitted to the touch in one step: outputs `footprint_place` and `footprint_angle`, beside the axis for touches
+        /// The contact fitted to the touch in one step: outputs `fit_place` and `fit_angle`, beside the axis for touches
         /// without a fit. It is not tested whether it explains the taxels.
-        FootprintInOne = "footprint-1",
+        FitInOne = "fit-1",
         /// The same in two steps.
-        FootprintInTwo = "footprint-2",
+        FitInTwo = "fit-2",
         /// The same in all steps.
-        Footprint = "footprint",
+        Fit = "fit",
     }
 }
 
@@ -133,12 +133,12 @@ impl Knobs {
         if on_change && outputs.intersects(Outputs::FILTERED) {
             return refuse("cadence on-change and outputs filtered_* both decide which motion counts");
         }
-        if on_change && outputs.intersects(Outputs::CONTACTS | Outputs::SPEED_IN_WORLD) {
+        if on_change && outputs.intersects(Outputs::SELF_CONTACTS | Outputs::SPEED_IN_WORLD) {
             return refuse(
-                "cadence on-change keeps places of touches while links move, and contacts and speed_in_world are made of them",
+                "cadence on-change keeps places of touches while links move, and self_contacts and speed_in_world are made of them",
             );
         }
-        let either = Outputs::ORIENTATION | Outputs::AXIS;
+        let either = Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
         if self.orientation_by != OrientationBy::AsAsked && !outputs.intersects(either) {
             return Err(Error::usage(format!(
                 "{} is a way to an orientation, which is not asked for; add output `orientation`",
@@ -163,16 +163,18 @@ impl Charts {
 }
 
 impl OrientationBy {
-    /// `outputs`, with the one of `orientation` and `axis` that this stands for in the place of either.
+    /// `outputs`, with the one of `orientation` and `principal_axis` that this stands for in the place of either.
     #[must_use]
     pub fn applied(self, outputs: Outputs) -> Outputs {
-        let either = Outputs::ORIENTATION | Outputs::AXIS;
+        let either = Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
         match self {
-            Self::TwoPoints if outputs.intersects(either) => (outputs - Outputs::AXIS) | Outputs::ORIENTATION,
-            Self::SecondMoments if outputs.intersects(either) => (outputs - Outputs::ORIENTATION) | Outputs::AXIS,
+            Self::TwoPoints if outputs.intersects(either) => (outputs - Outputs::PRINCIPAL_AXIS) | Outputs::ORIENTATION,
+            Self::SecondMoments if outputs.intersects(either) => {
+                (outputs - Outputs::ORIENTATION) | Outputs::PRINCIPAL_AXIS
+            }
             _ if self.steps().is_some() && outputs.intersects(either) => {
-                let fitted = Outputs::FOOTPRINT_PLACE | Outputs::FOOTPRINT_ANGLE;
-                (outputs - Outputs::ORIENTATION) | Outputs::AXIS | fitted
+                let fitted = Outputs::FIT_PLACE | Outputs::FIT_ANGLE;
+                (outputs - Outputs::ORIENTATION) | Outputs::PRINCIPAL_AXIS | fitted
             }
             _ => outputs,
         }
@@ -182,9 +184,9 @@ impl OrientationBy {
     #[must_use]
     pub fn steps(self) -> Option<usize> {
         match self {
-            Self::FootprintInOne => Some(1),
-            Self::FootprintInTwo => Some(2),
-            Self::Footprint => Some(footprint::STEPS),
+            Self::FitInOne => Some(1),
+            Self::FitInTwo => Some(2),
+            Self::Fit => Some(fit::STEPS),
             Self::AsAsked | Self::TwoPoints | Self::SecondMoments => None,
         }
     }
@@ -210,13 +212,13 @@ mod tests {
 
     #[test]
     fn an_orientation_that_is_not_asked_for_stays_away() {
-        let both = Outputs::ORIENTATION | Outputs::AXIS | Outputs::TOTAL;
+        let both = Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS | Outputs::TOTAL;
         assert_eq!(OrientationBy::AsAsked.applied(both), both);
         assert_eq!(OrientationBy::TwoPoints.applied(both), Outputs::ORIENTATION | Outputs::TOTAL);
-        assert_eq!(OrientationBy::SecondMoments.applied(Outputs::ORIENTATION), Outputs::AXIS);
+        assert_eq!(OrientationBy::SecondMoments.applied(Outputs::ORIENTATION), Outputs::PRINCIPAL_AXIS);
         assert_eq!(OrientationBy::SecondMoments.applied(Outputs::TOTAL), Outputs::TOTAL);
-        let fitted = Outputs::AXIS | Outputs::FOOTPRINT_PLACE | Outputs::FOOTPRINT_ANGLE;
-        assert_eq!(OrientationBy::FootprintInTwo.applied(Outputs::ORIENTATION), fitted);
-        assert_eq!(OrientationBy::Footprint.applied(Outputs::TOTAL), Outputs::TOTAL);
+        let fitted = Outputs::PRINCIPAL_AXIS | Outputs::FIT_PLACE | Outputs::FIT_ANGLE;
+        assert_eq!(OrientationBy::FitInTwo.applied(Outputs::ORIENTATION), fitted);
+        assert_eq!(OrientationBy::Fit.applied(Outputs::TOTAL), Outputs::TOTAL);
     }
 }

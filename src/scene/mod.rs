@@ -5,11 +5,11 @@ mod curves;
 mod explain;
 mod filter;
 mod knobs;
+mod layer;
 mod left_out;
 mod members;
 mod onset;
 mod plan;
-mod skin;
 mod slots;
 mod stages;
 
@@ -49,8 +49,8 @@ pub struct Scene {
     /// In which frame positions and normals are given.
     pub coordinates: Coordinates,
     /// The link in whose frame everything is given instead of the world: poses are taken from there on.
-    pub in_link: Option<String>,
-    /// How far the places of two touches may be apart that are one contact, m; for [`Outputs::CONTACTS`]. `None` is that of
+    pub relative_to: Option<String>,
+    /// How far the places of two touches may be apart that are one contact, m; for [`Outputs::SELF_CONTACTS`]. `None` is that of
     /// [`crate::field::ContactTolerance`].
     pub contact_tolerance_m: Option<f64>,
 }
@@ -64,7 +64,7 @@ impl Default for Scene {
             max_gap_s: 10.0,
             letters: vec![Letter::default()],
             coordinates: Coordinates::default(),
-            in_link: None,
+            relative_to: None,
             filter: MotionFilter::default(),
             knobs: Knobs::default(),
             contact_tolerance_m: None,
@@ -86,10 +86,10 @@ setters!(Scene {
 impl Scene {
     /// The link that stands for the world, which `body` must have.
     fn checked_link(&self, body: &Body) -> Result<Option<String>> {
-        let Some(link) = &self.in_link else { return Ok(None) };
+        let Some(link) = &self.relative_to else { return Ok(None) };
         if self.coordinates == Coordinates::Anchor {
             return Err(Error::usage(format!(
-                "coordinates `anchor` leave every field in its own link, and `in` puts all into `{link}`; leave one of them out"
+                "coordinates `anchor` leave every field in its own link, and `relative_to` puts all into `{link}`; leave one of them out"
             )));
         }
         if !body.links.iter().any(|of_body| of_body.name == *link) {
@@ -101,7 +101,7 @@ impl Scene {
 
     /// Refuses outputs that are made of places in the world where none are given.
     fn check_world(&self) -> Result<()> {
-        let of_world = self.outputs & (Outputs::CONTACTS | Outputs::SPEED_IN_WORLD);
+        let of_world = self.outputs & (Outputs::SELF_CONTACTS | Outputs::SPEED_IN_WORLD);
         match of_world.names().next().filter(|_| self.coordinates == Coordinates::Anchor) {
             Some(name) => Err(Error::usage(format!(
                 "`{name}` is made of places in the world; leave out coordinates `anchor`, or `{name}`"
@@ -110,10 +110,10 @@ impl Scene {
         }
     }
 
-    /// The same with this [`Scene::in_link`].
+    /// The same with this [`Scene::relative_to`].
     #[must_use]
-    pub fn in_link(mut self, link: Option<impl Into<String>>) -> Self {
-        self.in_link = link.map(Into::into);
+    pub fn relative_to(mut self, link: Option<impl Into<String>>) -> Self {
+        self.relative_to = link.map(Into::into);
         self
     }
 

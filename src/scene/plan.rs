@@ -18,7 +18,7 @@ use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
 use crate::percept::{Flags, Outputs};
 use crate::signal::{Calibration, Letter, Mark, Quantity, Receptor, Response, TaxelCalibration};
-use crate::stage::footprint::Layer;
+use crate::stage::fit::Layer;
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
 use crate::stage::{filter, layout, touches};
@@ -33,7 +33,7 @@ pub struct Plan {
     pub(super) letters: Vec<Letter>,
     knobs: Knobs,
     /// The link that stands for the world.
-    in_link: Option<String>,
+    relative_to: Option<String>,
     /// Up to where changes count as 0, in P per second, as the calibration has it.
     pub(crate) change_dead_band: f64,
     /// The body's taxels that are read, by ascending id; a *channel* is an index into this.
@@ -183,7 +183,7 @@ impl Plan {
             columns: outputs,
             letters: scene.letters.clone(),
             knobs: scene.knobs,
-            in_link: scene.checked_link(body)?,
+            relative_to: scene.checked_link(body)?,
             change_dead_band: calibration.change.dead_band,
             calibrations,
             onsets,
@@ -240,7 +240,7 @@ impl Plan {
                 chart: field.chart.as_ref().ok().cloned(),
                 no_chart: field.chart.as_ref().err().cloned(),
                 surface: plan.stages().position.then(|| surface(&nearest, field)).flatten(),
-                layer: Err(Flags::NO_SKIN),
+                layer: Err(Flags::NO_LAYER),
                 beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
                 spacing: field.spacing_m() / f64::from(unit_m),
                 places,
@@ -254,7 +254,7 @@ impl Plan {
                 in_letter.first = members.len();
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
                 let receptor = plan.letters[letter].receptor;
-                in_letter.layer = in_letter.layer_under(calibration.skin, receptor, scene.knobs.orientation_by);
+                in_letter.layer = in_letter.layer_under(calibration.layer, receptor, scene.knobs.orientation_by);
                 members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
                     slot: first_slot + channel_of(member.taxel),
                     weight: member.weight as f32,
@@ -285,16 +285,16 @@ impl Plan {
         Ok(plan)
     }
 
-    /// What places in the world are said to be in: `world`, or the link of [`Scene::in_link`].
+    /// What places in the world are said to be in: `world`, or the link of [`Scene::relative_to`].
     #[must_use]
     pub fn world(&self) -> &str {
-        self.in_link().unwrap_or(WORLD)
+        self.relative_to().unwrap_or(WORLD)
     }
 
     /// The link in whose frame places are given instead of the world.
     #[must_use]
-    pub fn in_link(&self) -> Option<&str> {
-        self.in_link.as_deref()
+    pub fn relative_to(&self) -> Option<&str> {
+        self.relative_to.as_deref()
     }
 
     /// The quantities that are computed.
@@ -309,7 +309,7 @@ impl Plan {
     }
 
     /// Calibrates the taxel at `channel` from now on with `baseline`, its raw value at rest, and leaves it out if it is `unfit`; `made` is how all
-    /// slots were before any upkeep.
+    /// slots were before any drift compensation.
     pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
         let shift = self.onset(channel).shift;
         let baseline = if shift == 0.0 { baseline } else { (f64::from(baseline) + shift) as f32 };

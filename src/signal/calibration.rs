@@ -4,8 +4,8 @@
 
 mod file;
 mod keys;
+mod layer;
 mod overlay;
-mod skin;
 mod thresholds;
 
 use std::collections::BTreeMap;
@@ -13,15 +13,15 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+pub use self::layer::LayerResponse;
 pub use self::overlay::LaidOver;
-pub use self::skin::SkinResponse;
 pub use self::thresholds::{ChangeCalibration, ContactThresholds};
 use super::curve::Curve;
+use super::drift::DriftKeys;
 use super::frame::RawValue;
 use super::fsr::FsrCircuit;
 use super::response::{FsrResponse, FsrSignal, Response};
 use super::unit::Quantity;
-use super::upkeep::UpkeepKeys;
 use crate::error::{Result, failed};
 
 /// What a taxel's pressure is where it leaves its dead band.
@@ -111,9 +111,9 @@ pub struct Calibration {
     /// Checks of the input.
     pub checks: Checks,
     /// How baselines follow drift and defective taxels are detected.
-    pub upkeep: UpkeepKeys,
+    pub drift: DriftKeys,
     /// What the layer over the taxels makes of a contact, where that is known.
-    pub skin: Option<SkinResponse>,
+    pub layer: Option<LayerResponse>,
 }
 
 impl Calibration {

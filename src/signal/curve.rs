@@ -90,7 +90,7 @@ impl Curve {
 
     /// The curve of a sensor in the paper's circuit, with a knot at every reading.
     pub(crate) fn fsr(sensor: &FsrResponse) -> Self {
-        let circuit = FsrCircuit { tap: sensor.tap };
+        let circuit = FsrCircuit { wiper: sensor.wiper };
         let signal = |counts| match sensor.signal {
             FsrSignal::Raw => circuit.logarithmic(counts),
             FsrSignal::Linear => circuit.linearised(counts, sensor.full_scale_newton),
@@ -212,17 +212,17 @@ mod tests {
 
     #[test]
     fn the_circuits_curves_are_sound_tables_that_say_what_it_says() {
-        for tap in 0..=255 {
+        for wiper in 0..=255 {
             for (signal, full_scale_newton) in [(Raw, 10.0), (Linear, 10.0), (Linear, 0.1), (Linear, 1e6)] {
-                let curve = Curve::fsr(&FsrResponse { tap, signal, full_scale_newton });
+                let curve = Curve::fsr(&FsrResponse { wiper, signal, full_scale_newton });
                 let column = |i: usize| curve.knots.iter().map(|knot| f64::from(knot[i])).collect::<Vec<_>>();
                 assert_eq!(Curve::new(&column(0), &column(1)).unwrap().knots, curve.knots);
                 assert!(curve.falls() && curve.knots[1023] == [1023.0, 0.0]);
                 assert_eq!(curve.written[1023], [1023.0, 0.0]);
             }
         }
-        let circuit = FsrCircuit { tap: 100 };
-        let curve = Curve::fsr(&FsrResponse { tap: 100, signal: Linear, full_scale_newton: 5.0 });
+        let circuit = FsrCircuit { wiper: 100 };
+        let curve = Curve::fsr(&FsrResponse { wiper: 100, signal: Linear, full_scale_newton: 5.0 });
         assert_eq!(f64::from(curve.knots[700][1]), f64::from(circuit.linearised(700, 5.0) as f32));
     }
 }

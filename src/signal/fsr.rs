@@ -8,13 +8,13 @@
 //! Below the break force of 0.1 N its layers do not touch and it is open; over 10 N it falls no further. Single
 //! resistors are off this line by tens of per cent: the constants are typical, not any one part's.
 //!
-//! **Divider** (MCP42050). Between supply and junction stands R(tap) = 50 kΩ · tap/256 + 52 Ω (the wiper), between
-//! junction and ground the resistor: V/Vcc = R(F)/(R(F) + R(tap)). The harder the press, the *lower* the voltage.
+//! **Divider** (MCP42050). Between supply and junction stands R(wiper) = 50 kΩ · wiper/256 + 52 Ω (the wiper's own), between
+//! junction and ground the resistor: V/Vcc = R(F)/(R(F) + R(wiper)). The harder the press, the *lower* the voltage.
 //!
 //! **Converter**. counts = ⌊1024 · V/Vcc⌋, at most 1023: open reads 1023.
 //!
 //! **Signals**. The *logarithmic raw* signal is the reading inverted and scaled: 0 open, 1000 at 10 N and over. In
-//! between it is about logarithmic in the force, steepest where R(F) = R(tap). The *linearised* signal is proportional
+//! between it is about logarithmic in the force, steepest where R(F) = R(wiper). The *linearised* signal is proportional
 //! to the force of the reading: 1000 at a full-scale force of the user's choice.
 
 use libm::pow;
@@ -24,11 +24,11 @@ const REFERENCE: (f64, f64) = (0.2, 30_000.0);
 /// b = ln 30 / ln 50, from the line's other point, 1 kΩ at 10 N.
 const EXPONENT: f64 = 0.869_421_620_717_160_4;
 
-/// The circuit of one sensor, with its potentiometer at a tap.
+/// The circuit of one sensor, with its potentiometer's wiper at a position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FsrCircuit {
     /// The potentiometer's setting: 0 leaves the wiper's own resistance, 255 nearly all of it.
-    pub tap: u8,
+    pub wiper: u8,
 }
 
 impl FsrCircuit {
@@ -38,16 +38,16 @@ impl FsrCircuit {
     pub const SATURATION_NEWTON: f64 = 10.0;
     /// The potentiometer's total resistance, Ω.
     pub const POTENTIOMETER_OHM: f64 = 50_000.0;
-    /// Its number of taps.
-    pub const TAPS: f64 = 256.0;
+    /// The number of positions of its wiper.
+    pub const WIPER_POSITIONS: f64 = 256.0;
     /// Its wiper's resistance, Ω.
     pub const WIPER_OHM: f64 = 52.0;
     /// Number of readings the converter has.
     pub const STEPS: f64 = 1024.0;
     /// The reading of an open resistor, which is the highest.
     pub const OPEN_COUNTS: u16 = 1023;
-    /// The tap that puts the steepest part of the response in the middle of the resistor's range.
-    pub const MIDDLE_TAP: u8 = 38;
+    /// The wiper that puts the steepest part of the response in the middle of the resistor's range.
+    pub const MIDDLE_WIPER: u8 = 38;
     /// Full scale of both signals.
     pub const FULL_SIGNAL: f64 = 1000.0;
 
@@ -64,7 +64,7 @@ impl FsrCircuit {
     /// The resistance above the junction, Ω.
     #[must_use]
     pub fn divider_ohm(self) -> f64 {
-        Self::POTENTIOMETER_OHM * f64::from(self.tap) / Self::TAPS + Self::WIPER_OHM
+        Self::POTENTIOMETER_OHM * f64::from(self.wiper) / Self::WIPER_POSITIONS + Self::WIPER_OHM
     }
 
     /// The junction's voltage in counts before conversion to an integer: 0..=1024.
@@ -142,7 +142,7 @@ impl FsrCircuit {
 
 impl Default for FsrCircuit {
     fn default() -> Self {
-        Self { tap: Self::MIDDLE_TAP }
+        Self { wiper: Self::MIDDLE_WIPER }
     }
 }
 
@@ -155,9 +155,9 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
         #[test]
-        fn backward_undoes_forward_within_the_step(tap: u8, log_force in -9.0..4.6_f64) {
+        fn backward_undoes_forward_within_the_step(wiper: u8, log_force in -9.0..4.6_f64) {
             let force = libm::exp(log_force);
-            let circuit = FsrCircuit { tap };
+            let circuit = FsrCircuit { wiper };
             let counts = circuit.counts(force);
             let [least, greatest] = circuit.step_newton(counts);
             // The power and its inverse each round once or twice.
@@ -169,16 +169,16 @@ mod tests {
         }
 
         #[test]
-        fn harder_reads_lower_and_never_higher(tap: u8, a in 0.0..30.0_f64, b in 0.0..30.0_f64) {
+        fn harder_reads_lower_and_never_higher(wiper: u8, a in 0.0..30.0_f64, b in 0.0..30.0_f64) {
             let (soft, hard) = (a.min(b), a.max(b));
-            let circuit = FsrCircuit { tap };
+            let circuit = FsrCircuit { wiper };
             prop_assert!(circuit.counts(hard) <= circuit.counts(soft));
             prop_assert!(circuit.level(hard) <= circuit.level(soft));
         }
 
         #[test]
-        fn both_signals_rise_with_pressure_from_0_to_1000(tap: u8, low in 0..1023_u16) {
-            let circuit = FsrCircuit { tap };
+        fn both_signals_rise_with_pressure_from_0_to_1000(wiper: u8, low in 0..1023_u16) {
+            let circuit = FsrCircuit { wiper };
             for signal in [FsrCircuit::logarithmic, |c: FsrCircuit, n: u16| c.linearised(n, 10.0)] {
                 let (pressed, less) = (signal(circuit, low), signal(circuit, low + 1));
                 prop_assert!((0.0..=1000.0).contains(&pressed) && pressed >= less);
@@ -195,8 +195,8 @@ mod tests {
 
     #[test]
     fn the_edges_read_as_they_should() {
-        for tap in [0, 1, FsrCircuit::MIDDLE_TAP, 254, 255] {
-            let circuit = FsrCircuit { tap };
+        for wiper in [0, 1, FsrCircuit::MIDDLE_WIPER, 254, 255] {
+            let circuit = FsrCircuit { wiper };
             for nothing in [0.0, -0.0, -3.0, f64::NAN, f64::NEG_INFINITY, 0.099_999, f64::MIN_POSITIVE] {
                 assert_eq!(circuit.counts(nothing), FsrCircuit::OPEN_COUNTS, "{nothing} N");
             }
@@ -214,15 +214,15 @@ mod tests {
             assert_eq!(circuit.linearised(full, 4.0), 1000.0);
         }
         // By hand: 1 kΩ under 52 Ω, and under 49.86 kΩ.
-        assert_eq!(FsrCircuit { tap: 0 }.counts(10.0), 973);
-        assert_eq!(FsrCircuit { tap: 255 }.counts(10.0), 20);
+        assert_eq!(FsrCircuit { wiper: 0 }.counts(10.0), 973);
+        assert_eq!(FsrCircuit { wiper: 255 }.counts(10.0), 20);
         assert_eq!((FsrCircuit::convert(-5.0), FsrCircuit::convert(2e9), FsrCircuit::convert(f64::NAN)), (0, 1023, 0));
     }
 
     #[test]
-    fn the_middle_tap_is_the_geometric_mean_of_the_range() {
+    fn the_middle_wiper_is_the_geometric_mean_of_the_range() {
         let range = [FsrCircuit::BREAK_NEWTON, FsrCircuit::SATURATION_NEWTON].map(FsrCircuit::resistance_ohm);
-        let off = |tap: u8| (FsrCircuit { tap }.divider_ohm() - (range[0] * range[1]).sqrt()).abs();
-        assert!((0..=255).all(|tap| off(FsrCircuit::MIDDLE_TAP) <= off(tap)));
+        let off = |wiper: u8| (FsrCircuit { wiper }.divider_ohm() - (range[0] * range[1]).sqrt()).abs();
+        assert!((0..=255).all(|wiper| off(FsrCircuit::MIDDLE_WIPER) <= off(wiper)));
     }
 }

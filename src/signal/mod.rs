@@ -4,6 +4,7 @@ mod block;
 mod board_health;
 mod calibration;
 mod curve;
+mod drift;
 mod frame;
 mod frame_time;
 mod fsr;
@@ -11,16 +12,17 @@ mod intake;
 mod letter;
 mod response;
 mod unit;
-mod upkeep;
 mod wiring;
 
 pub use block::FrameBlock;
 pub use board_health::BoardHealth;
 pub use calibration::{
-    Calibration, ChangeCalibration, Checks, ContactThresholds, LaidOver, Onset, SkinResponse, TaxelCalibration,
+    Calibration, ChangeCalibration, Checks, ContactThresholds, LaidOver, LayerResponse, Onset, TaxelCalibration,
 };
 pub use curve::Curve;
 pub(crate) use curve::slope;
+pub(crate) use drift::{DriftCompensation, Kept, MIN_UNTOUCHED};
+pub use drift::{DriftKeys, Unfit};
 pub use frame::{FARTHEST_POSE_M, Frame, Pose, RawValue};
 pub use frame_time::FrameTime;
 pub use fsr::FsrCircuit;
@@ -28,6 +30,4 @@ pub(crate) use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};
 pub use response::{FsrResponse, FsrSignal, Response};
 pub use unit::{Quantity, UnitOfP};
-pub(crate) use upkeep::{Kept, MIN_UNTOUCHED, Upkeep};
-pub use upkeep::{Unfit, UpkeepKeys};
 pub use wiring::{WiredBoard, Wiring};

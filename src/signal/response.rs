@@ -29,7 +29,7 @@ pub enum Response {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FsrResponse {
     /// The potentiometer's setting.
-    pub tap: u8,
+    pub wiper: u8,
     /// Which of the paper's signals P is.
     pub signal: FsrSignal,
     /// The force at which the linearised signal is 1000, N.
@@ -39,7 +39,7 @@ pub struct FsrResponse {
 impl Default for FsrResponse {
     fn default() -> Self {
         Self {
-            tap: FsrCircuit::MIDDLE_TAP,
+            wiper: FsrCircuit::MIDDLE_WIPER,
             signal: FsrSignal::default(),
             full_scale_newton: FsrCircuit::SATURATION_NEWTON,
         }

@@ -33,8 +33,8 @@ pub struct WiredBoard {
     pub baud: Option<u32>,
     /// Per channel the taxel's id; `None` for an unused channel.
     pub taxels: Vec<Option<u32>>,
-    /// Per channel the tap to set on its potentiometer, if given.
-    pub taps: Vec<Option<u8>>,
+    /// Per channel the wiper to set on its potentiometer, if given.
+    pub wipers: Vec<Option<u8>>,
 }
 
 #[derive(Deserialize)]
@@ -61,7 +61,7 @@ struct RunKeys {
     first: Option<Spanned<i64>>,
     count: Option<Spanned<i64>>,
     ids: Option<Vec<u32>>,
-    taps: Option<Spanned<Vec<Spanned<i64>>>>,
+    wipers: Option<Spanned<Vec<Spanned<i64>>>>,
 }
 
 impl Wiring {
@@ -139,8 +139,8 @@ impl Wiring {
             let (own, after) = rest.split_at(rest.len().div_ceil(boards - index));
             rest = after;
             let taxels = own.iter().copied().map(Some).collect();
-            let taps = vec![None; own.len()];
-            WiredBoard { id: first_id + index as u16, bits: None, port: None, baud: None, taxels, taps }
+            let wipers = vec![None; own.len()];
+            WiredBoard { id: first_id + index as u16, bits: None, port: None, baud: None, taxels, wipers }
         };
         Ok(Self { boards: (0..boards).map(take).collect() })
     }
@@ -157,13 +157,13 @@ impl Wiring {
         self.boards.iter().find(|board| board.id == id)
     }
 
-    /// The same wiring with the taps that `tap` gives for a board's id and a channel with a taxel.
+    /// The same wiring with the wipers that `wiper` gives for a board's id and a channel with a taxel.
     #[must_use]
-    pub fn with_taps(&self, tap: impl Fn(u16, u16) -> Option<u8>) -> Self {
+    pub fn with_wipers(&self, wiper: impl Fn(u16, u16) -> Option<u8>) -> Self {
         let mut wiring = self.clone();
         for board in &mut wiring.boards {
             let wired = (0..).zip(&board.taxels);
-            board.taps = wired.map(|(channel, taxel)| taxel.and_then(|_| tap(board.id, channel))).collect();
+            board.wipers = wired.map(|(channel, taxel)| taxel.and_then(|_| wiper(board.id, channel))).collect();
         }
         wiring
     }
@@ -186,7 +186,7 @@ impl BoardKeys {
         let baud = int("baud", self.baud.as_ref(), 1..1_000_000_000)?;
         let channels = int("channels", self.channels.as_ref(), 1..MAX_CHANNELS + 1)?.map(|count| count as usize);
         let mut taxels = vec![None; channels.unwrap_or(0)];
-        let mut taps = taxels.iter().map(|_| None).collect::<Vec<Option<u8>>>();
+        let mut wipers = taxels.iter().map(|_| None).collect::<Vec<Option<u8>>>();
         for keys in &self.taxels {
             let run = keys.get_ref();
             let channel = int("channel", Some(&run.channel), 0..MAX_CHANNELS)?.unwrap_or(0) as usize;
@@ -209,14 +209,14 @@ impl BoardKeys {
                 return Err(text.wrong(keys.span(), what));
             }
             taxels.resize(taxels.len().max(end), None);
-            taps.resize(taxels.len(), None);
-            if let Some(given) = &run.taps {
+            wipers.resize(taxels.len(), None);
+            if let Some(given) = &run.wipers {
                 if given.get_ref().len() != ids.len() {
-                    let what = format!("{} `taps` are given for {} channels", given.get_ref().len(), ids.len());
+                    let what = format!("{} `wipers` are given for {} channels", given.get_ref().len(), ids.len());
                     return Err(text.wrong(given.span(), what));
                 }
-                for (channel, tap) in (channel..).zip(given.get_ref()) {
-                    taps[channel] = int("taps", Some(tap), 0..256)?.map(|tap| tap as u8);
+                for (channel, wiper) in (channel..).zip(given.get_ref()) {
+                    wipers[channel] = int("wipers", Some(wiper), 0..256)?.map(|wiper| wiper as u8);
                 }
             }
             for (channel, id) in (channel..).zip(ids) {
@@ -228,7 +228,7 @@ impl BoardKeys {
         if taxels.iter().all(Option::is_none) {
             return Err(text.wrong(self.id.span(), format!("board {id} has no taxels; give `taxels`")));
         }
-        Ok(WiredBoard { id, bits, port: self.port.clone(), baud, taxels, taps })
+        Ok(WiredBoard { id, bits, port: self.port.clone(), baud, taxels, wipers })
     }
 }
 
@@ -283,8 +283,10 @@ mod tests {
         assert!(why(&run("{ channel = 250, first = 0, count = 9 }")).contains("channel 258"));
         assert!(why(&run("{ channel = 0, ids = [5] }, { channel = 1, ids = [5] }")).contains("taxel 5 is on channel"));
         assert!(why(&board("bits = 9\ntaxels = [{ channel = 0, first = 0 }]")).contains("8, 10, 12 or 16"));
-        assert!(why(&run("{ channel = 0, first = 1, count = 2, taps = [3] }")).contains("1 `taps` are given for 2"));
-        assert!(why(&run("{ channel = 0, first = 1, taps = [256] }")).contains("between 0 and 255"));
+        assert!(
+            why(&run("{ channel = 0, first = 1, count = 2, wipers = [3] }")).contains("1 `wipers` are given for 2")
+        );
+        assert!(why(&run("{ channel = 0, first = 1, wipers = [256] }")).contains("between 0 and 255"));
         assert!(why(&board("chanels = 3\ntaxels = []")).contains("did you mean `channels`"));
         assert!(why(&board("taxels = []")).contains("has no taxels"));
         assert!(why(&run("{ channel = 0, first = 1 }").repeat(2)).contains("two boards"));

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::FieldNames;
-use crate::percept::{COLUMNS, Contact, Flags, Outputs, Percept, Percepts, Precision, Store, Touch, Unit};
+use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, SelfContact, Store, Touch, Unit};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -87,16 +87,16 @@ impl LineWriter {
             line.push(b'}');
         }
         line.push(b']');
-        if let Some(contacts) = percepts.contacts(frame) {
-            self.write_contacts(contacts, line);
+        if let Some(self_contacts) = percepts.self_contacts(frame) {
+            self.write_self_contacts(self_contacts, line);
         }
         line.push(b'}');
     }
 
-    fn write_contacts(&self, contacts: &[Contact], line: &mut Vec<u8>) {
-        key(line, "contacts");
+    fn write_self_contacts(&self, self_contacts: &[SelfContact], line: &mut Vec<u8>) {
+        key(line, "self_contacts");
         line.push(b'[');
-        for (index, contact) in contacts.iter().enumerate() {
+        for (index, contact) in self_contacts.iter().enumerate() {
             line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
             print(line, &contact.id);
             // Both sides are of one letter.
@@ -138,7 +138,7 @@ impl LineWriter {
     }
 
     fn write_touches(&self, touches: &[Touch], outputs: Outputs, line: &mut Vec<u8>) {
-        let footprint = outputs.of_each_touch();
+        let fit = outputs.of_each_touch();
         key(line, "touches");
         line.push(b'[');
         for (index, touch) in touches.iter().enumerate() {
@@ -156,8 +156,8 @@ impl LineWriter {
                 key(line, "position");
                 print(line, &position);
             }
-            print_footprint(line, touch, footprint);
-            if !footprint.is_empty() {
+            print_fit(line, touch, fit);
+            if !fit.is_empty() {
                 self.write_flags(touch.flags, line);
             }
             line.push(b'}');
@@ -166,12 +166,12 @@ impl LineWriter {
     }
 }
 
-fn print_footprint(line: &mut Vec<u8>, touch: &Touch, outputs: Outputs) {
+fn print_fit(line: &mut Vec<u8>, touch: &Touch, outputs: Outputs) {
     for column in outputs.columns() {
         let Some(components) = touch.value(column) else { continue };
         key(line, column.name);
         match column.components {
-            _ if column.unit == Unit::Kind => print(line, &touch.footprint.map(|footprint| footprint.kind)),
+            _ if column.unit == Unit::Kind => print(line, &touch.fit.map(|fit| fit.kind)),
             1 => print(line, &components[0]),
             count => print(line, &&components[..count]),
         }
@@ -188,7 +188,7 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
         key(line, column.name);
         match column.store {
             Store::Active => print(line, &(components[0] as u32)),
-            _ if column.unit == Unit::Kind => print(line, &percept.footprint_kind),
+            _ if column.unit == Unit::Kind => print(line, &percept.fit_kind),
             // In double precision whatever the backend.
             Store::Host(_) if column.components == 1 => print(line, &components[0]),
             Store::Host(_) => print(line, &&components[..column.components]),

@@ -35,7 +35,7 @@ pub use spec::{SinkSpec, SinkTarget, TableName, TableWish};
 pub use table::ParquetSink;
 #[cfg(feature = "arrow")]
 pub use table::{ArrowTable, TableKind};
-pub use table::{CsvSink, TableColumn, TableType, contact_columns, percept_columns, touch_columns};
+pub use table::{CsvSink, TableColumn, TableType, percept_columns, self_contact_columns, touch_columns};
 #[cfg(feature = "zenoh")]
 pub use zenoh_sink::{ZenohSink, limb_frame_bytes, limb_percept_bytes};
 

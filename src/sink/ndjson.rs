@@ -203,7 +203,7 @@ mod tests {
                     (Component::CentroidU, 0.3),
                     (Component::CentroidV, -0.7),
                     (Component::Orientation, 1.5),
-                    (Component::Axis, 0.0),
+                    (Component::PrincipalAxis, 0.0),
                     (Component::Anisotropy, 1.0),
                     (Component::DisplacementU, -0.5),
                     (Component::DisplacementV, 0.1),
@@ -248,7 +248,7 @@ mod tests {
         let wanted = concat!(
             r#"{"t":0.05,"frame":7,"fields":[{"field":"hand/palm","link":"hand","contact":true,"total":0.1,"#,
             r#""peak":1e-30,"active":3,"area":0.000025,"centroid":[0.3,-0.7],"position":[0.1,-0.2,1e-9],"#,
-            r#""normal":[0.0,0.0,1.0],"orientation":1.5,"axis":0.0,"anisotropy":1.0,"displacement":[-0.5,0.1],"flags":["tie","saturated"]}]}"#,
+            r#""normal":[0.0,0.0,1.0],"orientation":1.5,"principal_axis":0.0,"anisotropy":1.0,"displacement":[-0.5,0.1],"flags":["tie","saturated"]}]}"#,
             "\n",
             r#"{"t":0.1,"frame":8,"fields":[{"field":"hand/palm","link":"world","contact":true,"total":12.0,"#,
             r#""position":[0.1,-0.2,1e-9],"flags":[]}]}"#,

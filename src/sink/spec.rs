@@ -97,19 +97,19 @@ pub enum TableName {
     /// A row per frame and separate touch.
     Touches,
     /// A row per frame and contact between links.
-    Contacts,
+    SelfContacts,
 }
 
 impl FromStr for TableName {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        let all = [("fields", Self::Fields), ("touches", Self::Touches), ("contacts", Self::Contacts)];
+        let all = [("fields", Self::Fields), ("touches", Self::Touches), ("self_contacts", Self::SelfContacts)];
         if let Some((_, table)) = all.iter().find(|(known, _)| *known == name) {
             return Ok(*table);
         }
         let near = nearest(name, all.map(|(name, _)| name)).map(|near| format!("; did you mean `{near}`?"));
-        let hint = near.unwrap_or_else(|| "; choose of fields, touches and contacts".to_owned());
+        let hint = near.unwrap_or_else(|| "; choose of fields, touches and self_contacts".to_owned());
         Err(Error::usage(format!("there is no table `{name}`{hint}")))
     }
 }
@@ -121,8 +121,8 @@ pub struct TableWish {
     pub wide: bool,
     /// Whether separate touches are asked for: they go into a second file, `percepts.touches.csv` beside `percepts.csv`.
     pub touches: bool,
-    /// Whether contacts are: they go into a third file, `percepts.contacts.csv`.
-    pub contacts: bool,
+    /// Whether self-contacts are: they go into a third file, `percepts.self_contacts.csv`.
+    pub self_contacts: bool,
     /// The table that goes to standard output, which has room for one. `None`: touches if they are computed, else fields.
     pub on_stdout: Option<TableName>,
 }
@@ -132,8 +132,8 @@ impl TableWish {
     #[must_use]
     pub fn new(outputs: Outputs, wide: bool) -> Self {
         let outputs = outputs.with_needed();
-        let (touches, contacts) = (outputs.contains(Outputs::TOUCHES), outputs.contains(Outputs::CONTACTS));
-        Self { wide, touches, contacts, on_stdout: None }
+        let (touches, self_contacts) = (outputs.contains(Outputs::TOUCHES), outputs.contains(Outputs::SELF_CONTACTS));
+        Self { wide, touches, self_contacts, on_stdout: None }
     }
 
     /// The same, with this table on standard output.
@@ -143,10 +143,10 @@ impl TableWish {
     pub fn on_stdout(self, table: Option<TableName>) -> Result<Self> {
         let is_there = match table {
             Some(TableName::Touches) => self.touches,
-            Some(TableName::Contacts) => self.contacts,
+            Some(TableName::SelfContacts) => self.self_contacts,
             Some(TableName::Fields) | None => true,
         };
-        let name = if table == Some(TableName::Touches) { "touches" } else { "contacts" };
+        let name = if table == Some(TableName::Touches) { "touches" } else { "self_contacts" };
         if !is_there {
             return Err(Error::usage(format!("{name} are not computed; ask for them with --outputs {name}")));
         }
@@ -201,7 +201,7 @@ impl SinkSpec {
     pub fn target(&self, outputs: &mut OutputPaths, allow_hosts: &[String], table: TableWish) -> Result<SinkTarget> {
         let beside = |path: &Path, outputs: &mut OutputPaths| {
             let mut add = |is_asked: bool, what| is_asked.then(|| outputs.add(path_beside(path, what))).transpose();
-            Ok::<_, Error>((add(table.touches, "touches")?, add(table.contacts, "contacts")?))
+            Ok::<_, Error>((add(table.touches, "touches")?, add(table.self_contacts, "self_contacts")?))
         };
         Ok(match self {
             #[cfg(feature = "page")]
@@ -210,33 +210,33 @@ impl SinkSpec {
             Self::Page(_) => return Err(Error::failed("built without the feature `page`").at("sink `page`")),
             Self::Ndjson(path) => SinkTarget::Ndjson(outputs.add(path)?),
             Self::Csv(path) if self.is_table_on_stdout() => {
-                let (mut percepts, mut touches, mut contacts) = (None, None, None);
+                let (mut percepts, mut touches, mut self_contacts) = (None, None, None);
                 let place = match table.table_on_stdout() {
                     TableName::Fields => &mut percepts,
                     TableName::Touches => &mut touches,
-                    TableName::Contacts => &mut contacts,
+                    TableName::SelfContacts => &mut self_contacts,
                 };
                 *place = Some(outputs.add(path)?);
-                SinkTarget::Csv { percepts, touches, contacts, wide: table.wide }
+                SinkTarget::Csv { percepts, touches, self_contacts, wide: table.wide }
             }
             Self::Csv(path) => {
                 let percepts = Some(outputs.add(path)?);
-                let (touches, contacts) = beside(path, outputs)?;
-                SinkTarget::Csv { percepts, touches, contacts, wide: table.wide }
+                let (touches, self_contacts) = beside(path, outputs)?;
+                SinkTarget::Csv { percepts, touches, self_contacts, wide: table.wide }
             }
             Self::Parquet(path) => {
                 if cfg!(not(feature = "parquet")) {
                     let what = "built without the feature `parquet`: cargo install --path . --features parquet; or use csv:FILE";
                     return Err(Error::failed(what).at(path.display()));
                 }
-                if self.is_on_stdout() && (table.touches || table.contacts) {
+                if self.is_on_stdout() && (table.touches || table.self_contacts) {
                     let what =
                         "standard output has room for one table; name a file, or choose one with csv:- and --table";
                     return Err(Error::usage(what).at("sink `parquet:-`"));
                 }
                 let percepts = outputs.add(path)?;
-                let (touches, contacts) = beside(path, outputs)?;
-                SinkTarget::Parquet { percepts, touches, contacts }
+                let (touches, self_contacts) = beside(path, outputs)?;
+                SinkTarget::Parquet { percepts, touches, self_contacts }
             }
             Self::Mcap(path) => SinkTarget::Mcap(outputs.add(path)?),
             #[cfg(feature = "mcap")]
@@ -282,8 +282,8 @@ pub enum SinkTarget {
         percepts: Option<OutputPath>,
         /// That of separate touches.
         touches: Option<OutputPath>,
-        /// That of contacts.
-        contacts: Option<OutputPath>,
+        /// That of self-contacts.
+        self_contacts: Option<OutputPath>,
         /// Whether it has one row per frame.
         wide: bool,
     },
@@ -293,8 +293,8 @@ pub enum SinkTarget {
         percepts: OutputPath,
         /// That of separate touches.
         touches: Option<OutputPath>,
-        /// That of contacts.
-        contacts: Option<OutputPath>,
+        /// That of self-contacts.
+        self_contacts: Option<OutputPath>,
     },
     /// A recording in MCAP.
     Mcap(OutputPath),
@@ -345,12 +345,12 @@ impl SinkTarget {
                 let sink = NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields);
                 Ok(Box::new(sink.with_header(header.as_deref())?))
             }
-            Self::Csv { percepts, touches, contacts, wide } => {
-                Ok(Box::new(CsvSink::create(percepts, touches, contacts, wide, session)?))
+            Self::Csv { percepts, touches, self_contacts, wide } => {
+                Ok(Box::new(CsvSink::create(percepts, touches, self_contacts, wide, session)?))
             }
             #[cfg(feature = "parquet")]
-            Self::Parquet { percepts, touches, contacts } => {
-                Ok(Box::new(super::ParquetSink::create(percepts, touches, contacts, session)?))
+            Self::Parquet { percepts, touches, self_contacts } => {
+                Ok(Box::new(super::ParquetSink::create(percepts, touches, self_contacts, session)?))
             }
             #[cfg(not(feature = "parquet"))]
             Self::Parquet { percepts, .. } => {

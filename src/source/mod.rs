@@ -32,7 +32,7 @@ mod vendor;
 pub use self::bag_name::BagName;
 pub use self::csv::CsvSource;
 #[cfg(any(feature = "serial", feature = "zenoh"))]
-pub use boards::{BoardAccount, BoardState, ChannelTap, LimbPercepts, Lines, Notice, TapTrouble};
+pub use boards::{BoardAccount, BoardState, ChannelWiper, LimbPercepts, Lines, Notice, WiperTrouble};
 pub use csv_file::CsvFile;
 #[cfg(feature = "ros2")]
 pub(crate) use joint_states::position_between;

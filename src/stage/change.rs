@@ -1,7 +1,7 @@
 //! **change**: how fast single taxels' pressures change, the letter of what adapts rapidly.
 //!
 //! C = |P − P′| / Δt, in P per second, with P′ the pressure of the frame before; 0 unless over the dead band that the
-//! calibration gives changes. P′ is the *raw value* of the frame before under the *present* calibration: when upkeep moves
+//! calibration gives changes. P′ is the *raw value* of the frame before under the *present* calibration: when drift compensation moves
 //! a baseline between two frames, or judges a taxel anew, nothing has touched the robot, and nothing changes.
 //!
 //! * No frame before: every taxel is left out, and its fields flagged `no_previous`. A Δt that cannot be used: the same,

@@ -178,7 +178,7 @@ pub(crate) struct Member {
     pub(crate) v: f32,
 }
 
-/// A taxel of a touch that is fitted, as [`crate::stage::footprint::Sensor`].
+/// A taxel of a touch that is fitted, as [`crate::stage::fit::Sensor`].
 #[cfg(feature = "gpu")]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -192,7 +192,7 @@ pub(crate) struct FitSensor {
     pub(crate) pressed: f32,
 }
 
-/// Where a touch's descents start, as [`crate::stage::footprint::Start`].
+/// Where a touch's descents start, as [`crate::stage::fit::Start`].
 #[cfg(feature = "gpu")]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -212,7 +212,7 @@ pub(crate) struct FitStart {
     pub(crate) is_long: u32,
 }
 
-/// Where a descent ended, as [`crate::stage::footprint::Shape`].
+/// Where a descent ended, as [`crate::stage::fit::Shape`].
 #[cfg(feature = "gpu")]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]

@@ -10,15 +10,13 @@
 //! power of two at least its radius, so that nothing overflows or underflows whatever the body's size.
 
 pub(crate) mod angle;
-pub(crate) mod axis;
 pub(crate) mod calibrate;
 pub(crate) mod centroid;
 pub(crate) mod change;
 pub(crate) mod contact;
-pub(crate) mod contacts;
 pub(crate) mod difference;
 pub(crate) mod filter;
-pub(crate) mod footprint;
+pub(crate) mod fit;
 pub(crate) mod force;
 pub(crate) mod hysteresis;
 pub(crate) mod layout;
@@ -26,6 +24,8 @@ pub(crate) mod limit;
 pub(crate) mod motion;
 pub(crate) mod orientation;
 pub(crate) mod position;
+pub(crate) mod principal_axis;
+pub(crate) mod self_contacts;
 pub(crate) mod sigma;
 pub(crate) mod touches;
 pub(crate) mod world_motion;

@@ -7,7 +7,7 @@
 //!
 //! var θ = Σ (wᵢσᵢ)² ((a − d)·ΔuᵢΔvᵢ − b·(Δuᵢ² − Δvᵢ²))² / h⁴
 //!
-//! with Δ = x − c, the moments a, b, d of [`super::axis`] and h² = (a − d)² + (2b)². The centroid's own error does not turn the
+//! with Δ = x − c, the moments a, b, d of [`super::principal_axis`] and h² = (a − d)² + (2b)². The centroid's own error does not turn the
 //! axis, as Σ wP Δ = 0.
 //!
 //! **Where it does not hold**, a quantity has no sigma, `unsure`. A taxel within [`NEAR_SIGMAS`] σ of its threshold may be
@@ -67,7 +67,7 @@ pub(crate) struct Sigmas {
     /// m, along u and along v.
     pub(crate) centroid: Option<DVec2>,
     /// rad.
-    pub(crate) axis: Option<f64>,
+    pub(crate) principal_axis: Option<f64>,
     /// Number of pressed taxels.
     pub(crate) pressed: usize,
 }
@@ -82,7 +82,7 @@ impl Sigmas {
         [
             (Host::TotalSigma, (Outputs::TOTAL_SIGMA, self.total.map(scalar))),
             (Host::CentroidSigma, (Outputs::CENTROID_SIGMA, self.centroid.map(|sigma| sigma.to_array()))),
-            (Host::AxisSigma, (Outputs::AXIS_SIGMA, self.axis.map(scalar))),
+            (Host::PrincipalAxisSigma, (Outputs::PRINCIPAL_AXIS_SIGMA, self.principal_axis.map(scalar))),
         ]
     }
 
@@ -160,9 +160,9 @@ pub(crate) fn reference(taxels: &[Felt], charted: bool) -> Sigmas {
     sigmas.total = of_total.sigma();
     if charted {
         sigmas.centroid = of_u.sigma().zip(of_v.sigma()).map(|(u, v)| DVec2::new(u, v));
-        sigmas.axis = of_axis.sigma().filter(|&sigma| sigma <= MAX_TURN);
+        sigmas.principal_axis = of_axis.sigma().filter(|&sigma| sigma <= MAX_TURN);
     }
-    if sigmas.total.is_none() || (charted && (sigmas.centroid.is_none() || sigmas.axis.is_none())) {
+    if sigmas.total.is_none() || (charted && (sigmas.centroid.is_none() || sigmas.principal_axis.is_none())) {
         sigmas.flags |= Flags::UNSURE;
     }
     sigmas
@@ -171,7 +171,7 @@ pub(crate) fn reference(taxels: &[Felt], charted: bool) -> Sigmas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::{axis, centroid, contact, pressed_at};
+    use crate::stage::{centroid, contact, pressed_at, principal_axis};
 
     fn felt(taxels: &[(f64, f64, f64)]) -> Vec<Felt> {
         let taxel = |&(u, v, pressure): &(f64, f64, f64)| Felt {
@@ -194,7 +194,7 @@ mod tests {
         let of = |taxels: &[(f64, f64, f64)]| {
             let pressed = pressed_at(taxels);
             let c = centroid::reference(&pressed).truncate();
-            let angle = axis::reference(&pressed, c).line.angle.unwrap();
+            let angle = principal_axis::reference(&pressed, c).line.angle.unwrap();
             [contact::reference(&pressed).total, c.x, c.y, angle]
         };
         let step = 1e-6;
@@ -212,19 +212,19 @@ mod tests {
         }
         let sigmas = reference(&felt(&TOUCH), true);
         let c = sigmas.centroid.unwrap();
-        let found = [sigmas.total.unwrap(), c.x, c.y, sigmas.axis.unwrap()];
+        let found = [sigmas.total.unwrap(), c.x, c.y, sigmas.principal_axis.unwrap()];
         for (found, variance) in found.iter().zip(variances) {
             assert!((found / variance.sqrt() - 1.0).abs() < 1e-7, "{found} {}", variance.sqrt());
         }
         assert!(sigmas.flags.is_empty());
-        assert_eq!(reference(&felt(&TOUCH), false), Sigmas { centroid: None, axis: None, ..sigmas });
+        assert_eq!(reference(&felt(&TOUCH), false), Sigmas { centroid: None, principal_axis: None, ..sigmas });
     }
 
     #[test]
     fn what_cannot_be_told_is_absent_with_its_reason() {
         let none = |taxels: &[Felt]| {
             let sigmas = reference(taxels, true);
-            assert_eq!((sigmas.total, sigmas.centroid, sigmas.axis), (None, None, None));
+            assert_eq!((sigmas.total, sigmas.centroid, sigmas.principal_axis), (None, None, None));
             sigmas.flags
         };
         let mut unknown = felt(&TOUCH);
@@ -250,7 +250,7 @@ mod tests {
         // An axis that noise turns by radians: the rest is known.
         let round = felt(&[(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (1.0, 1.01, 1.0)]);
         let sigmas = reference(&round, true);
-        assert_eq!((sigmas.axis, sigmas.flags), (None, Flags::UNSURE));
+        assert_eq!((sigmas.principal_axis, sigmas.flags), (None, Flags::UNSURE));
         assert!(sigmas.total.is_some() && sigmas.centroid.is_some());
     }
 }

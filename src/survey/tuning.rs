@@ -1,8 +1,8 @@
-//! Tuning: the taps at which sensors use most of their converter's range. No I/O, no clock.
+//! Tuning: the wiper positions at which sensors use most of their converter's range. No I/O, no clock.
 //!
 //! A sensor and its potentiometer divide the supply, as [`FsrCircuit`] documents: of the reading's share x of the range,
-//! x/(1 − x) is the sensor's resistance over D(tap) where readings fall when pressed, and (1 − x)/x where they rise. So
-//! one look at a rest and a firm press tells what both would read at every other tap, and the best of all 256 is chosen:
+//! x/(1 − x) is the sensor's resistance over D(wiper) where readings fall when pressed, and (1 − x)/x where they rise. So
+//! one look at a rest and a firm press tells what both would read at every other wiper position, and the best of all 256 is chosen:
 //! the one with the longest way from rest to press at which the press stays [`HEADROOM`] of the range from its end.
 //!
 //! A sensor's own circuit is not quite the model's, and a press that stands at the end of the range says only that it is
@@ -16,15 +16,15 @@ use somatic::signal::{FsrCircuit, RawValue};
 pub const HEADROOM: f64 = 1.0 / 16.0;
 /// A press that leaves less than this share may be cut off.
 const CUT_OFF: f64 = 1.0 / 64.0;
-/// Minimum gain, as a share of the range, for which a tap is changed.
+/// Minimum gain, as a share of the range, for which a wiper is moved.
 const MIN_GAIN: f64 = 0.06;
-/// A sensor that uses less than this share of the range at an extreme tap is reported.
+/// A sensor that uses less than this share of the range at an extreme wiper position is reported.
 const POOR_SHARE: f64 = 0.5;
 /// Minimum travel of a press, as a share of the expected travel.
 const MIN_EXPECTED_SHARE: f64 = 0.25;
 pub const MAX_ROUNDS: usize = 5;
 
-/// What a sensor read at one tap.
+/// What a sensor read at one wiper position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Untouched, in raw units.
@@ -43,9 +43,9 @@ pub struct Divider {
 }
 
 impl Divider {
-    /// The sensor's resistance when it reads `raw` at `tap`, Ω; infinite where it reads what an open one does.
+    /// The sensor's resistance when it reads `raw` at `wiper`, Ω; infinite where it reads what an open one does.
     #[must_use]
-    pub fn ohm(self, raw: f64, tap: u8) -> f64 {
+    pub fn ohm(self, raw: f64, wiper: u8) -> f64 {
         let open = if self.falls { raw >= self.most } else { raw <= 0.0 };
         if open {
             return f64::INFINITY;
@@ -53,13 +53,13 @@ impl Divider {
         // A reading stands for the middle of its step.
         let x = (raw.clamp(0.0, self.most) + 0.5) / (self.most + 1.0);
         let ratio = if self.falls { x / (1.0 - x) } else { (1.0 - x) / x };
-        ratio * FsrCircuit { tap }.divider_ohm()
+        ratio * FsrCircuit { wiper }.divider_ohm()
     }
 
-    /// The reading of a resistance of `ohm` at `tap`, before it is cut down to a whole number.
+    /// The reading of a resistance of `ohm` at `wiper`, before it is cut down to a whole number.
     #[must_use]
-    pub fn raw(self, ohm: f64, tap: u8) -> f64 {
-        let x = if ohm.is_infinite() { 1.0 } else { ohm / (ohm + FsrCircuit { tap }.divider_ohm()) };
+    pub fn raw(self, ohm: f64, wiper: u8) -> f64 {
+        let x = if ohm.is_infinite() { 1.0 } else { ohm / (ohm + FsrCircuit { wiper }.divider_ohm()) };
         let x = if self.falls { x } else { 1.0 - x };
         (x * (self.most + 1.0) - 0.5).clamp(0.0, self.most)
     }
@@ -76,19 +76,19 @@ impl Divider {
         (if self.falls { look.press } else { self.most - look.press }) / self.most
     }
 
-    /// What was looked at with `tap`, at another.
+    /// What was looked at with `wiper`, at another.
     #[must_use]
-    pub fn moved(self, look: Look, tap: u8, to: u8) -> Look {
-        let at = |raw| self.raw(self.ohm(raw, tap), to);
+    pub fn moved(self, look: Look, wiper: u8, to: u8) -> Look {
+        let at = |raw| self.raw(self.ohm(raw, wiper), to);
         Look { rest: at(look.rest), press: at(look.press) }
     }
 
-    /// The best tap for a sensor that was looked at with `tap`; the lowest one where no tap leaves the headroom.
+    /// The best wiper position for a sensor that was looked at with `wiper`; the lowest one where no wiper position leaves the headroom.
     #[must_use]
-    pub fn best(self, look: Look, tap: u8) -> u8 {
+    pub fn best(self, look: Look, wiper: u8) -> u8 {
         let mut best = (0, f64::NEG_INFINITY);
         for to in 0..=255 {
-            let moved = self.moved(look, tap, to);
+            let moved = self.moved(look, wiper, to);
             if self.headroom(moved) >= HEADROOM && self.share(moved) > best.1 {
                 best = (to, self.share(moved));
             }
@@ -96,11 +96,11 @@ impl Divider {
         best.0
     }
 
-    /// The tap that is worth going to from `tap`, if one is.
-    fn better(self, look: Look, tap: u8) -> Option<u8> {
-        let best = self.best(look, tap);
-        let gain = self.share(self.moved(look, tap, best)) - self.share(look);
-        (best != tap && (self.headroom(look) < CUT_OFF || gain > MIN_GAIN)).then_some(best)
+    /// The wiper position that is worth going to from `wiper`, if one is.
+    fn better(self, look: Look, wiper: u8) -> Option<u8> {
+        let best = self.best(look, wiper);
+        let gain = self.share(self.moved(look, wiper, best)) - self.share(look);
+        (best != wiper && (self.headroom(look) < CUT_OFF || gain > MIN_GAIN)).then_some(best)
     }
 }
 
@@ -114,15 +114,15 @@ pub enum Tuned {
     Silent,
     /// It was not pressed, and stays as it was.
     NotPressed,
-    /// Its tap was set, and it was not pressed again: what it reads now is not known.
+    /// Its wiper was set, and it was not pressed again: what it reads now is not known.
     NotPressedAgain,
-    /// At the highest tap a firm press uses less than half of the range.
+    /// At the highest wiper position a firm press uses less than half of the range.
     Weak,
-    /// At the lowest tap a firm press reaches the end of the range.
+    /// At the lowest wiper position a firm press reaches the end of the range.
     CutOff,
     /// It was still off after the last round.
     Unsettled,
-    /// Its tap could not be set.
+    /// Its wiper could not be set.
     NotSet,
 }
 
@@ -136,9 +136,9 @@ impl Tuned {
             Self::NotPressed => "never pressed; left as it was",
             Self::NotPressedAgain => "set, but not pressed again to see it",
             Self::Weak => {
-                "even the highest tap uses less than half of the range; press harder, or is it the right sensor?"
+                "even the highest wiper position uses less than half of the range; press harder, or is it the right sensor?"
             }
-            Self::CutOff => "even the lowest tap lets a firm press reach the end of the range",
+            Self::CutOff => "even the lowest wiper position lets a firm press reach the end of the range",
             Self::Unsettled => "still off after the last round; is its circuit another?",
             Self::NotSet => "its board does not set it",
         })
@@ -151,13 +151,13 @@ pub struct Sensor {
     pub id: u32,
     /// The highest reading of its converter.
     pub most: f64,
-    /// The tap that it had at first.
+    /// The wiper that it had at first.
     pub before: u8,
-    /// The tap that it has.
-    pub tap: u8,
+    /// The wiper that it has.
+    pub wiper: u8,
     /// What it read at first, if it was pressed.
     pub first: Option<Look>,
-    /// What it read last, and at which tap.
+    /// What it read last, and at which wiper position.
     looked: Option<(u8, Look)>,
     settable: bool,
     /// Up to so many raw units a way may be noise.
@@ -178,15 +178,15 @@ pub struct Tuning {
 }
 
 impl Tuning {
-    /// Begins with sensors of these ids, highest readings and taps.
+    /// Begins with sensors of these ids, highest readings and wipers.
     #[must_use]
     pub fn new(sensors: &[(u32, f64, u8)]) -> Self {
         let ids: Vec<u32> = sensors.iter().map(|(id, ..)| *id).collect();
-        let sensor = |&(id, most, tap): &(u32, f64, u8)| Sensor {
+        let sensor = |&(id, most, wiper): &(u32, f64, u8)| Sensor {
             id,
             most,
-            before: tap,
-            tap,
+            before: wiper,
+            wiper,
             first: None,
             looked: None,
             settable: true,
@@ -233,13 +233,13 @@ impl Tuning {
         self.sensors.iter().filter(awaited).map(|sensor| sensor.id)
     }
 
-    /// The tap of the sensor number `index` could not be set: it has `tap`, as far as is known.
-    pub fn not_set(&mut self, index: usize, tap: u8) {
+    /// The wiper of the sensor number `index` could not be set: it has `wiper`, as far as is known.
+    pub fn not_set(&mut self, index: usize, wiper: u8) {
         let sensor = &mut self.sensors[index];
-        (sensor.tap, sensor.settable) = (tap, false);
+        (sensor.wiper, sensor.settable) = (wiper, false);
     }
 
-    /// Ends a round: which sensors are to have which taps now. Nothing is left to do where there are none.
+    /// Ends a round: which sensors are to have which wipers now. Nothing is left to do where there are none.
     ///
     /// # Errors
     /// In the first round: nothing was delivered at rest, or nothing pressed.
@@ -252,12 +252,12 @@ impl Tuning {
             for (sensor, found) in self.sensors.iter_mut().zip(&findings.sensors) {
                 let way = found.baseline.zip(found.travel);
                 sensor.first = way.map(|(rest, travel)| Look { rest, press: rest + side * travel });
-                sensor.looked = sensor.first.map(|look| (sensor.tap, look));
+                sensor.looked = sensor.first.map(|look| (sensor.wiper, look));
                 sensor.tuned = if found.baseline.is_none() { Tuned::Silent } else { Tuned::NotPressed };
             }
         }
         let (first, last) = (self.rounds == 1, self.rounds == MAX_ROUNDS);
-        let mut taps = Vec::new();
+        let mut wipers = Vec::new();
         for (index, sensor) in self.sensors.iter_mut().enumerate() {
             let divider = Divider { most: sensor.most, falls: self.falls };
             if !first {
@@ -270,22 +270,22 @@ impl Tuning {
                 }
                 continue;
             };
-            let better = divider.better(look, sensor.tap);
+            let better = divider.better(look, sensor.wiper);
             sensor.tuned = match better {
                 None if divider.headroom(look) < CUT_OFF => Tuned::CutOff,
-                None if divider.share(look) < POOR_SHARE && sensor.tap == 255 => Tuned::Weak,
+                None if divider.share(look) < POOR_SHARE && sensor.wiper == 255 => Tuned::Weak,
                 None => Tuned::Fits,
                 Some(_) if !sensor.settable => Tuned::NotSet,
                 Some(_) => Tuned::Unsettled,
             };
-            if let Some(tap) = better.filter(|_| sensor.settable && !last) {
-                let expected = divider.share(divider.moved(look, sensor.tap, tap)) * divider.most;
+            if let Some(wiper) = better.filter(|_| sensor.settable && !last) {
+                let expected = divider.share(divider.moved(look, sensor.wiper, wiper)) * divider.most;
                 sensor.clear = sensor.noise.max(MIN_EXPECTED_SHARE * expected);
-                (sensor.tap, sensor.tuned) = (tap, Tuned::NotPressedAgain);
-                taps.push((index, tap));
+                (sensor.wiper, sensor.tuned) = (wiper, Tuned::NotPressedAgain);
+                wipers.push((index, wiper));
             }
         }
-        Ok(taps)
+        Ok(wipers)
     }
 
     #[must_use]
@@ -314,13 +314,13 @@ impl Tuning {
 }
 
 impl Sensor {
-    /// What it reads at the tap that it has, if it was pressed since.
+    /// What it reads at the wiper that it has, if it was pressed since.
     #[must_use]
     pub fn last(&self) -> Option<Look> {
-        self.looked.filter(|(tap, _)| *tap == self.tap).map(|(_, look)| look)
+        self.looked.filter(|(wiper, _)| *wiper == self.wiper).map(|(_, look)| look)
     }
 
-    /// Whether it has another tap than when it was looked at last.
+    /// Whether it has another wiper position than when it was looked at last.
     fn moved(&self) -> bool {
         self.first.is_some() && self.last().is_none()
     }
@@ -334,7 +334,7 @@ impl Sensor {
         if self.was_pressed() {
             let (low, high) = (f64::from(self.seen.low), f64::from(self.seen.high));
             let (rest, press) = if falls { (high, low) } else { (low, high) };
-            self.looked = Some((self.tap, Look { rest, press }));
+            self.looked = Some((self.wiper, Look { rest, press }));
         }
     }
 }
@@ -356,19 +356,19 @@ mod tests {
     }
 
     impl Real {
-        fn read(&self, ohm: f64, tap: u8) -> RawValue {
-            let divider_ohm = self.potentiometer_ohm * f64::from(tap) / 256.0 + self.wiper_ohm;
+        fn read(&self, ohm: f64, wiper: u8) -> RawValue {
+            let divider_ohm = self.potentiometer_ohm * f64::from(wiper) / 256.0 + self.wiper_ohm;
             let x = if ohm.is_infinite() { 1.0 } else { ohm / (ohm + divider_ohm) };
             let x = if self.falls { x } else { 1.0 - x };
             RawValue::new((x * (self.most + 1.0)).floor().min(self.most))
         }
 
         /// Tunes it beside a sound sensor, pressed `times` times as softly in each round.
-        fn tune(&self, tap: u8, softer: [f64; MAX_ROUNDS]) -> Tuning {
+        fn tune(&self, wiper: u8, softer: [f64; MAX_ROUNDS]) -> Tuning {
             let other = Real { rest_ohm: f64::INFINITY, press_ohm: 1e3, ..*self };
-            let mut tuning = Tuning::new(&[(4, self.most, tap), (5, self.most, 38)]);
+            let mut tuning = Tuning::new(&[(4, self.most, wiper), (5, self.most, 38)]);
             let frame = |tuning: &Tuning, own: f64, others: f64| {
-                [self.read(own, tuning.sensors()[0].tap), other.read(others, tuning.sensors()[1].tap)]
+                [self.read(own, tuning.sensors()[0].wiper), other.read(others, tuning.sensors()[1].wiper)]
             };
             for _ in 0..50 {
                 let values = frame(&tuning, self.rest_ohm, other.rest_ohm);
@@ -396,19 +396,19 @@ mod tests {
     }
 
     #[test]
-    fn the_best_tap_is_as_by_hand() {
+    fn the_best_wiper_is_as_by_hand() {
         for falls in [true, false] {
             let divider = Divider { most: 1023.0, falls };
             // 1 kΩ under 52 Ω reads 973 (FsrCircuit's own test); turned round, 50.
             let look = if falls { Look { rest: 1023.0, press: 973.0 } } else { Look { rest: 0.0, press: 50.0 } };
             assert!((divider.ohm(look.press, 0) - 1000.0).abs() < 11.0, "half a step is 1 %");
-            // A sixteenth is left where D = 15 R: 15 kΩ is tap 76.5.
+            // A sixteenth is left where D = 15 R: 15 kΩ is wiper 76.5.
             let best = divider.best(look, 0);
             assert!((75..=78).contains(&best), "{best}");
             assert_eq!(divider.better(divider.moved(look, 0, best), best), None, "it is good as it is");
-            // One that is open for all that is done to it uses nothing at any tap.
+            // One that is open for all that is done to it uses nothing at any wiper position.
             assert_eq!(divider.best(Look { press: look.rest, ..look }, 255), 0);
-            // With a rest of 4 kΩ over a press of 1 kΩ the way is longest at √(4 · 1) kΩ = 2 kΩ, tap 10.
+            // With a rest of 4 kΩ over a press of 1 kΩ the way is longest at √(4 · 1) kΩ = 2 kΩ, wiper 10.
             let preloaded = Look { rest: divider.raw(4000.0, 0), press: divider.raw(1000.0, 0) };
             assert!((9..=11).contains(&divider.best(preloaded, 0)), "{}", divider.best(preloaded, 0));
         }
@@ -416,10 +416,10 @@ mod tests {
 
     #[test]
     fn what_cannot_be_tuned_is_told_from_what_fits() {
-        let outcome = |real: Real, tap| {
-            let tuning = real.tune(tap, [1.0; MAX_ROUNDS]);
+        let outcome = |real: Real, wiper| {
+            let tuning = real.tune(wiper, [1.0; MAX_ROUNDS]);
             let (sensor, tuned, _) = tuning.outcomes().next().unwrap();
-            (tuned, sensor.before, sensor.tap)
+            (tuned, sensor.before, sensor.wiper)
         };
         assert_eq!(outcome(paper(), 3).0, Tuned::Fits);
         assert_eq!(outcome(Real { press_ohm: f64::INFINITY, ..paper() }, 3), (Tuned::NotPressed, 3, 3));
@@ -431,12 +431,12 @@ mod tests {
 
     #[test]
     fn a_press_that_was_softer_by_chance_is_not_chased() {
-        // 66 % of the range at first, then 57 % of a softer press: the highest tap would give 5 % more.
+        // 66 % of the range at first, then 57 % of a softer press: the highest wiper position would give 5 % more.
         let (potentiometer_ohm, press_ohm) = (9_897.0, 4_881.0);
         let real = Real { potentiometer_ohm, wiper_ohm: 20.0, press_ohm, ..paper() };
         let tuning = Real { falls: false, ..real }.tune(199, [0.8, 1.206, 0.8, 0.8, 0.8]);
         let (sensor, tuned, [before, now]) = tuning.outcomes().next().unwrap();
-        assert_eq!((tuned, sensor.tap), (Tuned::Fits, 199));
+        assert_eq!((tuned, sensor.wiper), (Tuned::Fits, 199));
         assert!((before.unwrap() - 0.66).abs() < 0.01 && (now.unwrap() - 0.57).abs() < 0.01, "{before:?} {now:?}");
     }
 
@@ -445,7 +445,7 @@ mod tests {
         let mut tuning = Tuning::new(&[(4, 1023.0, 0), (5, 1023.0, 0)]);
         let sensor = paper();
         let both = |tuning: &Tuning, ohm| {
-            let at = |index: usize| sensor.read(ohm, tuning.sensors()[index].tap);
+            let at = |index: usize| sensor.read(ohm, tuning.sensors()[index].wiper);
             [at(0), at(1)]
         };
         (0..9).for_each(|_| tuning.rest(&both(&tuning.clone(), f64::INFINITY)));
@@ -453,30 +453,31 @@ mod tests {
         assert_eq!(tuning.awaited().count(), 2, "nobody has seen them let go");
         (0..9).for_each(|_| tuning.press(&both(&tuning.clone(), f64::INFINITY)));
         assert_eq!(tuning.awaited().count(), 0);
-        let taps = tuning.next_round().unwrap();
-        assert_eq!(taps.len(), 2);
+        let wipers = tuning.next_round().unwrap();
+        assert_eq!(wipers.len(), 2);
         tuning.not_set(1, 0);
         // A light touch in the next round is no firm press.
         (0..9).for_each(|n| tuning.press(&both(&tuning.clone(), if n < 5 { f64::INFINITY } else { 90_000.0 })));
         assert!(tuning.next_round().unwrap().is_empty());
-        let ended: Vec<(Tuned, u8, bool)> = tuning.outcomes().map(|(s, t, _)| (t, s.tap, s.last().is_some())).collect();
-        assert_eq!(ended, [(Tuned::NotPressedAgain, taps[0].1, false), (Tuned::NotSet, 0, true)]);
+        let ended: Vec<(Tuned, u8, bool)> =
+            tuning.outcomes().map(|(s, t, _)| (t, s.wiper, s.last().is_some())).collect();
+        assert_eq!(ended, [(Tuned::NotPressedAgain, wipers[0].1, false), (Tuned::NotSet, 0, true)]);
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(3000))]
 
         #[test]
-        fn forward_undoes_backward(tap: u8, log_ohm in 2.0..16.0_f64, falls: bool) {
+        fn forward_undoes_backward(wiper: u8, log_ohm in 2.0..16.0_f64, falls: bool) {
             let divider = Divider { most: 1023.0, falls };
-            let raw = divider.raw(libm::exp(log_ohm), tap);
+            let raw = divider.raw(libm::exp(log_ohm), wiper);
             prop_assume!((1.0..=1022.0).contains(&raw));
-            prop_assert!((divider.raw(divider.ohm(raw, tap), tap) - raw).abs() < 1e-6);
+            prop_assert!((divider.raw(divider.ohm(raw, wiper), wiper) - raw).abs() < 1e-6);
         }
 
         #[test]
         fn other_circuits_and_other_presses_come_into_range(
-            tap in 4..=255_u8,
+            wiper in 4..=255_u8,
             log_pot in 9.2..11.5_f64,
             wiper_ohm in 20.0..200.0_f64,
             log_press in 5.5..8.5_f64,
@@ -487,11 +488,11 @@ mod tests {
             let most = f64::from((1_u32 << bits) - 1);
             let (potentiometer_ohm, press_ohm) = (libm::exp(log_pot), libm::exp(log_press));
             let real = Real { potentiometer_ohm, wiper_ohm, press_ohm, falls, most, ..paper() };
-            let tuning = real.tune(tap, softer);
+            let tuning = real.tune(wiper, softer);
             let (sensor, tuned, [_, share]) = tuning.outcomes().next().unwrap();
             prop_assert_eq!(tuned, Tuned::Fits, "{:?}", sensor);
-            // From 245 Ω to 5 kΩ, every potentiometer of 10 to 100 kΩ has a tap that uses two thirds or more of the range. A
-            // softer press uses less, and what is not worth another tap is left; a hundredth for the model's other wiper.
+            // From 245 Ω to 5 kΩ, every potentiometer of 10 to 100 kΩ has a wiper position that uses two thirds or more of the range. A
+            // softer press uses less, and what is not worth another wiper is left; a hundredth for the model's other wiper.
             let softest_ohm = press_ohm * softer.into_iter().fold(0.0, f64::max);
             let most_ohm = potentiometer_ohm * 255.0 / 256.0 + wiper_ohm;
             let least = (most_ohm / (most_ohm + softest_ohm) - MIN_GAIN - 0.01).min(0.6);

@@ -171,14 +171,14 @@ impl TrueErrors {
 fn orientation(percept: &Percept, by: OrientationBy) -> Option<f64> {
     match by {
         OrientationBy::AsAsked | OrientationBy::TwoPoints => percept.orientation,
-        OrientationBy::SecondMoments => percept.axis,
-        _ => percept.footprint_angle.or(percept.axis),
+        OrientationBy::SecondMoments => percept.principal_axis,
+        _ => percept.fit_angle.or(percept.principal_axis),
     }
 }
 
 /// Its place, likewise.
 fn place(percept: &Percept, by: OrientationBy) -> Option<DVec2> {
-    let fitted = percept.footprint_place.filter(|_| by.steps().is_some());
+    let fitted = percept.fit_place.filter(|_| by.steps().is_some());
     fitted.or(percept.centroid).map(DVec2::from_array)
 }
 
@@ -232,7 +232,7 @@ impl TrueErrorSamples {
         self.touches += 1;
         let field = got.field;
         let fits = by.steps().is_some();
-        let at = if fits { got.footprint_place.map(DVec2::from_array) } else { place(got, by) };
+        let at = if fits { got.fit_place.map(DVec2::from_array) } else { place(got, by) };
         let Some(at) = at else { return };
         self.given += 1;
         let right = truth.angle.zip(truth.uv);
@@ -242,7 +242,7 @@ impl TrueErrorSamples {
             Some(along) => self.across.extend(off.map(|off| 1e3 * off.reject_from_normalized(along).length())),
             None => self.round.extend(off.map(|off| 1e3 * off.length())),
         }
-        let angle = if fits { got.footprint_angle } else { orientation(got, by) };
+        let angle = if fits { got.fit_angle } else { orientation(got, by) };
         let got = angle.and_then(|angle| geometry.direction(field, at, angle));
         self.orientation.extend(got.zip(right).map(|(a, b)| between(a, b)));
     }

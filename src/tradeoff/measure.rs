@@ -108,10 +108,8 @@ pub fn measure(
     for charts in Charts::ALL.iter().filter(|charts| geometries.contains_key(charts.word()) && !another(**charts)) {
         report.left_out.push(format!("charts {charts}: they are the layout's own"));
     }
-    if options.scene.outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) && !has_skin(options) {
-        report
-            .left_out
-            .push("footprints: no calibration says what the layer is; add [skin] with sigma_m to it".to_owned());
+    if options.scene.outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) && !has_layer(options) {
+        report.left_out.push("fits: no calibration says what the layer is; add [layer] with sigma_m to it".to_owned());
     }
     const PROGRESS_BUILT: f64 = 0.1;
     const PROGRESS_COMPARED: f64 = 0.3;
@@ -120,7 +118,7 @@ pub fn measure(
         .ways
         .iter()
         .flat_map(|&way| {
-            Combination::all(&options.scene, way, &measure_options.backends, has_skin(options))
+            Combination::all(&options.scene, way, &measure_options.backends, has_layer(options))
                 .into_iter()
                 .map(move |one| (way, one))
         })
@@ -191,15 +189,15 @@ pub fn measure(
 }
 
 /// Whether contacts can be fitted.
-fn has_skin(options: &Options) -> bool {
-    options.calibration.as_ref().is_some_and(|calibration| calibration.skin.is_some())
+fn has_layer(options: &Options) -> bool {
+    options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some())
 }
 
 /// The method of orientation that `scene` requests.
 fn asked_by(scene: &Scene) -> OrientationBy {
     match scene.knobs.orientation_by {
         OrientationBy::AsAsked if scene.outputs.contains(Outputs::ORIENTATION) => OrientationBy::TwoPoints,
-        OrientationBy::AsAsked if scene.outputs.contains(Outputs::AXIS) => OrientationBy::SecondMoments,
+        OrientationBy::AsAsked if scene.outputs.contains(Outputs::PRINCIPAL_AXIS) => OrientationBy::SecondMoments,
         given => given,
     }
 }
@@ -231,8 +229,8 @@ struct ReferencePercepts {
 
 impl ReferencePercepts {
     fn new(body: &Body, options: &Options, played: &TestFrames) -> Result<Self> {
-        let fitted = if has_skin(options) { Outputs::FOOTPRINT } else { Outputs::empty() };
-        let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS | fitted;
+        let fitted = if has_layer(options) { Outputs::FIT } else { Outputs::empty() };
+        let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS | fitted;
         let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
         let mut engine = Engine::new(body, options)?;
@@ -326,7 +324,7 @@ impl Trial {
             centroid_mm: Errors::of(&mut errors.centroid),
             orientation_deg: Errors::of(&mut errors.orientation),
             truth: self.truth.map(|(all, _)| all),
-            truth_with_footprint: self.truth.and_then(|(_, with_footprint)| with_footprint),
+            truth_with_fit: self.truth.and_then(|(_, with_fit)| with_fit),
             front: false,
         }
     }
@@ -368,7 +366,7 @@ mod tests {
         assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.last() == Some(&1.0));
         // The hand's own charts are planes.
         let of_way = |&way: &CallMode| {
-            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu], has_skin(&options));
+            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu], has_layer(&options));
             all.iter().filter(|combination| combination.knobs.charts != Charts::Plane).count()
         };
         let expected: usize = CallMode::ALL.iter().map(of_way).sum();
@@ -403,20 +401,20 @@ mod tests {
         let by = |by: OrientationBy| {
             *rungs.iter().find(|row| row.words.orientation_by == by.word()).expect("every method is a rung")
         };
-        let [moments, footprint] = [OrientationBy::SecondMoments, OrientationBy::Footprint].map(by);
+        let [moments, fit] = [OrientationBy::SecondMoments, OrientationBy::Fit].map(by);
         // Moments say something of every touch, a fit only of what it explains.
         assert_eq!(moments.truth.unwrap().given, 1.0);
-        assert!((0.1..0.5).contains(&footprint.truth.unwrap().given), "{:?}", footprint.truth);
+        assert!((0.1..0.5).contains(&fit.truth.unwrap().given), "{:?}", fit.truth);
         assert_eq!(
-            footprint.truth,
-            footprint.truth_with_footprint.map(|of| crate::tradeoff::TrueErrors {
-                touches: footprint.truth.unwrap().touches,
-                given: footprint.truth.unwrap().given,
+            fit.truth,
+            fit.truth_with_fit.map(|of| crate::tradeoff::TrueErrors {
+                touches: fit.truth.unwrap().touches,
+                given: fit.truth.unwrap().given,
                 ..of
             })
         );
         // On the same touches, truer by half and more.
-        let [moments, fit] = [moments, footprint].map(|row| row.truth_with_footprint.unwrap());
+        let [moments, fit] = [moments, fit].map(|row| row.truth_with_fit.unwrap());
         assert!(2.0 * fit.orientation_deg.median < moments.orientation_deg.median, "{fit:?} {moments:?}");
         assert!(2.0 * fit.round_mm.median < moments.round_mm.median, "{fit:?} {moments:?}");
         // Negative control: a truth that is 3 mm elsewhere.

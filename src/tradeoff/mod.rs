@@ -94,9 +94,9 @@ impl Combination {
     }
 
     /// The combinations for `scene`, called `way`, on `backends`; knobs that `scene` sets stay fixed. Contacts are fitted where
-    /// the calibration `has_skin`, on the CPU, once: no other knob changes what they are.
+    /// the calibration `has_layer`, on the CPU, once: no other knob changes what they are.
     #[must_use]
-    pub fn all(scene: &Scene, way: CallMode, backends: &[BackendKind], has_skin: bool) -> Vec<Self> {
+    pub fn all(scene: &Scene, way: CallMode, backends: &[BackendKind], has_layer: bool) -> Vec<Self> {
         let given = scene.knobs;
         let usual = Knobs::default();
         let live = way == CallMode::Live;
@@ -104,10 +104,10 @@ impl Combination {
             if given == usual { all.to_vec() } else { vec![given] }
         }
         let charts_to_try = some(given.charts, usual.charts, Charts::ALL);
-        let orients = scene.outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS);
-        // From moments up; without a scene that knows its skin there is nothing to fit under.
+        let orients = scene.outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS);
+        // From moments up; without a scene that knows its layer there is nothing to fit under.
         let ways: Vec<OrientationBy> = match orients {
-            true => OrientationBy::ALL[1..].iter().copied().filter(|way| has_skin || way.steps().is_none()).collect(),
+            true => OrientationBy::ALL[1..].iter().copied().filter(|way| has_layer || way.steps().is_none()).collect(),
             false => vec![OrientationBy::AsAsked],
         };
         let ways = some(given.orientation_by, usual.orientation_by, &ways);
@@ -198,8 +198,8 @@ pub struct Measurement {
     pub orientation_deg: Errors,
     /// Errors against the truth, if known.
     pub truth: Option<TrueErrors>,
-    /// The same of those touches of which all steps of a fit find a footprint.
-    pub truth_with_footprint: Option<TrueErrors>,
+    /// The same of those touches that all steps together can fit.
+    pub truth_with_fit: Option<TrueErrors>,
     /// Whether it is on the Pareto front of its way: no other is faster and at least as accurate.
     pub front: bool,
 }
@@ -340,7 +340,7 @@ mod tests {
             centroid_mm: errors(centroid),
             orientation_deg: errors(orientation),
             truth: None,
-            truth_with_footprint: None,
+            truth_with_fit: None,
             front: false,
         }
     }

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::field::FieldSet;
 use crate::percept::Outputs;
 use crate::scene::{Knobs, Plan, PlanField, Scene};
-use crate::signal::{Calibration, Frame, Letter, SkinResponse};
+use crate::signal::{Calibration, Frame, LayerResponse, Letter};
 use crate::source::{SimulatedSource, Source as _};
 
 /// σ of the layer that is assumed where no calibration knows it, m: that of 7 mm of silicone.
@@ -83,9 +83,9 @@ impl SimulatedTouches {
         if fields.is_empty() {
             return Err(Error::failed("no field with a chart could be touched").at(&body.name));
         }
-        let known = options.calibration.as_ref().and_then(|calibration| calibration.skin);
-        let SkinResponse { sigma_m, gain_spread } =
-            known.unwrap_or(SkinResponse { sigma_m: SIGMA_M, gain_spread: SkinResponse::GAIN_SPREAD });
+        let known = options.calibration.as_ref().and_then(|calibration| calibration.layer);
+        let LayerResponse { sigma_m, gain_spread } =
+            known.unwrap_or(LayerResponse { sigma_m: SIGMA_M, gain_spread: LayerResponse::GAIN_SPREAD });
         let sensors = Sensors::new(body, options, sigma_m, gain_spread);
         let touches = touches(&fields, most.div_ceil(2));
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
@@ -94,7 +94,7 @@ impl SimulatedTouches {
         let thickness_m = sigma_m * 3.0_f64.sqrt();
         for layer in ["", "kernel = \"boussinesq\"\n"] {
             let text = format!(
-                "rate_hz = {RATE_HZ}\nduration_s = {}\nseed = {SEED}\n\n[skin]\nthickness_m = {thickness_m}\n{layer}\n{}\n{touches}",
+                "rate_hz = {RATE_HZ}\nduration_s = {}\nseed = {SEED}\n\n[layer]\nthickness_m = {thickness_m}\n{layer}\n{}\n{touches}",
                 (most.div_ceil(2) + 1) as f64 / RATE_HZ,
                 sensors.keys,
             );
@@ -118,7 +118,7 @@ impl SimulatedTouches {
         }
         let from = if known.is_some() { "the calibration's" } else { "assumed" };
         let description = format!(
-            "{count} touches simulated on it by fingertips, balls, stamps, rods and edges, half of them through a layer that footprints \
+            "{count} touches simulated on it by fingertips, balls, stamps, rods and edges, half of them through a layer that fits \
              do not know; layer σ {:.2} mm ({from}), gains ±{:.0} %, {}",
             sigma_m * 1e3,
             gain_spread * 100.0,
@@ -127,7 +127,7 @@ impl SimulatedTouches {
         let mut calibration: Calibration = calibration.unwrap_or_default();
         if options.calibration.is_some() && known.is_none() {
             // Percepts are not better here than they could be with the robot's own.
-            calibration.skin = None;
+            calibration.layer = None;
         }
         Ok(Self { frames, calibration, description })
     }
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn touches_are_under_the_layer_that_the_calibration_knows() {
         let body = hand();
-        let skin = Some(SkinResponse { sigma_m: 2e-3, gain_spread: 0.02 });
+        let layer = Some(LayerResponse { sigma_m: 2e-3, gain_spread: 0.02 });
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let noisy = Calibration::parse("[all]\nnoise = 5\np_max = 500\n", &ids).unwrap();
         let on = |calibration: Option<Calibration>| {
@@ -261,12 +261,12 @@ mod tests {
         assert!(
             assumed.description.contains("layer σ 4.04 mm (assumed), gains ±5 %, noise 1.0 ‰ of the range (assumed)")
         );
-        assert_eq!(assumed.calibration.skin.unwrap().gain_spread, SkinResponse::GAIN_SPREAD);
-        // Without a layer in the calibration footprints are no better here than they would be on the robot: absent.
-        assert_eq!(on(Some(noisy.clone())).calibration.skin, None);
-        let known = on(Some(Calibration { skin, ..noisy }));
+        assert_eq!(assumed.calibration.layer.unwrap().gain_spread, LayerResponse::GAIN_SPREAD);
+        // Without a layer in the calibration fits are no better here than they would be on the robot: absent.
+        assert_eq!(on(Some(noisy.clone())).calibration.layer, None);
+        let known = on(Some(Calibration { layer, ..noisy }));
         assert!(known.description.contains("layer σ 2.00 mm (the calibration's), gains ±2 %, noise 10.0 ‰"));
-        let sigma_m = known.calibration.skin.unwrap().sigma_m;
+        let sigma_m = known.calibration.layer.unwrap().sigma_m;
         assert!((sigma_m - 2e-3).abs() < 1e-12, "{sigma_m}");
         // The same touches whenever they are asked for.
         let values = |touches: &SimulatedTouches| format!("{:?}", touches.frames.frames);

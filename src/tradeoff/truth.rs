@@ -17,7 +17,7 @@ use crate::source::Truth;
 /// Frames a call.
 const BATCH: usize = 256;
 
-/// Errors against the truth, of all touches, and of those that have a footprint.
+/// Errors against the truth, of all touches, and of those that have a fit.
 pub(super) type OfTouches = (TrueErrors, Option<TrueErrors>);
 
 /// Frames, and per frame the fields with a single touch, and its truth.
@@ -28,8 +28,8 @@ pub(super) struct Truths<'a> {
     truth: Vec<Vec<(usize, &'a Truth)>>,
     /// What the touches are, in words; empty where they are the source's own.
     pub(super) description: String,
-    /// The (frame, field) of the touches that have a footprint; `None` where nothing can be fitted.
-    with_footprint: Option<BTreeSet<(usize, usize)>>,
+    /// The (frame, field) of the touches that have a fit; `None` where nothing can be fitted.
+    with_fit: Option<BTreeSet<(usize, usize)>>,
     /// What has been computed: coverage, cadence and calls change no percept of them.
     known: BTreeMap<String, OfTouches>,
 }
@@ -69,17 +69,17 @@ impl<'a> Truths<'a> {
             (None, None) => return Ok(None),
         };
         let known = BTreeMap::new();
-        let mut truths = Self { body, options, frames, truth, description, with_footprint: None, known };
-        if truths.options.calibration.as_ref().is_some_and(|calibration| calibration.skin.is_some()) {
-            let mut with_footprint = BTreeSet::new();
-            let scene = Scene { outputs: Outputs::FOOTPRINT, ..truths.scene(Knobs::default()) };
+        let mut truths = Self { body, options, frames, truth, description, with_fit: None, known };
+        if truths.options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some()) {
+            let mut with_fit = BTreeSet::new();
+            let scene = Scene { outputs: Outputs::FIT, ..truths.scene(Knobs::default()) };
             let recharted = &charted[Charts::AsAuthored.word()];
             truths.each(BackendKind::Cpu, scene, recharted, &mut |frame, percept, _| {
-                if percept.footprint_place.is_some() {
-                    with_footprint.insert((frame, percept.field));
+                if percept.fit_place.is_some() {
+                    with_fit.insert((frame, percept.field));
                 }
             })?;
-            truths.with_footprint = Some(with_footprint);
+            truths.with_fit = Some(with_fit);
         }
         Ok(Some(truths))
     }
@@ -103,11 +103,11 @@ impl<'a> Truths<'a> {
         let [mut all, mut fitted] = [(); 2].map(|()| TrueErrorSamples::default());
         self.each(backend, self.scene(knobs), recharted, &mut |frame, percept, truth| {
             all.add(geometry, authored, percept, truth, by);
-            if self.with_footprint.as_ref().is_some_and(|with| with.contains(&(frame, percept.field))) {
+            if self.with_fit.as_ref().is_some_and(|with| with.contains(&(frame, percept.field))) {
                 fitted.add(geometry, authored, percept, truth, by);
             }
         })?;
-        let fitted = self.with_footprint.is_some().then(|| TrueErrors::of(&mut fitted));
+        let fitted = self.with_fit.is_some().then(|| TrueErrors::of(&mut fitted));
         let errors = (TrueErrors::of(&mut all), fitted);
         self.known.insert(key, errors);
         Ok(errors)
@@ -115,7 +115,7 @@ impl<'a> Truths<'a> {
 
     /// The scene in which percepts are held against the truth.
     fn scene(&self, knobs: Knobs) -> Scene {
-        let outputs = self.options.scene.outputs & (Outputs::ORIENTATION | Outputs::AXIS) | Outputs::CENTROID;
+        let outputs = self.options.scene.outputs & (Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) | Outputs::CENTROID;
         Scene { knobs, outputs, letters: vec![Letter::default()], ..self.options.scene.clone() }
     }
 

@@ -297,7 +297,7 @@ fn command(packet: &[u8]) -> Option<Event<'_>> {
     let command = match (head[1], body) {
         (kind::IDENTIFY, []) => Command::Identify,
         (kind::RATE, &[a, b, c, d]) => Command::Rate { rate_mhz: u32::from_le_bytes([a, b, c, d]) },
-        (kind::TAP, &[a, b, tap]) => Command::Tap { channel: u16::from_le_bytes([a, b]), tap },
+        (kind::WIPER, &[a, b, wiper]) => Command::Wiper { channel: u16::from_le_bytes([a, b]), wiper },
         (kind::START, []) => Command::Start,
         (kind::STOP, []) => Command::Stop,
         _ => return None,

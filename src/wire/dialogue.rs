@@ -29,7 +29,7 @@ impl Default for RetryPolicy {
 pub enum Outcome {
     /// The board did it.
     Done {
-        /// The value that is set now: the rate in mHz, the tap, or 0.
+        /// The value that is set now: the rate in mHz, the wiper, or 0.
         value: u32,
     },
     /// The board refused.

@@ -76,9 +76,9 @@ pub fn command(to: &mut [u8], board: u16, request: u8, command: Command) -> Opti
         packet.put(&[request])?;
         match command {
             Command::Rate { rate_mhz } => packet.put(&rate_mhz.to_le_bytes()),
-            Command::Tap { channel, tap } => {
+            Command::Wiper { channel, wiper } => {
                 packet.put(&channel.to_le_bytes())?;
-                packet.put(&[tap])
+                packet.put(&[wiper])
             }
             Command::Identify | Command::Start | Command::Stop => Some(()),
         }

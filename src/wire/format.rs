@@ -34,7 +34,7 @@ pub(super) mod kind {
     pub(crate) const ANSWER: u8 = 0x04;
     pub(crate) const IDENTIFY: u8 = 0x10;
     pub(crate) const RATE: u8 = 0x11;
-    pub(crate) const TAP: u8 = 0x12;
+    pub(crate) const WIPER: u8 = 0x12;
     pub(crate) const START: u8 = 0x13;
     pub(crate) const STOP: u8 = 0x14;
 }
@@ -133,11 +133,11 @@ pub enum Command {
         rate_mhz: u32,
     },
     /// Set a channel's potentiometer.
-    Tap {
+    Wiper {
         /// From 0.
         channel: u16,
-        /// The tap.
-        tap: u8,
+        /// The wiper.
+        wiper: u8,
     },
     /// Send frames.
     Start,
@@ -152,7 +152,7 @@ impl Command {
         match self {
             Self::Identify => kind::IDENTIFY,
             Self::Rate { .. } => kind::RATE,
-            Self::Tap { .. } => kind::TAP,
+            Self::Wiper { .. } => kind::WIPER,
             Self::Start => kind::START,
             Self::Stop => kind::STOP,
         }
@@ -168,7 +168,7 @@ pub struct Answer {
     pub command: u8,
     /// Whether it was done.
     pub status: Status,
-    /// What is set now: the rate in thousandths of a hertz, the tap; else 0.
+    /// What is set now: the rate in thousandths of a hertz, the wiper; else 0.
     pub value: u32,
 }
 

@@ -78,7 +78,8 @@ fn table(folder: &Path, name: &str, of_right: impl Fn(usize) -> Option<usize>) -
 fn our_own_bag_of_two_links_is_the_run_that_made_it() {
     let (folder, body) = gripper();
     let (touch, states) = (example("gripper-touch.csv"), example("gripper-joints.csv"));
-    let outputs = ["--outputs", "total,peak,area,position,normal,orientation,speed,speed_in_world,touches,contacts"];
+    let outputs =
+        ["--outputs", "total,peak,area,position,normal,orientation,speed,speed_in_world,touches,self_contacts"];
     for delay in ["0", "0.03"] {
         let bag = folder.path().join(format!("bag{delay}"));
         let sink = format!("ros2-mcap:{}", text_of(&bag));
@@ -87,7 +88,9 @@ fn our_own_bag_of_two_links_is_the_run_that_made_it() {
         let told = ["--joint-states", states.as_str(), "--joints-delay", delay, "--sink", sink.as_str()];
         let first = done(&with(&run_of(&body, &touch), &[&joints[..], &told, &outputs].concat()));
         assert!(
-            first.contains("\"link\":\"world\"") && first.contains("\"contacts\":[{") && first.lines().count() == 101
+            first.contains("\"link\":\"world\"")
+                && first.contains("\"self_contacts\":[{")
+                && first.lines().count() == 101
         );
         // The bag has the positions that the joints had at the frames' times.
         let again = output(&with(&run_of(&body, &sink), &[&joints[..], &outputs].concat()));

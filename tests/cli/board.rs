@@ -106,12 +106,12 @@ fn a_board_says_who_it_is_obeys_and_sends_what_it_plays() {
     let mut decoder = Decoder::new();
     assert_eq!(ask(&mut port, &mut decoder, Command::Identify), Outcome::Done { value: 0 });
     assert_eq!(
-        ask(&mut port, &mut decoder, Command::Tap { channel: 40, tap: 9 }),
+        ask(&mut port, &mut decoder, Command::Wiper { channel: 40, wiper: 9 }),
         Outcome::Refused(Status::Bad),
         "there are channels 0 to 39"
     );
-    assert_eq!(ask(&mut port, &mut decoder, Command::Tap { channel: 3, tap: 9 }), Outcome::Done { value: 9 });
-    assert_eq!(ask(&mut port, &mut decoder, Command::Tap { channel: 3, tap: 38 }), Outcome::Done { value: 38 });
+    assert_eq!(ask(&mut port, &mut decoder, Command::Wiper { channel: 3, wiper: 9 }), Outcome::Done { value: 9 });
+    assert_eq!(ask(&mut port, &mut decoder, Command::Wiper { channel: 3, wiper: 38 }), Outcome::Done { value: 38 });
     assert_eq!(ask(&mut port, &mut decoder, Command::Start), Outcome::Done { value: 0 });
     let rows: Vec<Vec<u16>> = include_str!("../../bodies/touch.csv")
         .lines()

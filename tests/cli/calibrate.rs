@@ -142,15 +142,15 @@ fn gains_from_a_wandering_finger_are_written_into_the_calibration() {
     let (grid, touches, first, second) = (at("grid.glb"), at("t.csv"), at("t.calibration.toml"), at("skin.toml"));
     done(&["author", "--grid", "13x13", "--pitch", "5mm", "-o", &grid]);
     done(&["simulate", &at("finger.toml"), "-o", &touches]);
-    let calibrate = ["calibrate", "--body", &grid, "--skin", &touches, "--calibration", &first];
+    let calibrate = ["calibrate", "--body", &grid, "--gains-from", &touches, "--calibration", &first];
     let told = done(&[&calibrate[..], &["-o", &second]].concat());
     assert!(told.contains("of 145 of 169 taxels; they differ by 20") && told.contains("pressed too seldom"), "{told}");
     let written = std::fs::read_to_string(&second).unwrap();
-    assert!(written.contains("[taxel.162]\ngain = ") && written.contains("[skin]\nsigma_m = 0.0035"), "{written}");
-    // It is what `run` takes, and footprints come of it.
-    let run = ["run", "--body", &grid, "--source", &touches, "--calibration", &second, "--outputs", "footprint_place"];
+    assert!(written.contains("[taxel.162]\ngain = ") && written.contains("[layer]\nsigma_m = 0.0035"), "{written}");
+    // It is what `run` takes, and fits come of it.
+    let run = ["run", "--body", &grid, "--source", &touches, "--calibration", &second, "--outputs", "fit_place"];
     let lines = done(&run);
-    assert!(lines.matches("footprint_place").count() > 2000, "{}", lines.lines().next().unwrap());
+    assert!(lines.matches("fit_place").count() > 2000, "{}", lines.lines().next().unwrap());
     std::fs::write(at("one.csv"), "t,84\n0,5\n").unwrap();
     let (one, no) = (at("one.csv"), at("no"));
     let too_few = fails(1, &[&calibrate[..4], &[&one], &calibrate[5..], &["-o", &no]].concat());

@@ -52,11 +52,11 @@ fn a_source_for_another_body_is_said_once() {
 #[test]
 fn what_needs_poses_says_that_no_frame_has_any() {
     let said_of = |more: &[&str]| said(&[&["--body", "hand", "--source", TOUCH][..], more].concat());
-    let text = said_of(&["--outputs", "contacts,speed_in_world"]);
+    let text = said_of(&["--outputs", "self_contacts,speed_in_world"]);
     let about =
-        "touch.csv: no frame says where links are, as contacts, speed_in_world needs; give the robot's --joints";
+        "touch.csv: no frame says where links are, as self_contacts, speed_in_world needs; give the robot's --joints";
     assert!(text.contains(about) && text.lines().count() == 1, "{text}");
-    assert!(said_of(&["--in", "thumb"]).contains("as --in needs; "));
+    assert!(said_of(&["--relative-to", "thumb"]).contains("as --relative-to needs; "));
     assert_eq!(said_of(&["--outputs", "position"]), "");
     // Joints that are late are told of elsewhere.
     let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
@@ -65,7 +65,7 @@ fn what_needs_poses_says_that_no_frame_has_any() {
     let folder = tempfile::tempdir().unwrap();
     let arm = folder.path().join("arm.glb");
     done(&["author", "--urdf-skin", &urdf, "-o", text_of(&arm)]);
-    let of_arm = ["--body", text_of(&arm), "--source", &touch, "--outputs", "contacts"];
+    let of_arm = ["--body", text_of(&arm), "--source", &touch, "--outputs", "self_contacts"];
     assert!(said(&of_arm).contains("no frame says where links are"));
     let posed = [&of_arm[..], &["--joints", &urdf, "--joint-states", &states, "--up", "z"]].concat();
     assert!(!said(&posed).contains("no frame says where links are"));

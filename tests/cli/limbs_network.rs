@@ -15,7 +15,7 @@ use tempfile::TempDir;
 use super::{code_of, somatic};
 
 /// Outputs that one frame alone decides, so that they are the same whatever frames came before.
-pub const OUTPUTS: &str = "total,peak,active,area,centroid,orientation,axis";
+pub const OUTPUTS: &str = "total,peak,active,area,centroid,orientation,principal_axis";
 /// Fields of the hand that share no taxel, each a limb of its own.
 pub const LIMBS: [&str; 4] = ["hand/midhand/thumb", "hand/midhand/index", "hand/midhand/middle", "hand/midhand/ring"];
 pub const PERIOD: Duration = Duration::from_millis(20);

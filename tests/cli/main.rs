@@ -11,7 +11,6 @@ mod blocked_networks;
 mod board;
 mod browser;
 mod calibrate;
-mod contacts;
 mod devices;
 mod doubts;
 mod exports;
@@ -38,6 +37,7 @@ mod paper;
 mod plan;
 mod plot;
 mod python;
+mod self_contacts;
 // The library's own numbers that look like chance.
 #[path = "../../src/author/random.rs"]
 mod random;

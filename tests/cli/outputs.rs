@@ -134,7 +134,7 @@ const WRITTEN: &[Written] = &[
     },
     Written {
         flag: "--output",
-        command: "calibrate --body hand.glb --skin touch.csv --calibration cal.toml --output OUT",
+        command: "calibrate --body hand.glb --gains-from touch.csv --calibration cal.toml --output OUT",
         ending: "",
         reads: &["hand.glb", "touch.csv", "cal.toml"],
     },
@@ -358,7 +358,7 @@ fn keys_of_a_scene_are_held_to_the_same() {
         let scene = folder.path().join("scene.toml");
         let text = std::fs::read_to_string(&scene).unwrap();
         for force in [false, true] {
-            std::fs::write(&scene, format!("sink = \"ndjson:inner/../{input}\"\nforce = {force}\n{text}")).unwrap();
+            std::fs::write(&scene, format!("sink = \"ndjson:inner/../{input}\"\noverwrite = {force}\n{text}")).unwrap();
             let elsewhere = tempfile::tempdir().unwrap();
             let before = all_in(folder.path());
             let why = refused(elsewhere.path(), 2, &["run".to_owned(), text_of(&scene).to_owned()], &[]);
@@ -474,7 +474,7 @@ const READ: &[&str] = &[
     "--icub",
     "--package",
     "--urdf-skin",
-    "--skin",
+    "--gains-from",
     "--mjcf-skin",
     "--csv-skin",
     "--layout",
@@ -527,8 +527,8 @@ const NO_FILES: &[&str] = &[
     "SIGNAL,...",
     "T",
     "TABLE",
-    "TAP",
-    "TAPS",
+    "WIPER",
+    "WIPERS",
     "TIME",
     "UNIT",
     "VIEW",

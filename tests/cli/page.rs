@@ -385,8 +385,8 @@ fn a_viewer_that_never_reads_holds_nobody_up() {
 fn a_taxel_that_is_left_out_is_an_event() {
     let rows: String = (0..400).map(|n| format!("{},{},\n", f64::from(n) * 0.01, n % 7)).collect();
     let (_folder, recording) = super::file("a.csv", &format!("t,4,5\n{rows}"));
-    let calibration = recording.with_file_name("upkeep.toml");
-    std::fs::write(&calibration, "[upkeep]\ncadence_s = 0.2\ndead_s = 0.5\n").unwrap();
+    let calibration = recording.with_file_name("drift.toml");
+    std::fs::write(&calibration, "[drift]\ncadence_s = 0.2\ndead_s = 0.5\n").unwrap();
     let mut run = Run::of(&[
         "run",
         "--quiet",

@@ -57,7 +57,7 @@ fn it_writes_the_figures_and_what_the_docs_say() {
     assert_eq!(rods.len(), 72);
     for row in rods {
         let ([rms, worst, low, high], [axis, axis_worst, ..]) =
-            (errors(row, "two_points_deg"), errors(row, "axis_deg"));
+            (errors(row, "two_points_deg"), errors(row, "principal_axis_deg"));
         assert!(rms <= worst && rms < 20.0 && axis <= axis_worst && axis < 10.0, "{row}");
         // Some seeds are kinder than others, and all of them together are in between.
         assert!(low <= rms && rms <= high && row["frames"] == 30 * 40, "{row}");

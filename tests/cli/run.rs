@@ -78,7 +78,7 @@ fn without_arguments_the_bundled_touch_comes_out_as_lines_of_json() {
         "position",
         "normal",
         "orientation",
-        "axis",
+        "principal_axis",
         "anisotropy",
         "flags",
     ] {
@@ -101,8 +101,8 @@ fn fields_and_outputs_are_those_asked_for() {
 
     let one = done(&[&run[..], &["--outputs", "centroid"]].concat());
     assert!(one.contains("centroid") && !one.contains("total") && !one.contains("position"));
-    let two = done(&[&run[..], &["--outputs", "total,axis"]].concat());
-    assert!(two.contains("total") && two.contains("axis") && !two.contains("centroid"));
+    let two = done(&[&run[..], &["--outputs", "total,principal_axis"]].concat());
+    assert!(two.contains("total") && two.contains("principal_axis") && !two.contains("centroid"));
 }
 
 #[test]
@@ -330,7 +330,7 @@ fn calibration_and_age_reach_the_percepts() {
 
 #[test]
 fn the_circuits_signal_is_chosen_for_a_run() {
-    let text = "[all]\nsensor = \"fsr\"\nsignal = \"linear\"\ntap = 60\n";
+    let text = "[all]\nsensor = \"fsr\"\nsignal = \"linear\"\nwiper = 60\n";
     let (_folder, calibration) = file("robot.toml", text);
     let (_other, path) = file("touch.csv", "t,4\n0,1023\n0.1,600\n0.2,0\n");
     let run = ["run", "--backend", "cpu", "--all-fields", "--fields", "hand/palm", "--source", text_of(&path)];
@@ -338,7 +338,7 @@ fn the_circuits_signal_is_chosen_for_a_run() {
         let arguments = [&run[..], &["--calibration", text_of(&calibration)], more].concat();
         frames(&done(&arguments)).iter().map(|frame| frame["fields"][0]["total"].as_f64().unwrap()).collect()
     };
-    let sensor = somatic::signal::FsrCircuit { tap: 60 };
+    let sensor = somatic::signal::FsrCircuit { wiper: 60 };
     let [raw, linear] = [sensor.logarithmic(600), sensor.linearised(600, 10.0)].map(|p| f64::from(p as f32));
     let near = |totals: Vec<f64>, p: f64| {
         assert_eq!((totals[0], totals[2]), (0.0, 1000.0));

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::{done, fails, files_in, frames, output, somatic, stderr, text_of};
 
-const ALL: &str = "total,peak,active,area,centroid,position,normal,orientation,axis,anisotropy,displacement,direction,distance,radial_distance,speed,radial_speed,filtered_displacement,filtered_direction,filtered_speed,touches";
+const ALL: &str = "total,peak,active,area,centroid,position,normal,orientation,principal_axis,anisotropy,displacement,direction,distance,radial_distance,speed,radial_speed,filtered_displacement,filtered_direction,filtered_speed,touches";
 
 /// A table of CSV: the titles, and its rows.
 fn table(path: &Path) -> (Vec<String>, Vec<Vec<String>>) {
@@ -53,8 +53,8 @@ fn same(got: &str, wanted: &str, title: &str) {
 fn a_row_is_a_field_of_a_line_of_ndjson() {
     // The bundled touch, and one under a known layer with what was fitted to it.
     let rod = ["--source", "sim:examples/simulations/turn.toml", "--fields", "hand/back"];
-    let fitted = "footprint_kind,footprint_place,footprint_force,footprint_angle,footprint_width,footprint_length,\
-                  footprint_place_sigma,footprint_angle_sigma,footprint_width_sigma,footprint_length_sigma,touches,total";
+    let fitted = "fit_kind,fit_place,fit_force,fit_angle,fit_width,fit_length,\
+                  fit_place_sigma,fit_angle_sigma,fit_width_sigma,fit_length_sigma,touches,total";
     for (backend, source, outputs, least) in
         [("cpu", &[][..], ALL, 10_000), ("reference", &[], ALL, 10_000), ("cpu", &rod, fitted, 1500)]
     {
@@ -71,8 +71,8 @@ fn a_row_is_a_field_of_a_line_of_ndjson() {
         let is_usual = has(&titles, "centroid_u [m]") && has(&titles, "total [count]");
         assert!(is_usual || outputs == fitted, "{titles:?}");
         let (touch_titles, touch_rows) = table(&at("a.touches.csv"));
-        // Of one touch alone the field has its footprint.
-        assert_eq!(has(&touch_titles, "footprint_angle [rad]"), outputs == fitted, "{touch_titles:?}");
+        // Of one touch alone the field has its fit.
+        assert_eq!(has(&touch_titles, "fit_angle [rad]"), outputs == fitted, "{touch_titles:?}");
         let (mut rows, mut touch_rows) = (rows.into_iter(), touch_rows.into_iter());
         let mut compared = 0;
         for line in &lines {

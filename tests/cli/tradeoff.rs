@@ -49,9 +49,7 @@ fn a_simulation_is_held_against_its_truth_and_drawn() {
     let ways = |way: &str| rows.iter().filter(|row| row["orientation_by"] == way).count();
     assert_eq!(ways("two-points"), ways("second-moments"));
     let svg = std::fs::read_to_string(plot).unwrap();
-    assert!(
-        svg.contains("from the truth") && svg.contains("footprint-2") && svg.matches("<circle").count() > 2 * 2 * 5
-    );
+    assert!(svg.contains("from the truth") && svg.contains("fit-2") && svg.matches("<circle").count() > 2 * 2 * 5);
 }
 
 #[test]
@@ -86,20 +84,18 @@ fn a_body_alone_is_measured_on_touches_that_are_simulated_on_it() {
     let asked = ["tradeoff", "--fields", "hand/back", "--backend", "cpu"];
     let brief = ["--seconds", "0.2", "--frames", "200"];
     let (out, _) = done(folder.path(), &[&asked[..], &brief].concat());
-    for said in
-        ["from the truth: 2", "touches simulated on it", "that have a footprint", "footprint-1", "second-moments"]
-    {
+    for said in ["from the truth: 2", "touches simulated on it", "that have a fit", "fit-1", "second-moments"] {
         assert!(out.contains(said), "{said}: {out}");
     }
     // What only a fit reaches, and what a fit is too slow for.
     let pick = |target: &[&str]| done(folder.path(), &[&asked[..], &brief, target].concat()).1;
     let said = pick(&["--within", "1.2 mm, 6 deg"]);
-    assert!(said.contains("footprint") && said.contains("absent for the others"), "{said}");
+    assert!(said.contains("fit") && said.contains("absent for the others"), "{said}");
     let live_us = |by: &str| -> f64 {
         let row = out.lines().find(|line| line.trim_end().ends_with(by)).unwrap();
         row.split_whitespace().next().unwrap().parse().unwrap()
     };
-    let between = (live_us("second-moments") * live_us("footprint-1")).sqrt();
+    let between = (live_us("second-moments") * live_us("fit-1")).sqrt();
     let said = pick(&["--budget", &format!("{between:.2}us")]);
     assert!(said.contains("second-moments") && said.contains("of the truth"), "{said}");
 }

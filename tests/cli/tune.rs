@@ -14,7 +14,7 @@ const HAND: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/wirings/hand.t
 /// One of the hand's, which the person never presses.
 const FORGOTTEN: u32 = 7;
 
-/// A running `somatic board` whose sensors a person touches: the paper's, recorded at tap 38.
+/// A running `somatic board` whose sensors a person touches: the paper's, recorded at wiper 38.
 struct Touched {
     child: Child,
     told: BufReader<ChildStdout>,
@@ -47,13 +47,13 @@ impl Touched {
         let _ = writeln!(self.skin, "{}", json!({"t": self.time_s, "values": values}));
     }
 
-    /// Ends it, and gives the taps that it had.
-    fn taps(mut self) -> Vec<u64> {
+    /// Ends it, and gives the wipers that it had.
+    fn wipers(mut self) -> Vec<u64> {
         interrupt(&self.child);
         let mut line = String::new();
         self.told.read_line(&mut line).unwrap();
         let account: Value = serde_json::from_str(&line).unwrap();
-        account["sent"][0]["taps"].as_array().unwrap().iter().map(|tap| tap.as_u64().unwrap()).collect()
+        account["sent"][0]["wipers"].as_array().unwrap().iter().map(|wiper| wiper.as_u64().unwrap()).collect()
     }
 }
 
@@ -102,7 +102,7 @@ fn sensors(text: &str) -> BTreeMap<u64, Value> {
     sensors.map(|sensor| (sensor["taxel"].as_u64().unwrap(), sensor.clone())).collect()
 }
 
-const TUNE: [&str; 10] = ["tune", "--body", "hand", "--rest", "0.5", "--press", "2.5", "--json", "--tap", "3"];
+const TUNE: [&str; 10] = ["tune", "--body", "hand", "--rest", "0.5", "--press", "2.5", "--json", "--wiper", "3"];
 
 #[test]
 fn sensors_that_are_badly_tuned_use_their_range_in_the_end_and_again_after_a_reset() {
@@ -116,28 +116,32 @@ fn sensors_that_are_badly_tuned_use_their_range_in_the_end_and_again_after_a_res
     let (text, said, code) = guided(&arguments, &mut boards, None);
     assert_eq!(code, Some(0), "{said}");
     let [board] = boards;
-    let taps = board.taps();
+    let wipers = board.wipers();
     let sensors = sensors(&text);
     assert_eq!(sensors.len(), 40);
     for (id, sensor) in &sensors {
         let number = |key: &str| sensor[key].as_f64().unwrap_or_else(|| panic!("{key}: {sensor}"));
-        assert_eq!((&sensor["acknowledged"], &sensor["tap"]), (&true.into(), &taps[*id as usize].into()), "{sensor}");
+        assert_eq!(
+            (&sensor["acknowledged"], &sensor["wiper"]),
+            (&true.into(), &wipers[*id as usize].into()),
+            "{sensor}"
+        );
         if *id == u64::from(FORGOTTEN) {
-            assert!(sensor["why"].as_str().unwrap().contains("never pressed") && sensor["tap"] == 3, "{sensor}");
+            assert!(sensor["why"].as_str().unwrap().contains("never pressed") && sensor["wiper"] == 3, "{sensor}");
             continue;
         }
-        // By the circuit: at tap 3 a press of 10 N uses 39 % of the range, and the best tap leaves a sixteenth.
+        // By the circuit: at wiper 3 a press of 10 N uses 39 % of the range, and the best wiper position leaves a sixteenth.
         assert!(number("share_before") < 0.4, "{sensor}");
         assert!(number("share") > 0.85 && number("press") > 1023.0 / 64.0 && sensor["fits"] == true, "{sensor}");
-        let circuit = FsrCircuit { tap: sensor["tap"].as_u64().unwrap() as u8 };
+        let circuit = FsrCircuit { wiper: sensor["wiper"].as_u64().unwrap() as u8 };
         let own = f64::from(circuit.counts(firm(*id as u32).unwrap()));
         assert!((own - number("press")).abs() < 0.02 * 1023.0, "{own} in the paper's circuit: {sensor}");
     }
     assert!(text.contains("never pressed; left as it was: taxel 7"), "{text}");
 
-    // What was written is set whenever a board starts, in the right order: no value is of another tap.
+    // What was written is set whenever a board starts, in the right order: no value is of another wiper.
     let wiring = Wiring::load(&tuned).unwrap();
-    let wanted: Vec<Option<u8>> = wiring.boards()[0].taps.clone();
+    let wanted: Vec<Option<u8>> = wiring.boards()[0].wipers.clone();
     assert_eq!(wanted.iter().flatten().count(), 40);
     let mut board = Touched::start(folder.path(), "again", HAND, &["--faults", "reset@3s"]);
     let source = board.port.clone();
@@ -158,22 +162,25 @@ fn sensors_that_are_badly_tuned_use_their_range_in_the_end_and_again_after_a_res
         totals.extend(whole.and_then(|field| field["total"].as_f64()));
     }
     assert_eq!(code_of(&mut child), Some(0));
-    let taps = board.taps();
-    assert!((0..).zip(&wanted).all(|(channel, tap)| tap.is_none_or(|tap| u64::from(tap) == taps[channel])), "{taps:?}");
+    let wipers = board.wipers();
+    assert!(
+        (0..).zip(&wanted).all(|(channel, wiper)| wiper.is_none_or(|wiper| u64::from(wiper) == wipers[channel])),
+        "{wipers:?}"
+    );
     // The linear signal is 100 a newton, to the converter's step: nine taxels of 2 N + 0.15 N each.
     let force: f64 = (16..25).filter_map(firm).sum();
     let right = totals.iter().filter(|total| (*total / 100.0 - force).abs() < 0.05 * force).count();
     assert!(right > 100 && totals.len() - right <= 10, "{force} N: {right} of {}: {totals:?}", totals.len());
 
-    // A calibration at other taps is refused; a name says which.
-    std::fs::write(&fsr, "[all]\nsensor = \"fsr\"\ntap = 38\n").unwrap();
+    // A calibration at other wiper positions is refused; a name says which.
+    std::fs::write(&fsr, "[all]\nsensor = \"fsr\"\nwiper = 38\n").unwrap();
     let output = somatic(&[&run[..], &["--for", "1s"]].concat()).output().unwrap();
     let said = super::stderr(&output);
-    assert!(output.status.code() == Some(1) && said.contains("and the calibration has tap 38"), "{said}");
+    assert!(output.status.code() == Some(1) && said.contains("and the calibration has wiper 38"), "{said}");
 }
 
 #[test]
-fn an_interrupted_tuning_puts_all_taps_back() {
+fn an_interrupted_tuning_puts_all_wipers_back() {
     let folder = tempfile::tempdir().unwrap();
     let mut boards = [Touched::start(folder.path(), "hand", HAND, &[])];
     let source = boards[0].port.clone();
@@ -181,16 +188,19 @@ fn an_interrupted_tuning_puts_all_taps_back() {
     let arguments = [&TUNE[..], &["--source", &source, "--wiring", HAND, "-o", text_of(&output)]].concat();
     let (_, said, code) = guided(&arguments, &mut boards, Some("once more"));
     assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("setting 39 taps") && said.contains("all taps are as they were at first"), "{said}");
+    assert!(said.contains("setting 39 wipers") && said.contains("all wipers are as they were at first"), "{said}");
     let [board] = boards;
-    let taps = board.taps();
+    let wipers = board.wipers();
     let wired = Wiring::load(HAND).unwrap().boards()[0].taxels.clone();
-    assert!(wired.iter().zip(&taps).all(|(taxel, tap)| *tap == if taxel.is_some() { 3 } else { 38 }), "{taps:?}");
+    assert!(
+        wired.iter().zip(&wipers).all(|(taxel, wiper)| *wiper == if taxel.is_some() { 3 } else { 38 }),
+        "{wipers:?}"
+    );
     assert!(!output.exists());
 }
 
 #[test]
-fn boards_that_set_no_taps_are_named_and_the_others_are_tuned() {
+fn boards_that_set_no_wipers_are_named_and_the_others_are_tuned() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -204,24 +214,24 @@ fn boards_that_set_no_taps_are_named_and_the_others_are_tuned() {
     let both = file("both.toml", &format!("{one}{two}"));
     let mut boards = [
         Touched::start(folder.path(), "one", &file("one.toml", &one), &[]),
-        Touched::start(folder.path(), "two", &file("two.toml", &two), &["--taps", "unknown"]),
+        Touched::start(folder.path(), "two", &file("two.toml", &two), &["--wipers", "unknown"]),
     ];
     let [first, second] = boards.each_ref().map(|board| board.port.clone());
     let arguments = [&TUNE[..], &["--source", &first, "--source", &second, "--wiring", &both]].concat();
     let (text, said, code) = guided(&arguments, &mut boards, None);
     assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("board 2 does not know `tap`; 4 of its channels stay as they are"), "{said}");
-    assert!(text.contains("board 2 refuses `tap`: taxel 16, 17, 18, 19"), "{text}");
+    assert!(said.contains("board 2 does not know `wiper`; 4 of its channels stay as they are"), "{said}");
+    assert!(text.contains("board 2 refuses `wiper`: taxel 16, 17, 18, 19"), "{text}");
     let sensors = sensors(&text);
     let which = |key: &str| -> Vec<u64> { sensors.iter().filter(|(_, s)| s[key] == true).map(|(id, _)| *id).collect() };
     assert_eq!((which("fits"), which("acknowledged")), (vec![0, 1, 2, 3], vec![0, 1, 2, 3]));
 
-    let deaf = Touched::start(folder.path(), "deaf", HAND, &["--taps", "ignored"]);
+    let deaf = Touched::start(folder.path(), "deaf", HAND, &["--wipers", "ignored"]);
     let source = deaf.port.clone();
     let start = Instant::now();
     let (_, said, code) = guided(&[&TUNE[..], &["--source", &source, "--wiring", HAND]].concat(), &mut [deaf], None);
-    assert!(code == Some(1) && said.contains("board 1 does not answer `tap`; 40 of its channels"), "{said}");
-    assert!(said.contains("no board sets a tap") && start.elapsed() < Duration::from_secs(15), "{said}");
+    assert!(code == Some(1) && said.contains("board 1 does not answer `wiper`; 40 of its channels"), "{said}");
+    assert!(said.contains("no board sets a wiper") && start.elapsed() < Duration::from_secs(15), "{said}");
 }
 
 #[test]
@@ -230,7 +240,7 @@ fn what_makes_no_sense_is_said_before_anything_is_set() {
     assert!(refused(&["--source", "a.csv", "--press", "3"]).contains("give --source serial:PORT"));
     assert!(refused(&["--source", "serial:a"]).contains("is not a terminal; give --press"));
     assert!(refused(&["--source", "serial:a", "--press", "0"]).contains("times over 0"));
-    assert!(refused(&["--source", "serial:a", "--press", "3", "--tap", "256"]).contains("256"));
+    assert!(refused(&["--source", "serial:a", "--press", "3", "--wiper", "256"]).contains("256"));
     assert!(refused(&["--source", "serial:a", "--source", "-", "--press", "3"]).contains("only serial lines"));
     let (_folder, path) = super::file("there.toml", "mine");
     let why = super::fails(1, &["tune", "--source", "serial:a", "--press", "3", "-o", text_of(&path)]);

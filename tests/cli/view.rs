@@ -216,7 +216,7 @@ fn what_cannot_be_shown_is_one_line() {
 }
 
 #[test]
-fn joints_move_the_links_of_a_view_and_contacts_are_told() {
+fn joints_move_the_links_of_a_view_and_self_contacts_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let body = folder.path().join("gripper.glb").display().to_string();
     let example = |name: &str| format!("{}/examples/robots/{name}", env!("CARGO_MANIFEST_DIR"));
@@ -224,7 +224,7 @@ fn joints_move_the_links_of_a_view_and_contacts_are_told() {
     done(&["author", "--urdf-skin", &urdf, "-o", &body]);
     let (touch, states) = (example("gripper-touch.csv"), example("gripper-joints.csv"));
     let joints = ["--joints", &urdf, "--joint-states", &states, "--up", "z"];
-    let of_robot = ["--body", &body, "--source", &touch, "--outputs", "total,contacts"];
+    let of_robot = ["--body", &body, "--source", &touch, "--outputs", "total,self_contacts"];
     let mut view = Run::of(&[&VIEW[..], &of_robot, &joints].concat());
     let mut viewer = view.viewer();
     viewer.binary();
@@ -234,7 +234,7 @@ fn joints_move_the_links_of_a_view_and_contacts_are_told() {
         say(&mut viewer.socket, &json!({"type": "seek", "t_s": t_s}));
         let frame = frame(&mut viewer, number);
         let sections = u16::from_le_bytes([frame[2], frame[3]]);
-        // Pressures, poses, percepts, touches and contacts: all of them have changed.
+        // Pressures, poses, percepts, touches and self-contacts: all of them have changed.
         assert_eq!(sections, 0b10_1111, "{sections:b}");
         // The last section, 48 bytes each behind their number.
         let section = (4_usize + 48 * contacts).next_multiple_of(8);

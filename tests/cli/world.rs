@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde_json::Value;
 
-use super::contacts::{Plates, Truth, truth};
+use super::self_contacts::{Plates, Truth, truth};
 use super::{done, fails, text_of};
 
 /// The percept of `field` in `frame`.
@@ -30,9 +30,9 @@ fn in_upper(truth: &Truth, place: DVec3) -> DVec3 {
 fn a_link_can_stand_for_the_world() {
     let (plates, truth) = (Plates::new(), closed());
     let lines = plates.lines(&truth, 0.0);
-    let outputs = ["--outputs", "position,normal,contacts"];
+    let outputs = ["--outputs", "position,normal,self_contacts"];
     let run = |flags: &[&str]| plates.jointed(&lines, &[&outputs[..], flags].concat());
-    let (in_world, in_link, in_anchor) = (run(&[]), run(&["--in", "upper"]), plates.anchored(&lines));
+    let (in_world, in_link, in_anchor) = (run(&[]), run(&["--relative-to", "upper"]), plates.anchored(&lines));
     for (index, truth) in truth.iter().enumerate() {
         for field in ["lower", "upper"] {
             let [world, link] = [&in_world, &in_link].map(|frames| percept(&frames[index], field));
@@ -45,9 +45,9 @@ fn a_link_can_stand_for_the_world() {
         // A touch of the link itself is where it is without any pose.
         let [own, link] = [&in_anchor, &in_link].map(|frames| percept(&frames[index], "upper"));
         assert!(position(own).distance(position(link)) < 1e-9, "{own} {link}");
-        let contact = &in_link[index]["contacts"][0];
+        let contact = &in_link[index]["self_contacts"][0];
         assert!(position(contact).distance(in_upper(truth, truth.place)) < 0.001, "frame {index}: {contact}");
-        assert_eq!(contact["links"], in_world[index]["contacts"][0]["links"]);
+        assert_eq!(contact["links"], in_world[index]["self_contacts"][0]["links"]);
     }
 }
 
@@ -57,7 +57,7 @@ fn speed_in_the_world_is_that_of_the_skin_and_the_link_together() {
     let outputs = ["--outputs", "position,speed,speed_in_world"];
     let run = |flags: &[&str]| plates.jointed(&plates.lines(&truth, 0.0), &[&outputs[..], flags].concat());
     // The contact goes 1 mm in a frame of 50 ms, the upper plate 1.3 mm.
-    for (flags, lower, upper) in [(&[][..], 0.02, 0.02), (&["--in", "upper"], 0.006, 0.006)] {
+    for (flags, lower, upper) in [(&[][..], 0.02, 0.02), (&["--relative-to", "upper"], 0.006, 0.006)] {
         let found = run(flags);
         for (field, expected, over_skin) in [("lower", lower, 0.02), ("upper", upper, 0.006)] {
             let of = |index: usize| percept(&found[index], field);
@@ -92,11 +92,11 @@ fn without_poses_there_is_no_speed_in_the_world_and_a_flag_says_why() {
 
 #[test]
 fn a_link_that_cannot_stand_for_the_world_is_refused() {
-    let said = fails(2, &["run", "--in", "plam"]);
+    let said = fails(2, &["run", "--relative-to", "plam"]);
     assert!(said.contains("the body has no link `plam`"), "{said}");
-    let said = fails(2, &["run", "--in", "hand", "--coordinates", "anchor"]);
+    let said = fails(2, &["run", "--relative-to", "hand", "--coordinates", "anchor"]);
     assert!(said.contains("leave one of them out"), "{said}");
-    let said = fails(2, &["run", "--in", "hand", "--sink", "page:127.0.0.1:0"]);
+    let said = fails(2, &["run", "--relative-to", "hand", "--sink", "page:127.0.0.1:0"]);
     assert!(said.contains("a page shows the world"), "{said}");
     let said = fails(2, &["run", "--outputs", "speed_in_world", "--coordinates", "anchor"]);
     assert!(said.contains("`speed_in_world` is made of places in the world"), "{said}");
@@ -109,7 +109,7 @@ fn tables_name_the_link_that_stands_for_the_world() {
     let (plates, truth) = (Plates::new(), closed());
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("upper.csv");
-    plates.jointed(&plates.lines(&truth, 0.0), &["--in", "upper", "--sink", text_of(&table), "--sink", "-"]);
+    plates.jointed(&plates.lines(&truth, 0.0), &["--relative-to", "upper", "--sink", text_of(&table), "--sink", "-"]);
     let rows = std::fs::read_to_string(&table).unwrap();
     assert!(rows.lines().skip(1).all(|row| row.contains(",upper,")) && rows.lines().count() > 7, "{rows}");
 }

@@ -102,7 +102,11 @@ fn assert_near(name: &str, a: &Value, b: &Value, near: f64) {
             let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
             // Angles just under π and just over 0 are near each other too.
             let off = (a - b).abs();
-            let off = if name == "orientation" || name == "axis" { off.min(std::f64::consts::PI - off) } else { off };
+            let off = if name == "orientation" || name == "principal_axis" {
+                off.min(std::f64::consts::PI - off)
+            } else {
+                off
+            };
             assert!(off <= near, "{name}: {a} and {b}");
         }
         _ => assert_eq!(a, b, "{name}"),

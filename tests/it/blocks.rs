@@ -138,7 +138,7 @@ fn columns_are_percepts_one_after_the_other() {
     let body = Body::from_bytes("hand", bundled::HAND).unwrap();
     let frames = recording(&body, 30);
     for kind in backends() {
-        let mut engine = engine(&body, kind, "[all]\nnoise = 1\nunit = \"Pa\"\n[skin]\nsigma_m = 0.002", &[]);
+        let mut engine = engine(&body, kind, "[all]\nnoise = 1\nunit = \"Pa\"\n[layer]\nsigma_m = 0.002", &[]);
         let percepts = engine.process(&frames).unwrap();
         let mut there = 0;
         for column in COLUMNS {

@@ -51,7 +51,7 @@ fn hear(kind: BackendKind, calibration: &str, frames: &[Frame]) -> Vec<[Percept;
 
 #[test]
 fn a_press_is_felt_by_its_ends_where_change_is_and_throughout_where_pressure_is() {
-    const PRESS: &str = "body = \"hand\"\nrate_hz = 50\nduration_s = 2\n[skin]\nthickness_m = 0.004\n\
+    const PRESS: &str = "body = \"hand\"\nrate_hz = 50\nduration_s = 2\n[layer]\nthickness_m = 0.004\n\
                          [[touch]]\non = \"hand/palm\"\nindenter = \"fingertip\"\n\
                          path = [[0, 0]]\npress = { from_s = 0.5, to_s = 1.5, newton = 4, ramp_s = 0.1 }\n";
     let body = Body::from_bytes("hand", bundled::HAND).unwrap();
@@ -146,7 +146,7 @@ fn changes_have_a_dead_band_and_thresholds_of_their_own() {
 #[test]
 fn a_baseline_that_moves_is_not_a_change_and_neither_is_a_taxel_found_unfit() {
     const KEEP: &str =
-        "[all]\nbaseline = 100\ngain = 0.3\n[contact]\non = 200\n[upkeep]\ntime_constant_s = 1\nstuck_s = 4\n";
+        "[all]\nbaseline = 100\ngain = 0.3\n[contact]\non = 200\n[drift]\ntime_constant_s = 1\nstuck_s = 4\n";
     // Every taxel is 10 over its baseline, which follows; that is no contact. Then taxel 0 is really pressed a little.
     let frames: Vec<Frame> = (0..24_u32)
         .map(|tick| {
@@ -217,7 +217,7 @@ fn letters_that_make_no_sense_are_refused() {
     let fsr = "[all]\nsensor = \"fsr\"";
     assert!(why(fsr, vec![raw, Letter::default(), raw]).contains("`change` of signal `raw` is asked for twice"));
     let change = vec![Letter { receptor: Receptor::Change, signal: None }];
-    assert!(why("[upkeep]\nstuck_s = 3", change.clone()).contains("ask for letter `sustained` too"));
+    assert!(why("[drift]\nstuck_s = 3", change.clone()).contains("ask for letter `sustained` too"));
     assert!(engine(&skin(), BackendKind::Cpu, "", change).is_ok());
 }
 

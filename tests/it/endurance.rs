@@ -108,10 +108,10 @@ fn an_axis_goes_through_the_seam_without_a_jump() {
         })
         .collect();
     for backend in backends() {
-        let mut engine = engine(&body, backend, Outputs::CENTROID | Outputs::AXIS | Outputs::ANISOTROPY);
+        let mut engine = engine(&body, backend, Outputs::CENTROID | Outputs::PRINCIPAL_AXIS | Outputs::ANISOTROPY);
         let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
         assert!(agreement.holds(), "{backend:?}: {agreement}");
-        let axes: Vec<f64> = (0..frames.len()).map(|n| percepts.get(n, 0).axis.unwrap()).collect();
+        let axes: Vec<f64> = (0..frames.len()).map(|n| percepts.get(n, 0).principal_axis.unwrap()).collect();
         let mut turns = 0;
         for (n, pair) in axes.windows(2).enumerate() {
             let theta = n as f64 / STEPS as f64 * TAU;
@@ -139,12 +139,12 @@ fn a_rod_at_any_angle_has_it() {
     let body = flat.body();
     let values = [3.0, 1.0, 1.0, 2.0].repeat(angles.len());
     for backend in backends() {
-        let mut engine = engine(&body, backend, Outputs::CENTROID | Outputs::ORIENTATION | Outputs::AXIS);
+        let mut engine = engine(&body, backend, Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS);
         let (percepts, agreement) = engine.process_and_compare(&[frame(0.0, &values)]).unwrap();
         assert!(agreement.holds(), "{backend:?}: {agreement}");
         for (field, &right) in angles.iter().enumerate() {
             let percept = percepts.get(0, field);
-            for (angle, arithmetic) in [(percept.orientation, 8.0 * U), (percept.axis, 40.0 * U)] {
+            for (angle, arithmetic) in [(percept.orientation, 8.0 * U), (percept.principal_axis, 40.0 * U)] {
                 let angle = angle.unwrap();
                 assert!((0.0..PI).contains(&angle) && angle.is_sign_positive(), "{backend:?}: {angle} for {right}");
                 assert!(between_lines(angle, right) < arithmetic + ATAN2, "{backend:?}: {angle} for {right}");
@@ -180,7 +180,7 @@ fn pressures_of_every_size_are_measured_or_told() {
             } else {
                 assert!(percept.flags.contains(Flags::FAULTY_INPUT), "{backend:?}, 1e{exponent}: {percept:?}");
             }
-            let numbers = [percept.total, percept.peak, percept.orientation, percept.axis, percept.speed];
+            let numbers = [percept.total, percept.peak, percept.orientation, percept.principal_axis, percept.speed];
             assert!(numbers.into_iter().flatten().all(f64::is_finite), "{backend:?}, 1e{exponent}: {percept:?}");
         }
     }

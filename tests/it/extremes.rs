@@ -56,7 +56,7 @@ fn every_output_can_be_asked_for_alone() {
                 agreement.quantities.keys().filter(|name| !["flags", "contact"].contains(&name.as_str()));
             let of = |name: &str| Outputs::named(name.split('.').next().unwrap_or_default());
             // Contacts are made of touches.
-            let brings = |name: &str| outputs == Outputs::CONTACTS && of(name) == Some(Outputs::TOUCHES);
+            let brings = |name: &str| outputs == Outputs::SELF_CONTACTS && of(name) == Some(Outputs::TOUCHES);
             assert!(compared.all(|name| of(name) == Some(outputs) || brings(name)), "{agreement}");
             seen.push(percepts.get(1, 0).flags);
         }
@@ -65,12 +65,13 @@ fn every_output_can_be_asked_for_alone() {
 }
 
 fn assert_finite(percept: &Percept) {
-    let scalars = [percept.total, percept.peak, percept.area, percept.orientation, percept.axis, percept.anisotropy];
+    let scalars =
+        [percept.total, percept.peak, percept.area, percept.orientation, percept.principal_axis, percept.anisotropy];
     let vectors = [percept.position, percept.normal];
     let centroid = percept.centroid.unwrap_or_default();
     let all = scalars.into_iter().flatten().chain(vectors.into_iter().flatten().flatten()).chain(centroid);
     assert!(all.into_iter().all(f64::is_finite), "{percept:?}");
-    for angle in [percept.orientation, percept.axis].into_iter().flatten() {
+    for angle in [percept.orientation, percept.principal_axis].into_iter().flatten() {
         assert!((0.0..PI).contains(&angle) && angle.is_sign_positive(), "{percept:?}");
     }
 }
@@ -91,7 +92,7 @@ fn no_pressure_is_no_contact() {
         for p in percepts(&field(&SQUARE), &values) {
             assert_eq!((p.contact, p.flags), (false, Flags::NO_CONTACT));
             assert_eq!((p.total, p.peak, p.active, p.area), (Some(0.0), Some(0.0), Some(0), Some(0.0)));
-            assert_eq!((p.centroid, p.position, p.orientation, p.axis), (None, None, None, None));
+            assert_eq!((p.centroid, p.position, p.orientation, p.principal_axis), (None, None, None, None));
         }
     }
 }
@@ -101,7 +102,7 @@ fn one_live_taxel_has_a_place_and_no_direction() {
     for p in percepts(&field(&SQUARE), &[0.0, 0.0, 7.0, 0.0]) {
         assert_eq!(p.flags, Flags::ONE_TAXEL);
         assert_eq!((p.centroid, p.active), (Some([0.5, 0.5]), Some(1)));
-        assert_eq!((p.orientation, p.axis, p.anisotropy), (None, None, None));
+        assert_eq!((p.orientation, p.principal_axis, p.anisotropy), (None, None, None));
         assert_eq!(p.position, Some([0.5, 0.0, -0.5]));
         assert_eq!(p.normal, Some([0.0, 1.0, 0.0]));
     }
@@ -117,7 +118,7 @@ fn all_equal_is_a_tie_and_isotropic() {
         assert_eq!(p.flags, Flags::TIE | Flags::ISOTROPIC);
         assert_eq!((p.centroid, p.total), (Some([0.0, 0.0]), Some(12.0)));
         // The lowest two ids, 0 and 1, lie along u.
-        assert_eq!((p.orientation, p.axis), (Some(0.0), None));
+        assert_eq!((p.orientation, p.principal_axis), (Some(0.0), None));
         assert!(near(p.anisotropy, 0.0, 1e-6));
     }
 }
@@ -158,7 +159,7 @@ fn collinear_taxels_have_their_line() {
                 d.min(PI - d)
             };
             // Positions are stored in single precision.
-            assert!(apart(p.orientation) < 1e-5 && apart(p.axis) < 1e-5, "{degrees} {p:?}");
+            assert!(apart(p.orientation) < 1e-5 && apart(p.principal_axis) < 1e-5, "{degrees} {p:?}");
             assert!(near(p.anisotropy, 1.0, 1e-5));
         }
     }
@@ -167,7 +168,7 @@ fn collinear_taxels_have_their_line() {
 #[test]
 fn vertical_is_no_special_case() {
     for p in percepts(&field(&[[0.25, -0.5], [0.25, 0.5]]), &[2.0, 2.0]) {
-        assert!(near(p.orientation, FRAC_PI_2, 1e-6) && near(p.axis, FRAC_PI_2, 1e-6), "{p:?}");
+        assert!(near(p.orientation, FRAC_PI_2, 1e-6) && near(p.principal_axis, FRAC_PI_2, 1e-6), "{p:?}");
     }
 }
 
@@ -188,11 +189,11 @@ fn coincident_taxels_have_no_line() {
     for p in percepts(&field(&[[0.5, 0.25]; 3]), &[1.0, 2.0, 3.0]) {
         assert_eq!(p.flags, Flags::COINCIDENT);
         assert_eq!((p.centroid, p.active), (Some([0.5, 0.25]), Some(3)));
-        assert_eq!((p.orientation, p.axis, p.anisotropy), (None, None, None));
+        assert_eq!((p.orientation, p.principal_axis, p.anisotropy), (None, None, None));
     }
     // Two on one point and one elsewhere: the two farthest points may coincide while the spread has an axis.
     for p in percepts(&field(&[[0.5, 0.0], [0.5, 0.0], [-0.5, 0.0]]), &[1.0, 1.0, 2.0]) {
-        assert!(near(p.axis, 0.0, 1e-6), "{p:?}");
+        assert!(near(p.principal_axis, 0.0, 1e-6), "{p:?}");
     }
 }
 
@@ -340,7 +341,10 @@ fn ten_kilometres_from_the_origin_nothing_is_lost() {
         assert!(shifted.distance(DVec3::from_array(here.position.unwrap())) < 1e-8, "{p:?} {here:?}");
         assert!(near(p.orientation, here.orientation.unwrap(), 1e-5));
         // Second moments about the body's origin would have 10⁸ m² taken from 10⁸ m², of which f32 keeps some 8 m².
-        assert!(near(p.axis, here.axis.unwrap(), 1e-5) && near(p.anisotropy, here.anisotropy.unwrap(), 1e-5));
+        assert!(
+            near(p.principal_axis, here.principal_axis.unwrap(), 1e-5)
+                && near(p.anisotropy, here.anisotropy.unwrap(), 1e-5)
+        );
     }
 }
 
@@ -395,7 +399,7 @@ fn a_field_around_a_limb_has_no_chart_and_says_where_it_is() {
     (values[0], values[3]) = (3.0, 1.0);
     for p in percepts(&body, &values) {
         assert_eq!(p.flags, Flags::NO_CHART);
-        assert_eq!((p.centroid, p.normal, p.orientation, p.axis), (None, None, None, None));
+        assert_eq!((p.centroid, p.normal, p.orientation, p.principal_axis), (None, None, None, None));
         assert_eq!((p.total, p.active), (Some(4.0), Some(2)));
         let mean = DVec3::new(0.03, 0.1, 0.01);
         assert!(DVec3::from_array(p.position.unwrap()).distance(mean) < 1e-8, "{p:?}");
@@ -556,13 +560,13 @@ fn drift_that_no_taxel_can_tell_is_named_at_the_start() {
         let options = Options::default().backend(BackendKind::Cpu).calibration(calibration(keys));
         Engine::new(&flat.body(), options).unwrap().remarks()
     };
-    let upkeep = "[upkeep]\ntime_constant_s = 2\n";
-    let told = remarks(std::slice::from_ref(&(0..6)), upkeep);
+    let drift = "[drift]\ntime_constant_s = 2\n";
+    let told = remarks(std::slice::from_ref(&(0..6)), drift);
     assert!(told.len() == 1 && told[0].contains("no taxel can tell the drift"), "{told:?}");
     // Three others can, two cannot.
     assert!(
-        remarks(&[0..2, 2..5], upkeep).is_empty()
-            && remarks(std::slice::from_ref(&(0..6)), "[upkeep]\nstuck_s = 4\n").is_empty()
+        remarks(&[0..2, 2..5], drift).is_empty()
+            && remarks(std::slice::from_ref(&(0..6)), "[drift]\nstuck_s = 4\n").is_empty()
     );
-    assert!(remarks(&[0..2, 2..5], &format!("{upkeep}[taxel.4]\nmask = true\n")).len() == 1);
+    assert!(remarks(&[0..2, 2..5], &format!("{drift}[taxel.4]\nmask = true\n")).len() == 1);
 }

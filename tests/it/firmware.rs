@@ -72,12 +72,12 @@ fn line(packet: &Packet) -> (String, String) {
             (with("answer", head, format!("{request} {command} {status} {value}")), bytes)
         }
         Packet::Command { board, request, command } => {
-            let (rate, channel, tap) = match *command {
+            let (rate, channel, wiper) = match *command {
                 Command::Rate { rate_mhz } => (rate_mhz, 0, 0),
-                Command::Tap { channel, tap } => (0, channel, tap),
+                Command::Wiper { channel, wiper } => (0, channel, wiper),
                 _ => (0, 0, 0),
             };
-            let heard = format!("{} {board} {request} {rate} {channel} {tap} ", command.kind());
+            let heard = format!("{} {board} {request} {rate} {channel} {wiper} ", command.kind());
             (format!("hear {bytes}"), heard)
         }
         Packet::Corrupt(why) => panic!("{why}"),

@@ -1,7 +1,7 @@
 //! Gains and the layer's width from ordinary touches, against those that a simulation has.
 
 use glam::DVec2;
-use somatic::gains::{SkinEstimate, SkinSurvey};
+use somatic::gains::{GainsEstimate, GainsSurvey};
 use somatic::source::{SimulatedSource, Source};
 use somatic::{Body, Calibration, Engine, Frame, Options, Outputs, Scene};
 
@@ -35,7 +35,7 @@ fn wandering(layer: &str, noise: u32, seconds: u32, seed: u32) -> String {
         forces += &format!("[{t}, {}],", 2.0 + 4.0 * random());
     }
     format!(
-        "rate_hz = 25\nduration_s = {seconds}\nseed = {seed}\n[skin]\nthickness_m = {}\n{layer}[sensor]\nkind = \"linear\"\nbits = 10\n\
+        "rate_hz = 25\nduration_s = {seconds}\nseed = {seed}\n[layer]\nthickness_m = {}\n{layer}[sensor]\nkind = \"linear\"\nbits = 10\n\
          gain = 500\nnoise_sigma = {noise}\ngain_spread = 0.2\ngain_seed = 4\n[[touch]]\non = \"grid\"\nindenter = \"fingertip\"\n\
          path = [{path}]\ntimes_s = [{times}]\nforce_newton = [{forces}]\n",
         2.3e-3 * 3.0_f64.sqrt()
@@ -56,16 +56,16 @@ fn frames(source: &mut SimulatedSource) -> (Vec<Frame>, Vec<DVec2>) {
     (frames, places)
 }
 
-fn estimated(body: &Body, source: &mut SimulatedSource, onset: &str) -> SkinEstimate {
+fn estimated(body: &Body, source: &mut SimulatedSource, onset: &str) -> GainsEstimate {
     let text = source.calibration().replace("[all]\n", &format!("[all]\nonset = \"{onset}\"\n"));
     let calibration = Calibration::parse(&text, &ids(body)).unwrap();
-    let mut survey = SkinSurvey::new(body, calibration, &[], source.taxels()).unwrap();
+    let mut survey = GainsSurvey::new(body, calibration, &[], source.taxels()).unwrap();
     survey.add(&frames(source).0).unwrap();
     survey.finish(&mut |_| true).unwrap()
 }
 
 /// Root mean squares of log gains as they are, and of what is wrong with the estimate, both without their means.
-fn off(estimate: &SkinEstimate, gains: &[f64]) -> [f64; 2] {
+fn off(estimate: &GainsEstimate, gains: &[f64]) -> [f64; 2] {
     let told: Vec<[f64; 2]> = estimate
         .gains
         .iter()
@@ -91,19 +91,17 @@ fn places(
     for (index, taxel) in calibration.taxels.iter_mut().enumerate() {
         taxel.gain /= gains(index);
     }
-    calibration.skin = calibration.skin.map(|mut skin| {
-        (skin.sigma_m, skin.gain_spread) = (sigma_m, spread);
-        skin
+    calibration.layer = calibration.layer.map(|mut layer| {
+        (layer.sigma_m, layer.gain_spread) = (sigma_m, spread);
+        layer
     });
-    let scene = Scene::default().outputs(Outputs::CENTROID | Outputs::FOOTPRINT);
+    let scene = Scene::default().outputs(Outputs::CENTROID | Outputs::FIT);
     let mut engine = Engine::new(body, Options::default().scene(scene).calibration(calibration).batch(256)).unwrap();
     engine.set_channels(source.taxels()).unwrap();
     let (frames, truth) = frames(source);
     let percepts = engine.process(&frames).unwrap();
     let errors: Vec<f64> = (0..frames.len())
-        .filter_map(|frame| {
-            Some(1e3 * DVec2::from_array(percepts.get(frame, 0).footprint_place?).distance(truth[frame]))
-        })
+        .filter_map(|frame| Some(1e3 * DVec2::from_array(percepts.get(frame, 0).fit_place?).distance(truth[frame])))
         .collect();
     ((errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt(), errors.len())
 }

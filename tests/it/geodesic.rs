@@ -127,7 +127,7 @@ fn a_field_around_half_a_limb_is_unrolled_on_every_backend() {
         let off = position.distance(normal * RADIUS + DVec3::Y * y);
         assert!(off < 1e-4, "{kind:?}: {off} m");
         assert!(DVec3::from_array(percept.normal.unwrap()).angle_between(normal).to_degrees() < 2.0);
-        assert!(percept.orientation.is_some() && percept.axis.is_some());
+        assert!(percept.orientation.is_some() && percept.principal_axis.is_some());
     }
     let mut engine = engine(&body, somatic::BackendKind::Cpu);
     let (_, agreement) = engine.process_and_compare(&[frame(0.0, &values)]).unwrap();

@@ -27,7 +27,7 @@ fn a_million_taxels_add_up_only_with_compensation() {
     let body = Flat::new(&uv).field("field", None, 0..side * side).body();
     // Tenths are no binary fractions: each addition to a large sum errs to the same side.
     let frame = frame(0.0, &vec![0.1; uv.len()]);
-    let outputs = Outputs::TOTAL | Outputs::CENTROID | Outputs::AXIS | Outputs::ANISOTROPY;
+    let outputs = Outputs::TOTAL | Outputs::CENTROID | Outputs::PRINCIPAL_AXIS | Outputs::ANISOTROPY;
     for kind in single() {
         let mut errors = Vec::new();
         for arithmetic in [Arithmetic::OnePass, Arithmetic::Compensated] {
@@ -108,7 +108,10 @@ fn second_moments_take_the_place_of_two_points_and_their_work() {
     let two = (Outputs::ORIENTATION, vec!["calibrate", "contact", "centroid", "orientation"]);
     assert_eq!(stages(OrientationBy::AsAsked), two);
     assert_eq!(stages(OrientationBy::TwoPoints), two);
-    assert_eq!(stages(OrientationBy::SecondMoments), (Outputs::AXIS, vec!["calibrate", "contact", "centroid", "axis"]));
+    assert_eq!(
+        stages(OrientationBy::SecondMoments),
+        (Outputs::PRINCIPAL_AXIS, vec!["calibrate", "contact", "centroid", "principal_axis"])
+    );
     let knobs = Knobs::default().orientation_by(OrientationBy::SecondMoments);
     let scene = Scene::default().outputs(Outputs::TOTAL).knobs(knobs);
     let error = Engine::new(&body, Options::default().scene(scene)).err().unwrap();

@@ -100,12 +100,12 @@ fn gain_and_baseline_move_a_table() {
     }
 }
 
-const TAPS: [u8; 4] = [5, FsrCircuit::MIDDLE_TAP, 120, 255];
+const WIPERS: [u8; 4] = [5, FsrCircuit::MIDDLE_WIPER, 120, 255];
 
-/// Four sensors of the circuit, each with its own tap.
+/// Four sensors of the circuit, each with its own wiper.
 fn circuit() -> Calibration {
-    let taps: String = (0..).zip(TAPS).map(|(id, tap)| format!("[taxel.{id}]\ntap = {tap}\n")).collect();
-    parse(&format!("[all]\nsensor = \"fsr\"\nsignal = \"raw\"\n{taps}"), 4)
+    let wipers: String = (0..).zip(WIPERS).map(|(id, wiper)| format!("[taxel.{id}]\nwiper = {wiper}\n")).collect();
+    parse(&format!("[all]\nsensor = \"fsr\"\nsignal = \"raw\"\n{wipers}"), 4)
 }
 
 #[test]
@@ -115,15 +115,15 @@ fn every_reading_of_the_circuit_is_exact_in_both_signals() {
         for signal in [None, Some(FsrSignal::Raw), Some(FsrSignal::Linear)] {
             let cells = run(kind, &circuit(), signal, &frames);
             for (counts, cells) in (0..).zip(&cells) {
-                for (cell, tap) in cells.iter().zip(TAPS) {
-                    let sensor = FsrCircuit { tap };
+                for (cell, wiper) in cells.iter().zip(WIPERS) {
+                    let sensor = FsrCircuit { wiper };
                     let right = match signal {
                         Some(FsrSignal::Linear) => sensor.linearised(counts, 10.0),
                         _ => sensor.logarithmic(counts),
                     };
                     // The reference has the circuit's own numbers, the others those next to them in single precision.
                     let right = if kind == BackendKind::Reference { right } else { f64::from(right as f32) };
-                    assert_eq!(cell.total, Some(right), "{kind:?} {signal:?} {tap} {counts}");
+                    assert_eq!(cell.total, Some(right), "{kind:?} {signal:?} {wiper} {counts}");
                 }
             }
         }
@@ -133,23 +133,23 @@ fn every_reading_of_the_circuit_is_exact_in_both_signals() {
 #[test]
 fn both_signals_rise_with_the_force_and_the_linear_one_is_linear() {
     let forces: Vec<f64> = (0..=520).map(|i| f64::from(i) * 0.02).collect();
-    let read = |force: f64| TAPS.map(|tap| f64::from(FsrCircuit { tap }.counts(force)));
+    let read = |force: f64| WIPERS.map(|wiper| f64::from(FsrCircuit { wiper }.counts(force)));
     let frames: Vec<Frame> = forces.iter().map(|&force| frame(force, &read(force))).collect();
     for kind in backends() {
         for signal in [FsrSignal::Raw, FsrSignal::Linear] {
             let cells = run(kind, &circuit(), Some(signal), &frames);
-            for (index, tap) in TAPS.into_iter().enumerate() {
-                let sensor = FsrCircuit { tap };
+            for (index, wiper) in WIPERS.into_iter().enumerate() {
+                let sensor = FsrCircuit { wiper };
                 let signals: Vec<f64> = cells.iter().map(|cells| cells[index].total.unwrap()).collect();
-                assert!(signals.windows(2).all(|pair| pair[0] <= pair[1]), "{kind:?} {signal} {tap}");
-                assert_eq!((signals[0], *signals.last().unwrap()), (0.0, 1000.0), "{kind:?} {signal} {tap}");
+                assert!(signals.windows(2).all(|pair| pair[0] <= pair[1]), "{kind:?} {signal} {wiper}");
+                assert_eq!((signals[0], *signals.last().unwrap()), (0.0, 1000.0), "{kind:?} {signal} {wiper}");
                 if signal == FsrSignal::Linear {
                     for (&force, got) in forces.iter().zip(&signals) {
                         // A reading stands for a step of forces, and what it says is in it; 100 a newton.
                         let [least, most] = sensor.step_newton(sensor.counts(force));
                         let step = 100.0 * (most.min(10.0) - least);
                         let off = (got - 100.0 * force.min(10.0)).abs();
-                        assert!(off <= step + 1e-4, "{kind:?} tap {tap}: {got} at {force} N, step {step}");
+                        assert!(off <= step + 1e-4, "{kind:?} wiper {wiper}: {got} at {force} N, step {step}");
                     }
                 }
             }

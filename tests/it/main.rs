@@ -14,9 +14,9 @@ mod endurance;
 mod extremes;
 mod filter;
 mod firmware;
-mod footprint;
-mod footprint_cells;
-mod footprints_of_touches;
+mod fit;
+mod fit_cells;
+mod fits_of_touches;
 mod gains;
 mod gate;
 mod geodesic;
@@ -39,6 +39,7 @@ mod random;
 mod real;
 mod recordings;
 // The skins of `somatic bench`.
+mod drift;
 #[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
 #[path = "../../src/experiments/shape.rs"]
 mod shape;
@@ -49,7 +50,6 @@ mod skips;
 mod state;
 mod sure;
 mod touch;
-mod upkeep;
 mod validator;
 mod verify;
 mod wire;

@@ -171,7 +171,7 @@ proptest! {
             prop_assert!((got[0] - right[0]).abs() < 1e-14 && (got[1] - right[1]).abs() < 1e-14, "{got:?} {right:?}");
         }
         if is_clear(&plain) && is_clear(&turned) {
-            for (a, b) in [(plain.orientation, turned.orientation), (plain.axis, turned.axis)] {
+            for (a, b) in [(plain.orientation, turned.orientation), (plain.principal_axis, turned.principal_axis)] {
                 prop_assert!(between_lines(a.unwrap() - angle, b.unwrap()) < 1e-8, "{a:?} {b:?} {angle}");
             }
             prop_assert!((plain.anisotropy.unwrap() - turned.anisotropy.unwrap()).abs() < 1e-9);

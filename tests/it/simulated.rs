@@ -28,7 +28,7 @@ fn dense() -> Body {
 /// A simulation of `touch` on the dense skin under 7 mm.
 fn on_dense(sensor: &str, touch: &str) -> SimulatedSource {
     let text = format!(
-        "rate_hz = 10\nduration_s = 1\nseed = 5\n[skin]\nthickness_m = 0.007\n\
+        "rate_hz = 10\nduration_s = 1\nseed = 5\n[layer]\nthickness_m = 0.007\n\
          [sensor]\narea_m2 = 1.6e-5\n{sensor}\n[[touch]]\non = \"all\"\n{touch}\n"
     );
     SimulatedSource::on_body("dense", &text, dense()).unwrap()
@@ -184,10 +184,10 @@ fn all_of_the_force_arrives_on_a_flat_skin() {
     assert!(aliasing(SIGMA, PITCH) < 1e-6 && aliasing(SIGMA, 2.5 * PITCH) > 0.1, "the bound knows a coarse skin");
 }
 
-/// The dense skin with another `skin` over it.
-fn under(skin: &str, touch: &str) -> SimulatedSource {
+/// The dense skin under another `layer`.
+fn under(layer: &str, touch: &str) -> SimulatedSource {
     let text = format!(
-        "rate_hz = 10\nduration_s = 1\n[skin]\nthickness_m = 0.007\n{skin}\n[sensor]\narea_m2 = 1.6e-5\n\
+        "rate_hz = 10\nduration_s = 1\n[layer]\nthickness_m = 0.007\n{layer}\n[sensor]\narea_m2 = 1.6e-5\n\
          [[touch]]\non = \"all\"\n{touch}\npath = [[0.0013, -0.0007]]\nhold = {{ newton = 7.5 }}\n"
     );
     SimulatedSource::on_body("dense", &text, dense()).unwrap()
@@ -200,16 +200,16 @@ fn another_layer_changes_what_is_felt_and_not_the_truth() {
         let felt = numbers(&first(&mut plain));
         // What lies beyond the skin's edge, from the touch's own end: nothing of a Gaussian, z³/r³ at most of Boussinesq's.
         let edge = (f64::from(HALF) + 0.5) * PITCH - 0.022;
-        for (skin, tail) in [("contact = \"hertz\"", 0.0), ("kernel = \"boussinesq\"", (7e-3_f64 / edge).powi(3))] {
-            let mut other = under(skin, touch);
+        for (layer, tail) in [("contact = \"hertz\"", 0.0), ("kernel = \"boussinesq\"", (7e-3_f64 / edge).powi(3))] {
+            let mut other = under(layer, touch);
             let values = numbers(&first(&mut other));
             let sum: f64 = values.iter().sum();
-            assert!((sum - 7.5).abs() <= 7.5 * (tail + aliasing(SIGMA, PITCH) + U + 1e-8), "{touch}, {skin}: {sum} N");
+            assert!((sum - 7.5).abs() <= 7.5 * (tail + aliasing(SIGMA, PITCH) + U + 1e-8), "{touch}, {layer}: {sum} N");
             assert!(tail == 0.0 || sum < 7.5 * (1.0 - 1e-4), "{touch}: the tail is not there: {sum} N");
             let apart = values.iter().zip(&felt).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             // An edge has no width, and a disc's is exact in either.
-            let is_exact = skin.starts_with("contact") && (touch.contains("edge") || touch.contains("flat"));
-            assert!(is_exact != (apart > 1e-4 * 7.5 / 100.0), "{touch}, {skin}: {apart:e} N");
+            let is_exact = layer.starts_with("contact") && (touch.contains("edge") || touch.contains("flat"));
+            assert!(is_exact != (apart > 1e-4 * 7.5 / 100.0), "{touch}, {layer}: {apart:e} N");
             let [mine, its] = [&plain, &other].map(|simulation| simulation.truth().to_vec());
             assert_eq!(mine, its, "the truth is the indenter's");
         }
@@ -325,7 +325,7 @@ fn the_principal_axis_of_a_rod_is_its_truth() {
 fn dead_stuck_and_noisy_taxels_behave() {
     let middle = 2 * HALF * (HALF + 1);
     let sensor = format!(
-        "kind = \"fsr\"\ntap = 38\nnoise_sigma = 2\ndead = [{middle}]\nstuck = [{{ taxel = {}, at = 321 }}]\n\
+        "kind = \"fsr\"\nwiper = 38\nnoise_sigma = 2\ndead = [{middle}]\nstuck = [{{ taxel = {}, at = 321 }}]\n\
          noisy = [{{ taxel = {}, sigma = 80 }}]",
         middle + 1,
         middle + 2
@@ -372,16 +372,16 @@ const PRESS_AFTER_HALF: &str = "indenter = \"ball\"\nradius_m = 0.01\npath = [[0
 
 #[test]
 fn by_its_own_calibration_a_simulation_feels_its_force_and_nothing_at_rest() {
-    let fsr = |counts: u16| FsrCircuit { tap: 50 }.linearised(counts, FsrCircuit::SATURATION_NEWTON);
+    let fsr = |counts: u16| FsrCircuit { wiper: 50 }.linearised(counts, FsrCircuit::SATURATION_NEWTON);
     let as_it_is: fn(f64) -> f64 = |newton| newton;
     let signals: [(&str, &dyn Fn(f64) -> f64); 6] = [
         ("kind = \"ideal\"", &as_it_is),
         ("kind = \"linear\"\noffset = 30.5\ngain = 20", &as_it_is),
         ("kind = \"linear\"\noffset = 240\ngain = 25\ninvert = true", &as_it_is),
-        ("kind = \"fsr\"\ntap = 50", &|newton| fsr(FsrCircuit { tap: 50 }.counts(newton))),
-        ("kind = \"fsr\"\ntap = 50\noutput = \"linearised\"", &|newton| fsr(FsrCircuit { tap: 50 }.counts(newton))),
-        ("kind = \"fsr\"\ntap = 50\noutput = \"logarithmic\"", &|newton| {
-            let circuit = FsrCircuit { tap: 50 };
+        ("kind = \"fsr\"\nwiper = 50", &|newton| fsr(FsrCircuit { wiper: 50 }.counts(newton))),
+        ("kind = \"fsr\"\nwiper = 50\noutput = \"linearised\"", &|newton| fsr(FsrCircuit { wiper: 50 }.counts(newton))),
+        ("kind = \"fsr\"\nwiper = 50\noutput = \"logarithmic\"", &|newton| {
+            let circuit = FsrCircuit { wiper: 50 };
             circuit.logarithmic(circuit.counts(newton))
         }),
     ];
@@ -442,7 +442,7 @@ fn the_papers_rod_lights_row_after_row_of_the_back_board() {
 #[test]
 fn only_what_faces_the_touch_feels_it() {
     let text = "body = \"hand\"\nrate_hz = 1\nduration_s = 1\n[[touch]]\non = \"hand\"\nindenter = \"ball\"\n\
-                radius_m = 0.01\npath = [[0, 0.0055, 0]]\nhold = { newton = 5 }\n[skin]\nthickness_m = 0.02\n";
+                radius_m = 0.01\npath = [[0, 0.0055, 0]]\nhold = { newton = 5 }\n[layer]\nthickness_m = 0.02\n";
     let mut simulation = SimulatedSource::from_text("ball", text, Path::new("")).unwrap();
     first(&mut simulation);
     let truth = &simulation.truth()[0];
@@ -462,7 +462,7 @@ fn a_fingertip_on_a_skinned_body_is_found_where_it_is() {
     // Some of each limb's patches: opening each takes its time.
     for (index, spec) in humanoid.fields.iter().enumerate().step_by(8) {
         let text = format!(
-            "rate_hz = 1\nduration_s = 1\n[skin]\nthickness_m = 0.02\n[[touch]]\non = \"{}\"\nindenter = \"fingertip\"\n\
+            "rate_hz = 1\nduration_s = 1\n[layer]\nthickness_m = 0.02\n[[touch]]\non = \"{}\"\nindenter = \"fingertip\"\n\
              path = [[0, 0]]\nhold = {{ newton = 3 }}\n",
             spec.name
         );
@@ -490,11 +490,11 @@ fn a_fingertip_on_a_skinned_body_is_found_where_it_is() {
 const SOUND: &str = r#"body = "hand"
 rate_hz = 50
 duration_s = 2
-[skin]
+[layer]
 thickness_m = 0.007
 [sensor]
 kind = "fsr"
-tap = 38
+wiper = 38
 dead = [17]
 [[touch]]
 on = "hand/back"
@@ -550,13 +550,13 @@ fn what_is_wrong_is_said_in_one_line() {
             "0.007\nkernel = \"boussinesq\"\ncontact = \"gaussian\"",
             "a.toml: line 7: `contact` is gaussian; beside `kernel = \"boussinesq\"` it must be hertz",
         ),
-        ("tap = 38", "gain_spread = -0.1", "a.toml: line 8: `gain_spread` is -0.1; it must be 0 or more"),
-        ("tap = 38", "threshold_newton = -1", "a.toml: line 8: `threshold_newton` is -1; it must be 0 or more"),
+        ("wiper = 38", "gain_spread = -0.1", "a.toml: line 8: `gain_spread` is -0.1; it must be 0 or more"),
+        ("wiper = 38", "threshold_newton = -1", "a.toml: line 8: `threshold_newton` is -1; it must be 0 or more"),
         ("[sensor]", "[calibration]\ndead_band = -1\n[sensor]", "a.toml: line 7: `dead_band` is -1; it must be 0"),
         ("kind = \"fsr\"", "kind = \"fsrr\"", "a.toml: line 7: there is no choice `fsrr`; did you mean `fsr`?"),
-        ("tap = 38", "tap = 256", "a.toml: line 8: `tap` is 256; it must be between 0 and 255"),
-        ("tap = 38", "gain = 2", "a.toml: line 8: `gain` has no effect for this kind of sensor"),
-        ("tap = 38", "noise_sigma = -2", "a.toml: line 8: `noise_sigma` is -2"),
+        ("wiper = 38", "wiper = 256", "a.toml: line 8: `wiper` is 256; it must be between 0 and 255"),
+        ("wiper = 38", "gain = 2", "a.toml: line 8: `gain` has no effect for this kind of sensor"),
+        ("wiper = 38", "noise_sigma = -2", "a.toml: line 8: `noise_sigma` is -2"),
         ("dead = [17]", "dead = [30]", "a.toml: line 9: the body has no pressure taxel 30"),
         ("dead = [17]", "dead = [17, 17]", "a.toml: line 9: taxel 17 is broken twice"),
         ("dead = [17]", "stuck = [{ taxel = 1, at = inf }]", "a.toml: line 9: `at` is inf"),

@@ -8,24 +8,24 @@ use crate::common::{backends, frame};
 
 const CALIBRATION: &str = "[checks]\nsettle_frames = 2\nisolated_ratio = 3\nisolated_above = 500\n\
      [all]\np_max = 900\nraw_range = [0, 1023]\nbaseline = 3\ndead_band = 10\n[contact]\non = 900\noff = 300\n";
-const UPKEEP: &str = "[upkeep]\ntime_constant_s = 2\nmax_drift = 50\ndead_s = 0.5\nsaturated_s = 1\ncadence_s = 0.3\n";
+const DRIFT: &str = "[drift]\ntime_constant_s = 2\nmax_drift = 50\ndead_s = 0.5\nsaturated_s = 1\ncadence_s = 0.3\n";
 
 /// What differs between the engines of this test.
 #[derive(Clone, Copy, Debug)]
 struct Case {
     backend: BackendKind,
     cadence: Cadence,
-    upkeep: bool,
+    drift: bool,
     tare: bool,
 }
 
 impl Case {
     fn engine(self, body: &Body) -> Engine {
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        let text = if self.upkeep { [CALIBRATION, UPKEEP].concat() } else { CALIBRATION.to_owned() };
+        let text = if self.drift { [CALIBRATION, DRIFT].concat() } else { CALIBRATION.to_owned() };
         let calibration = Some(Calibration::parse(&text, &ids).unwrap());
         // Cadence `on-change` excludes letters of change and filters, and what is made of places in the world.
-        let on_change = Outputs::all() - Outputs::FILTERED - Outputs::CONTACTS - Outputs::SPEED_IN_WORLD;
+        let on_change = Outputs::all() - Outputs::FILTERED - Outputs::SELF_CONTACTS - Outputs::SPEED_IN_WORLD;
         let (receptors, outputs): (&[_], _) = match self.cadence {
             Cadence::OnChange => (&[Receptor::Sustained], on_change),
             Cadence::EveryFrame => (&[Receptor::Sustained, Receptor::Change], Outputs::all()),
@@ -58,10 +58,10 @@ fn a_recording_goes_on_from_a_state_with_the_same_bits() {
         .flat_map(|frame| [0.0, 0.005].map(|later_s| Frame { t_s: frame.t_s + later_s, ..frame.clone() }))
         .collect();
     for backend in backends() {
-        for (cadence, upkeep, tare) in
+        for (cadence, drift, tare) in
             [(Cadence::EveryFrame, false, false), (Cadence::EveryFrame, true, true), (Cadence::OnChange, true, false)]
         {
-            let case = Case { backend, cadence, upkeep, tare };
+            let case = Case { backend, cadence, drift, tare };
             let whole = percepts(&mut case.engine(&body), &frames, 32);
             for start in [0, 1, 37, 100] {
                 let mut first = case.engine(&body);
@@ -89,8 +89,8 @@ fn a_comparison_begins_at_any_frame() {
     let body = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
     let frames = recording(&body, 60);
     for backend in backends() {
-        for (cadence, upkeep) in [(Cadence::EveryFrame, true), (Cadence::OnChange, false)] {
-            let case = Case { backend, cadence, upkeep, tare: false };
+        for (cadence, drift) in [(Cadence::EveryFrame, true), (Cadence::OnChange, false)] {
+            let case = Case { backend, cadence, drift, tare: false };
             let mut engine = case.engine(&body);
             let whole = percepts(&mut engine, &frames, 60);
             let mut engine = case.engine(&body);
@@ -114,11 +114,11 @@ fn a_comparison_begins_at_any_frame() {
 fn a_state_of_another_engine_is_refused() {
     let hand = Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
     let humanoid = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
-    let case = Case { backend: BackendKind::Cpu, cadence: Cadence::EveryFrame, upkeep: false, tare: false };
+    let case = Case { backend: BackendKind::Cpu, cadence: Cadence::EveryFrame, drift: false, tare: false };
     let state: EngineState = case.engine(&hand).state().unwrap();
     for (body, other) in [
         (&humanoid, case),
-        (&hand, Case { upkeep: true, ..case }),
+        (&hand, Case { drift: true, ..case }),
         (&hand, Case { tare: true, ..case }),
         (&hand, Case { cadence: Cadence::OnChange, ..case }),
     ] {

@@ -110,7 +110,7 @@ impl Case {
             })
             .collect();
         let text = format!(
-            "rate_hz = 100\nduration_s = {}\nseed = 11\n[skin]\nthickness_m = {}\n[sensor]\nkind = \"linear\"\n\
+            "rate_hz = 100\nduration_s = {}\nseed = 11\n[layer]\nthickness_m = {}\n[sensor]\nkind = \"linear\"\n\
              offset = {OFFSET}\ngain = {GAIN}\narea_m2 = {}\n{sensor}\n[calibration]\ndead_band = {}\n[[touch]]\non = \"all\"\n{}\n\
              path = [{}]\ntimes_s = [{}]\nforce_newton = [{}]\n",
             frames as f64 / 100.0,
@@ -133,7 +133,7 @@ fn calibrated(simulation: &SimulatedSource, onset: &str) -> Calibration {
 
 fn scene() -> Scene {
     let mut scene = Scene::default();
-    scene.outputs = Outputs::TOTAL | Outputs::PEAK | Outputs::CENTROID | Outputs::AXIS | Outputs::SIGMAS;
+    scene.outputs = Outputs::TOTAL | Outputs::PEAK | Outputs::CENTROID | Outputs::PRINCIPAL_AXIS | Outputs::SIGMAS;
     scene
 }
 
@@ -156,7 +156,7 @@ fn percepts(simulation: &mut SimulatedSource, calibration: Calibration) -> Vec<(
     found
 }
 
-/// The standard deviations of first order of total, centroid and axis, whether that holds or not.
+/// The standard deviations of first order of total, centroid and principal axis, whether that holds or not.
 fn first_order(case: &Case, values: &[f64], onset: &str, sigma: f64) -> [f64; 4] {
     let taken_off = if onset == "soft" { DEAD_BAND / GAIN } else { 0.0 };
     let pressed: Vec<([f64; 2], f64)> = values
@@ -214,7 +214,7 @@ impl Counted {
     }
 }
 
-const NAMES: [&str; 4] = ["total", "centroid u", "centroid v", "axis"];
+const NAMES: [&str; 4] = ["total", "centroid u", "centroid v", "principal axis"];
 
 /// By bin and quantity.
 type Table = [[Counted; 4]; BINS.len() - 1];
@@ -239,10 +239,10 @@ fn table(case: &Case, onset: &str, frames: usize) -> Table {
             seen.total.zip(truth.total).map(|(total, right)| total - right),
             Some(c[0] - right[0]),
             Some(c[1] - right[1]),
-            seen.axis.zip(truth.axis).filter(|_| is_long).map(|(axis, right)| turn(axis, right)),
+            seen.principal_axis.zip(truth.principal_axis).filter(|_| is_long).map(|(axis, right)| turn(axis, right)),
         ];
         let along = |index: usize| seen.centroid_sigma.map(|sigma| sigma[index]);
-        let sigmas = [seen.total_sigma, along(0), along(1), seen.axis_sigma];
+        let sigmas = [seen.total_sigma, along(0), along(1), seen.principal_axis_sigma];
         let first_order = first_order(case, values, onset, sigma);
         for (index, counted) in table[bin].iter_mut().enumerate() {
             let Some(off) = off[index] else { continue };
@@ -335,7 +335,7 @@ fn sigmas_have_the_same_bits_on_every_backend() {
         let sigmas = |percept: &Percept| {
             let bits = |sigma: Option<f64>| sigma.map(f64::to_bits);
             let [u, v] = [0, 1].map(|index| bits(percept.centroid_sigma.map(|sigma| sigma[index])));
-            [bits(percept.total_sigma), u, v, bits(percept.axis_sigma)]
+            [bits(percept.total_sigma), u, v, bits(percept.principal_axis_sigma)]
         };
         assert!(onset == "hard" || right.iter().any(|(_, percept)| percept.total_sigma.is_some()));
         for backend in backends() {
@@ -387,7 +387,7 @@ fn without_noise_or_with_one_taxel_there_is_no_sigma() {
     assert_eq!((one.total, one.total_sigma, one.flags & Flags::ONE_TAXEL), (Some(100.0), None, Flags::ONE_TAXEL));
     let two = hand(known, both, &[17, 18]);
     assert!((two.total_sigma.unwrap() - 1.5 * 2.0_f64.sqrt()).abs() < 1e-12);
-    assert_eq!((two.centroid_sigma, two.axis_sigma), (None, None), "nobody asked for them");
+    assert_eq!((two.centroid_sigma, two.principal_axis_sigma), (None, None), "nobody asked for them");
     // Who does not ask for a sigma has no flag of it either.
     let unasked = hand("[all]\ndead_band = 5\n", Outputs::TOTAL, &[17, 18]);
     assert!(unasked.flags.is_empty() && unasked.total_sigma.is_none());
@@ -427,8 +427,8 @@ fn a_soft_onset_begins_with_nothing() {
 fn baselines_of_soft_onsets_follow_drift_and_tare() {
     let body = Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let press = |onset: &str, upkeep: &str, tare: bool| {
-        let text = format!("[all]\nbaseline = 100\ngain = 0.5\ndead_band = 4\nonset = \"{onset}\"\n{upkeep}");
+    let press = |onset: &str, drift: &str, tare: bool| {
+        let text = format!("[all]\nbaseline = 100\ngain = 0.5\ndead_band = 4\nonset = \"{onset}\"\n{drift}");
         let calibration = Some(Calibration::parse(&text, &ids).unwrap());
         let mut scene = Scene::default();
         scene.outputs = Outputs::PEAK;
@@ -450,11 +450,11 @@ fn baselines_of_soft_onsets_follow_drift_and_tare() {
         }
         peak.unwrap()
     };
-    let upkeep = "[upkeep]\ncadence_s = 0.25\ntime_constant_s = 1\n";
+    let drift = "[drift]\ncadence_s = 0.25\ntime_constant_s = 1\n";
     for (onset, right) in [("hard", 25.0), ("soft", 21.0)] {
-        assert!((press(onset, upkeep, false) - right).abs() < 0.5, "{onset}: {}", press(onset, upkeep, false));
+        assert!((press(onset, drift, false) - right).abs() < 0.5, "{onset}: {}", press(onset, drift, false));
         assert!((press(onset, "", true) - right).abs() < 1e-4, "{onset}: {}", press(onset, "", true));
-        // Negative control: without upkeep the drift is felt.
+        // Negative control: without drift compensation the drift is felt.
         assert!((press(onset, "", false) - right - 3.0).abs() < 1e-4, "{onset}: {}", press(onset, "", false));
     }
 }

@@ -115,7 +115,7 @@ impl Packet {
                 let (name, value) = match *command {
                     Command::Identify => ("identify", json!({})),
                     Command::Rate { rate_mhz } => ("rate", json!({"rate_mhz": rate_mhz})),
-                    Command::Tap { channel, tap } => ("tap", json!({"channel": channel, "tap": tap})),
+                    Command::Wiper { channel, wiper } => ("wiper", json!({"channel": channel, "wiper": wiper})),
                     Command::Start => ("start", json!({})),
                     Command::Stop => ("stop", json!({})),
                 };
@@ -202,11 +202,11 @@ pub(crate) fn examples() -> Vec<(&'static str, Packet)> {
         ("at power-up", identity(0, 64, 0, "")),
         ("asked for", identity(17, 256, 0xDEAD_BEEF, "hand 1.2 µ")),
         ("rate set", answer(18, Command::Rate { rate_mhz: 0 }, Status::Done, 57_029)),
-        ("no such channel", answer(19, Command::Tap { channel: 0, tap: 0 }, Status::Bad, 0)),
+        ("no such channel", answer(19, Command::Wiper { channel: 0, wiper: 0 }, Status::Bad, 0)),
         ("identify", command(1, Command::Identify)),
         ("identify, whoever hears it", Packet::Command { board: 65535, request: 255, command: Command::Identify }),
         ("50 Hz", command(2, Command::Rate { rate_mhz: 50_000 })),
-        ("channel 63 to tap 38", command(3, Command::Tap { channel: 63, tap: 38 })),
+        ("channel 63 to wiper 38", command(3, Command::Wiper { channel: 63, wiper: 38 })),
         ("start", command(4, Command::Start)),
         ("stop", command(5, Command::Stop)),
     ]

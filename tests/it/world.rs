@@ -31,7 +31,7 @@ fn a_touch_that_rests_on_a_turning_link_moves_in_the_world_alone() {
     let outputs = Outputs::POSITION | Outputs::SPEED | Outputs::SPEED_IN_WORLD;
     for backend in backends() {
         for link in [None, Some("skin")] {
-            let scene = Scene::default().outputs(outputs).in_link(link);
+            let scene = Scene::default().outputs(outputs).relative_to(link);
             let mut engine = Engine::new(&body, Options::default().backend(backend).scene(scene)).unwrap();
             let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
             assert!(agreement.holds() && agreement.quantities["speed_in_world"].compared == 4, "{agreement}");
@@ -132,7 +132,7 @@ fn a_field_over_links_that_move_is_where_its_members_are_now() {
     let outputs = Outputs::TOTAL | Outputs::POSITION | Outputs::SPEED_IN_WORLD | Outputs::TOUCHES;
     for backend in backends() {
         for link in [None, Some(in_link.as_str())] {
-            let scene = Scene::default().outputs(outputs).in_link(link);
+            let scene = Scene::default().outputs(outputs).relative_to(link);
             let mut engine = moving.engine(scene.clone(), backend);
             let (percepts, agreement) = engine.process_and_compare(&moving.frames).unwrap();
             assert!(agreement.holds(), "{backend:?}: {agreement}");

@@ -112,7 +112,7 @@ test("an absent column says why", () => {
   model.begin({
     run: "a",
     fields: [{}],
-    columns: [column("total", 1), column("axis", 1)],
+    columns: [column("total", 1), column("principal_axis", 1)],
     flags: ["no_contact", "one_taxel", "tie"],
     scale: { max: 1, from: "" },
   });
@@ -125,7 +125,7 @@ test("an absent column says why", () => {
     },
   });
   assert.deepEqual([...model.value(0, "total")], [3]);
-  assert.equal(model.value(0, "axis"), null);
-  assert.equal(model.reason(0, "axis"), "one_taxel");
+  assert.equal(model.value(0, "principal_axis"), null);
+  assert.equal(model.reason(0, "principal_axis"), "one_taxel");
   assert.equal(model.value(1, "total"), null);
 });

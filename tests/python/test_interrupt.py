@@ -20,7 +20,7 @@ import somatic_touch.batch
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are sent as POSIX has them")
 SENSORS = st.Body.grid(8, 8, 0.01, name="array")
-SCENE = {"outputs": ["total", "centroid", "axis", "speed", "touches"]}
+SCENE = {"outputs": ["total", "centroid", "principal_axis", "speed", "touches"]}
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from conftest import DATA, ROOT, pressed
 import somatic_touch as st
 
 ALL = (
-    "total,peak,active,area,centroid,position,normal,orientation,axis,anisotropy,displacement,direction,distance,"
+    "total,peak,active,area,centroid,position,normal,orientation,principal_axis,anisotropy,displacement,direction,distance,"
     "radial_distance,speed,radial_speed,filtered_displacement,filtered_direction,filtered_speed,touches"
 ).split(",")
 
@@ -70,9 +70,9 @@ def test_the_bundled_touch(somatic, touch: st.Recording, backend: str) -> None:
         compare(changed, text)
 
 
-def test_touches_have_footprints_of_their_own(somatic) -> None:
+def test_touches_have_fits_of_their_own(somatic) -> None:
     rod = ROOT / "examples/simulations/turn.toml"
-    outputs = ["touches", "footprint_kind", "footprint_place", "footprint_angle", "footprint_angle_sigma"]
+    outputs = ["touches", "fit_kind", "fit_place", "fit_angle", "fit_angle_sigma"]
     scene = {"outputs": outputs, "fields": "hand/back"}
     command = ["run", "--quiet", "--source", f"sim:{rod}", "--fields", "hand/back", "--backend", "cpu"]
     text = somatic(*command, "--outputs", ",".join(outputs), "--sink", "-")
@@ -84,13 +84,13 @@ def test_touches_have_footprints_of_their_own(somatic) -> None:
     told = 0
     for index, row in enumerate(rows):
         assert [flag.name.lower() for flag in st.Flags(touches.flags[index])] == row["flags"]
-        for name in ["footprint_place", "footprint_angle", "footprint_angle_sigma"]:
+        for name in ["fit_place", "fit_angle", "fit_angle_sigma"]:
             got = touches[name][index]
             assert np.array_equal(got, row[name]) if name in row else np.isnan(got).all()
             told += name in row
     assert told > 400
-    with pytest.raises(st.UsageError, match="footprint_width"):
-        touches["footprint_width"]
+    with pytest.raises(st.UsageError, match="fit_width"):
+        touches["fit_width"]
 
 
 def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:

@@ -15,7 +15,7 @@ from conftest import DATA, ROOT
 
 import somatic_touch as st
 
-OUTPUTS = ["total", "active", "centroid", "position", "axis", "touches"]
+OUTPUTS = ["total", "active", "centroid", "position", "principal_axis", "touches"]
 
 
 @pytest.fixture(scope="module", params=["cpu", "reference"])
@@ -30,12 +30,12 @@ def test_tables_have_the_rows_of_the_columns(p: st.Percepts) -> None:
     assert table.schema.field("centroid_u").metadata[b"unit"] == b"m"
     assert table.schema.metadata[b"somatic.backend"].split(b";")[0] in (b"cpu", b"reference")
     frames, fields = np.nonzero(p.contact)
-    for column, got in [("total", p["total"]), ("active", p["active"]), ("axis", p["axis"])]:
+    for column, got in [("total", p["total"]), ("active", p["active"]), ("principal_axis", p["principal_axis"])]:
         values = table[column].to_pandas().to_numpy(p[column].dtype)
         assert np.array_equal(values, got[frames, fields], equal_nan=True), column
     for number, component in enumerate("uv"):
         assert np.array_equal(table[f"centroid_{component}"], p["centroid"][frames, fields, number], equal_nan=True)
-    assert table["axis"].null_count == (~p.present("axis")[p.contact]).sum()
+    assert table["principal_axis"].null_count == (~p.present("principal_axis")[p.contact]).sum()
     assert table["field"].to_pylist() == [p.fields[field] for field in fields]
     everything = p.to_arrow(all_fields=True)
     assert everything.num_rows == p.flags.size

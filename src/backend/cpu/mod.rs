@@ -4,11 +4,10 @@
 //! is written once ([`pipeline`] and the stages). Every lane does the operations of its cell in one fixed order, never
 //! fused, so that percepts have the same bits however a recording is cut and whatever instructions there are.
 
-mod axis;
 mod calibrate;
 mod change;
 mod contact;
-pub(crate) mod footprint;
+pub(crate) mod fit;
 mod gate;
 mod hysteresis;
 mod lanes;
@@ -17,6 +16,7 @@ mod members;
 mod motion;
 mod orientation;
 mod pipeline;
+mod principal_axis;
 #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the GPU's frames go up side by side"))]
 pub(super) mod read;
 mod recording;

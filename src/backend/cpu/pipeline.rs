@@ -1,4 +1,4 @@
-//! The stages from contact to axis, in their order, over as many cells as there are lanes.
+//! The stages from contact to principal_axis, in their order, over as many cells as there are lanes.
 //!
 //! Whether the lanes are frames of one field or fields of one frame, each does the operations of its own cell in one
 //! fixed order, never fused: percepts have the same bits either way, and on every instruction set. A cell's stages wait for
@@ -7,11 +7,11 @@
 
 use fearless_simd::prelude::*;
 
-use super::axis;
 use super::contact::{self, Sums};
 use super::lanes::{F, LANES, M, Row, U, bits_where, load, load_u, splat, splat_u, store, store_u, width};
 use super::members::{Compensated, Kind, KindLanes, Members, OnePass, Sum, Touch};
 use super::orientation::{self, Farthest};
+use super::principal_axis;
 use super::write::Answers;
 use crate::percept::{Component, Flags, Outputs};
 use crate::scene::{Plan, Stages};
@@ -76,7 +76,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for Abreast<P> {
 
     #[inline(always)]
     fn moments<A: Sum<S>>(self, simd: S, at: usize, touch: &Touch<S>) -> [F<S>; 3] {
-        let [a, b, d] = axis::moments::<S, A, P>(simd, self.0, at, touch);
+        let [a, b, d] = principal_axis::moments::<S, A, P>(simd, self.0, at, touch);
         [a.total(), b.total(), d.total()]
     }
 }
@@ -106,7 +106,7 @@ pub(super) struct Between {
     /// The centroid's numerators, then the centroid, in the field's unit.
     u: Row<f32>,
     v: Row<f32>,
-    /// What orientation has found, then what axis has.
+    /// What orientation has found, then what principal_axis has.
     found: [Row<f32>; 5],
 }
 
@@ -178,7 +178,7 @@ pub(super) fn all_stages<S: Simd, P: Sweep<S>, K: Kind<S>>(
             }
         });
     }
-    if stages.axis {
+    if stages.principal_axis {
         for_each_vector!(|members, kind, at, between, answers| {
             if let Some(touch) = charted_touch::<S, 1>(simd, &kind, at, between, answers) {
                 let moments = match compensated {
@@ -190,7 +190,7 @@ pub(super) fn all_stages<S: Simd, P: Sweep<S>, K: Kind<S>>(
         });
         for_each_vector!(|_, kind, at, between, answers| {
             if let Some(touch) = charted_touch::<S, 1>(simd, &kind, at, between, answers) {
-                axis::finish(simd, &touch, kept(simd, at, between), at, answers);
+                principal_axis::finish(simd, &touch, kept(simd, at, between), at, answers);
             }
         });
     }
@@ -234,7 +234,7 @@ fn find_contact<S: Simd, P: Sweep<S>>(
         store_u(simd, sums.active, &mut answers.active, at);
     }
     if !(touched.any_true() && kind.any_charted()) {
-        for part in orientation::PARTS.into_iter().chain(axis::PARTS) {
+        for part in orientation::PARTS.into_iter().chain(principal_axis::PARTS) {
             answers.put(simd, part, none, at);
         }
     }

@@ -229,7 +229,7 @@ fn fields_wider_than_what_is_at_hand_have_the_same_bits() {
     // Among the others, as charted fields and on both sides of the fold, where there is no chart.
     body.fields.insert(5, wide("all", (0..30_000).step_by(2).collect()));
     body.fields.push(wide("one side", (0..FOLD).filter(|id| id % 5 != 1).collect()));
-    for outputs in [Outputs::USUAL, Outputs::TOTAL, Outputs::CENTROID, Outputs::AXIS] {
+    for outputs in [Outputs::USUAL, Outputs::TOTAL, Outputs::CENTROID, Outputs::PRINCIPAL_AXIS] {
         let plan = plan_of(&body, &Scene { outputs, ..Scene::default() });
         assert_eq!(window::Window::new(&plan).slots(), plan.slots());
         same_bits_however_cut(&plan, FRAMES);

@@ -6,12 +6,12 @@
 
 use fearless_simd::prelude::*;
 
-use super::axis;
 use super::contact::{self, Sums};
 use super::lanes::{F, I, LANES, M, Row, U, splat, splat_u, store, store_u, width};
 use super::members::{Members, OnePass, Sum, Touch};
 use super::orientation::{Farthest, point};
 use super::pipeline::{Abreast, Sweep};
+use super::principal_axis;
 use crate::stage::calibrate::UNUSABLE;
 
 /// A wide field in one frame: all lanes have members of it, and its answer.
@@ -162,7 +162,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for Wide<P> {
         all_lanes(
             simd,
             #[inline(always)]
-            |at| axis::moments::<S, A, P>(simd, self.0, at, touch),
+            |at| principal_axis::moments::<S, A, P>(simd, self.0, at, touch),
         )
     }
 }
@@ -308,7 +308,7 @@ impl<S: Simd, P: Members<S>> Sweep<S> for WideAbreast<P> {
             simd,
             self.0.count(),
             #[inline(always)]
-            |member, sums: &mut [A; 3]| axis::add(simd, self.0, member, at, touch, sums),
+            |member, sums: &mut [A; 3]| principal_axis::add(simd, self.0, member, at, touch, sums),
         )
     }
 }

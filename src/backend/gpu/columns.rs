@@ -79,13 +79,13 @@ impl Columns {
     }
 
     pub(super) fn of_fields(&self, plan: &Plan) -> Vec<(&'static str, f64)> {
-        let mut overrides = self.overrides(&["contact", "centroid", "orientation", "axis"]);
+        let mut overrides = self.overrides(&["contact", "centroid", "orientation", "principal_axis"]);
         overrides.push(("DEPTH_AT", self.at(Column::Component(Component::CentroidDepth))));
         let stages = plan.stages();
         let said = [
             ("CENTRED", stages.centroid),
             ("ORIENTED", stages.orientation),
-            ("AXED", stages.axis),
+            ("AXED", stages.principal_axis),
             ("COMPENSATED", plan.is_compensated()),
             ("UNWEIGHTED", plan.fields.iter().all(|field| field.unweighted)),
         ];
@@ -124,7 +124,7 @@ mod tests {
         let body = Body::from_bytes("hand.glb", bundled::HAND).unwrap();
         let wanted = Outputs::all().iter().chain([Outputs::USUAL, Outputs::CENTROID | Outputs::SPEED]);
         // Those come back as pressures.
-        let of_pressures = Outputs::TOUCHES | Outputs::CONTACTS | Outputs::FORCE | Outputs::FOOTPRINT;
+        let of_pressures = Outputs::TOUCHES | Outputs::SELF_CONTACTS | Outputs::FORCE | Outputs::FIT;
         for outputs in wanted.filter(|outputs| !outputs.intersects(of_pressures)) {
             let plan = plan_of(&body, &Scene { outputs, ..Scene::default() });
             let cells = plan.fields.len() * size_of::<u32>();

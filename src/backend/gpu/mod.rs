@@ -10,7 +10,7 @@ pub(crate) mod adapter;
 mod bus;
 mod capacity;
 mod columns;
-mod footprint;
+mod fit;
 mod members;
 mod over_fields;
 mod pack;
@@ -38,7 +38,7 @@ pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 use self::adapter::Device;
 use self::capacity::FRAMES_A_BLOCK;
 use self::columns::{Columns, NOTHING};
-use self::footprint::Descents;
+use self::fit::Descents;
 use self::over_fields::{Bound, OverFields};
 use self::pack::{Form, HEADER, Packer, STEP};
 use self::ring::{SETS, Set};
@@ -50,7 +50,7 @@ use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
-use crate::stage::footprint::{Ends, Touch, numbers};
+use crate::stage::fit::{Ends, Touch, numbers};
 use crate::stage::{layout, motion};
 
 /// The backend, with everything it needs on the device.
@@ -202,7 +202,7 @@ impl Gpu {
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
         let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
-        let descents = wanted.footprint.then(|| Descents::new(&device, &shaders::footprint(&numbers())));
+        let descents = wanted.fit.then(|| Descents::new(&device, &shaders::fit(&numbers())));
         device.check()?;
         Ok(Self {
             plan: plan.clone(),

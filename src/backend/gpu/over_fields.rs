@@ -1,4 +1,4 @@
-//! The stages from contact to axis on the device: a program over fields, one over wide ones, and three over their parts.
+//! The stages from contact to principal_axis on the device: a program over fields, one over wide ones, and three over their parts.
 
 use wgpu::BindingResource;
 
@@ -79,7 +79,7 @@ impl OverFields {
             by_parts,
             abreast: if capacity == 1 { Abreast::One } else { Abreast::Four },
             told: columns.of_fields(plan),
-            lined: stages.orientation || stages.axis,
+            lined: stages.orientation || stages.principal_axis,
         }
     }
 

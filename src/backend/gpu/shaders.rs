@@ -1,11 +1,11 @@
-//! The shaders' text: one file a stage, after what they share. The stages from contact to axis are one program, put together
+//! The shaders' text: one file a stage, after what they share. The stages from contact to principal_axis are one program, put together
 //! for where it reads and for how many frames it takes at once.
 
 use std::borrow::Cow;
 
 use crate::percept::COLUMNS;
 #[cfg(test)]
-use crate::stage::footprint::numbers;
+use crate::stage::fit::numbers;
 use crate::stage::layout::PRESENT;
 
 /// A program's name, the stages that it computes, and its whole WGSL.
@@ -55,11 +55,11 @@ pub(crate) const CHANGE: Shader = shader!("change"; "four_frames", "marks");
 pub(crate) const HYSTERESIS: Shader = shader!("hysteresis";);
 pub(crate) const MOTION: Shader = shader!("motion"; "angle");
 
-/// Descents of contacts, with [`crate::stage::footprint::numbers`]: over touches, not over frames, and so without what the others share.
-pub(crate) fn footprint(numbers: &[(String, f64)]) -> Shader {
+/// Descents of contacts, with [`crate::stage::fit::numbers`]: over touches, not over frames, and so without what the others share.
+pub(crate) fn fit(numbers: &[(String, f64)]) -> Shader {
     let numbers: String = numbers.iter().map(|(name, number)| format!("const {name} = {number:?};\n")).collect();
-    let source = numbers + include_str!("../../../shaders/footprint.wgsl");
-    Shader { name: "footprint", stages: &["footprint"], source: source.into() }
+    let source = numbers + include_str!("../../../shaders/fit.wgsl");
+    Shader { name: "fit", stages: &["fit"], source: source.into() }
 }
 
 /// Frames that an invocation of the program over fields takes at once.
@@ -87,7 +87,7 @@ pub(crate) enum Members {
     Few,
 }
 
-/// Contact, centroid, orientation and axis, over fields that are not wide.
+/// Contact, centroid, orientation and principal_axis, over fields that are not wide.
 pub(crate) fn narrow_fields(abreast: Abreast, values: Values, members: Members) -> Shader {
     over_fields("fields", shared!("narrow_fields"), abreast, values, members)
 }
@@ -115,11 +115,11 @@ fn over_fields(name: &'static str, fields: &str, abreast: Abreast, values: Value
         include_str!("../../../shaders/contact.wgsl"),
         include_str!("../../../shaders/centroid.wgsl"),
         include_str!("../../../shaders/orientation.wgsl"),
-        include_str!("../../../shaders/axis.wgsl"),
+        include_str!("../../../shaders/principal_axis.wgsl"),
     );
     Shader {
         name,
-        stages: &["contact", "centroid", "orientation", "axis"],
+        stages: &["contact", "centroid", "orientation", "principal_axis"],
         source: [shared!("layout"), abreast, values, members, SHARED, fields, STAGES].concat().into(),
     }
 }
@@ -136,6 +136,6 @@ pub(crate) fn all() -> Vec<Shader> {
             }
         }
     }
-    all.extend([HYSTERESIS, MOTION, footprint(&numbers())]);
+    all.extend([HYSTERESIS, MOTION, fit(&numbers())]);
     all
 }

@@ -54,9 +54,9 @@ enum Rest {
     High,
 }
 
-/// What boards do when they are told to set a tap.
+/// What boards do when they are told to set a wiper.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Taps {
+enum Wipers {
     /// They set it.
     Obeyed,
     /// They do not know the command.
@@ -117,13 +117,13 @@ pub(super) struct Arguments {
     #[arg(long)]
     wait: bool,
 
-    /// What an untouched sensor reads, which matters to the taps.
+    /// What an untouched sensor reads, which matters to the wipers.
     #[arg(long, value_enum, default_value = "low")]
     rest: Rest,
 
-    /// What boards do when they are told to set a tap of a potentiometer.
+    /// What boards do when they are told to set a wiper of a potentiometer.
     #[arg(long, value_enum, default_value = "obeyed")]
-    taps: Taps,
+    wipers: Wipers,
 
     /// What is to go wrong.
     #[arg(long, value_name = "FAULTS", default_value = "")]
@@ -309,10 +309,10 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, LineSettings, Play)> {
             running: !arguments.wait,
             partial: arguments.partial,
             falls: arguments.rest == Rest::High,
-            potentiometers: match arguments.taps {
-                Taps::Obeyed => Potentiometers::Obeyed,
-                Taps::Unknown => Potentiometers::Unknown,
-                Taps::Ignored => Potentiometers::Ignored,
+            potentiometers: match arguments.wipers {
+                Wipers::Obeyed => Potentiometers::Obeyed,
+                Wipers::Unknown => Potentiometers::Unknown,
+                Wipers::Ignored => Potentiometers::Ignored,
             },
             drift: faults.drift,
         };

@@ -158,7 +158,7 @@ impl Station {
             "frames": self.board.frames(),
             "bytes": self.bytes,
             "commands": self.board.commands(),
-            "taps": self.board.taps(),
+            "wipers": self.board.wipers(),
             "faults": {
                 "noise_bytes": out.noise_bytes + back.noise_bytes,
                 "dropped_bytes": out.dropped_bytes + back.dropped_bytes,

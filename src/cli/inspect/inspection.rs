@@ -9,7 +9,7 @@ pub(super) struct Inspection {
     pub(super) body: Body,
     pub(super) fields: Vec<Field>,
     pub(super) coverage: Coverage,
-    /// Links with taxels that are within the tolerance of contacts at rest.
+    /// Links with taxels that are within the tolerance of self-contacts at rest.
     pub(super) overlaps: Vec<RestOverlap>,
     /// A line each; those of reading first.
     pub(super) findings: Vec<String>,

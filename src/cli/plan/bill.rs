@@ -65,7 +65,7 @@ impl Bill {
         let made = |outputs: Outputs| -> Result<Engine> {
             let mut options = options.clone().backend(kind);
             options.scene.outputs = outputs;
-            if !outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) {
+            if !outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) {
                 // A way to an orientation is for those that have one.
                 options.scene.knobs.orientation_by = OrientationBy::AsAsked;
             }

@@ -114,7 +114,7 @@ fn rounded(us: f64) -> f64 {
 /// What single precision costs, in the units that people think in.
 fn accuracy(agreement: &Agreement) -> String {
     let mut words = Vec::new();
-    for name in ["centroid", "orientation", "axis", "direction"] {
+    for name in ["centroid", "orientation", "principal_axis", "direction"] {
         let Some(of) = agreement.quantities.get(name).filter(|of| of.compared + of.too_close > 0) else { continue };
         let within = match name {
             _ if of.compared == 0 => String::new(),

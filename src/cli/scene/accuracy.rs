@@ -61,9 +61,9 @@ pub(in crate::cli) struct Accuracy {
     #[schemars(with = "Option<String>", extend("enum" = Charts::WORDS))]
     pub(in crate::cli) charts: Option<Charts>,
 
-    /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), axis alone
-    /// (second-moments), or with it that of the contact fitted in one step (footprint-1), two (footprint-2) or all
-    /// (footprint), and its place [default: as-asked].
+    /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), principal_axis alone
+    /// (second-moments), or with it that of the contact fitted in one step (fit-1), two (fit-2) or all
+    /// (fit), and its place [default: as-asked].
     #[arg(long, help_heading = ACCURACY, value_name = "WAY",
         value_parser = one_of::<OrientationBy>(OrientationBy::WORDS))]
     #[serde(deserialize_with = "word")]
@@ -165,8 +165,9 @@ impl Accuracy {
         if target.centroid_m.is_some() && outputs.is_empty() {
             return Err(("centroid", Error::usage("a tolerance needs outputs to hold for")));
         }
-        if target.orientation_rad.is_some() && !outputs.intersects(Outputs::ORIENTATION | Outputs::AXIS) {
-            let what = "a tolerance of orientation is for output `orientation` or `axis`, and neither is asked for";
+        if target.orientation_rad.is_some() && !outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) {
+            let what =
+                "a tolerance of orientation is for output `orientation` or `principal_axis`, and neither is asked for";
             return Err(("orientation", Error::usage(what)));
         }
         match (backend, self.arithmetic) {

@@ -39,8 +39,8 @@ impl RunOptions {
             return Err(Error::usage(format!("--max-gap {gap} is not a time span; give seconds over 0")));
         }
         if let Some(tolerance) = self.contact_tolerance {
-            if !self.outputs().contains(Outputs::CONTACTS) {
-                return Err(Error::usage("--contact-tolerance is for contacts; add them to --outputs"));
+            if !self.outputs().contains(Outputs::SELF_CONTACTS) {
+                return Err(Error::usage("--contact-tolerance is for self_contacts; add them to --outputs"));
             }
             if !(tolerance.is_finite() && tolerance > 0.0) {
                 return Err(Error::usage(format!(
@@ -62,7 +62,7 @@ impl RunOptions {
         ];
         // Fitted contacts have motion over a time, too.
         let measured = |flag: &str| match flag {
-            "--filter-over" => outputs.intersects(Outputs::FILTERED | Outputs::FOOTPRINT_MOTION),
+            "--filter-over" => outputs.intersects(Outputs::FILTERED | Outputs::FIT_MOTION),
             _ => outputs.intersects(Outputs::FILTERED),
         };
         if let Some((flag, _)) = given.iter().find(|(flag, given)| *given && !measured(flag)) {

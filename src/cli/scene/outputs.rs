@@ -11,7 +11,7 @@ pub(super) fn output_names(schema: &mut schemars::Schema) {
 pub(in crate::cli) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
-        "Compute only these quantities: {} [default: all but touches, contacts, speed_in_world, filtered_*, footprint_* and \
+        "Compute only these quantities: {} [default: all but touches, self_contacts, speed_in_world, filtered_*, fit_* and \
          *_sigma; force only where P has a unit]",
         names.join(", ")
     )

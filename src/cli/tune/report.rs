@@ -23,7 +23,7 @@ pub(super) fn table(tuning: &Tuning, places: &[TunedChannel]) -> String {
         count(tuning.rounds() as u64, "round"),
         if tuning.falls() { "fall" } else { "rise" }
     );
-    let mut table = plain(["taxel", "board", "channel", "tap", "at rest", "firm press", "of the range"], 0..7);
+    let mut table = plain(["taxel", "board", "channel", "wiper", "at rest", "firm press", "of the range"], 0..7);
     let dash = || "–".to_owned();
     for (at, (sensor, _, [before, after])) in places.iter().zip(tuning.outcomes()).take(LISTED) {
         let number = |raw: f64| format!("{raw:.0}");
@@ -33,10 +33,10 @@ pub(super) fn table(tuning: &Tuning, places: &[TunedChannel]) -> String {
             at.taxel.to_string(),
             at.id.to_string(),
             at.channel.to_string(),
-            if sensor.tap == sensor.before {
-                sensor.tap.to_string()
+            if sensor.wiper == sensor.before {
+                sensor.wiper.to_string()
             } else {
-                format!("{} → {}", sensor.before, sensor.tap)
+                format!("{} → {}", sensor.before, sensor.wiper)
             },
             last.map_or_else(dash, |look| number(look.rest)),
             last.map_or_else(dash, |look| number(look.press)),
@@ -72,7 +72,7 @@ pub(super) fn json(tuning: &Tuning, places: &[TunedChannel]) -> String {
             let last = sensor.last();
             json!({
                 "taxel": at.taxel, "board": at.id, "channel": at.channel,
-                "tap_before": sensor.before, "tap": sensor.tap, "acknowledged": at.is_set,
+                "wiper_before": sensor.before, "wiper": sensor.wiper, "acknowledged": at.is_set,
                 "rest": last.map(|look| look.rest), "press": last.map(|look| look.press),
                 "share_before": before, "share": after,
                 "fits": tuned == Tuned::Fits,
@@ -87,7 +87,7 @@ pub(super) fn json(tuning: &Tuning, places: &[TunedChannel]) -> String {
 }
 
 pub(super) fn wiring(wiring: &Wiring) -> String {
-    format!("# With the taps that `somatic tune` found.\n{}", wiring.to_toml())
+    format!("# With the wipers that `somatic tune` found.\n{}", wiring.to_toml())
 }
 
 /// A calibration for the paper's circuit.
@@ -98,12 +98,12 @@ pub(super) fn fsr(tuning: &Tuning, body: &str) -> Result<String> {
         ));
     }
     let mut counts = BTreeMap::new();
-    tuning.sensors().iter().for_each(|sensor| *counts.entry(sensor.tap).or_insert(0) += 1);
-    let usual = counts.iter().max_by_key(|(_, count)| **count).map_or(FsrCircuit::MIDDLE_TAP, |(tap, _)| *tap);
+    tuning.sensors().iter().for_each(|sensor| *counts.entry(sensor.wiper).or_insert(0) += 1);
+    let usual = counts.iter().max_by_key(|(_, count)| **count).map_or(FsrCircuit::MIDDLE_WIPER, |(wiper, _)| *wiper);
     let body = Value::from(body);
     let mut text = format!("body = {body}\n\n[all]\nsensor = \"fsr\"\ntap = {usual}\n");
-    for sensor in tuning.sensors().iter().filter(|sensor| sensor.tap != usual) {
-        text += &format!("\n[taxel.{}]\ntap = {}\n", sensor.id, sensor.tap);
+    for sensor in tuning.sensors().iter().filter(|sensor| sensor.wiper != usual) {
+        text += &format!("\n[taxel.{}]\nwiper = {}\n", sensor.id, sensor.wiper);
     }
     Ok(text)
 }

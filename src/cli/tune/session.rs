@@ -17,9 +17,9 @@ use crate::cli::words;
 
 /// Boards without progress for this long are given up.
 const BOARD_TIMEOUT: Duration = Duration::from_secs(6);
-/// Time until frames from before a tap change have passed.
+/// Time until frames from before a wiper change have passed.
 const SETTLE_TIME: Duration = Duration::from_millis(300);
-/// Time limit for restoring the taps.
+/// Time limit for restoring the wipers.
 const RESTORE_TIMEOUT: Duration = Duration::from_secs(4);
 /// Time between updates of the press count.
 const UPDATE_INTERVAL: Duration = Duration::from_millis(150);
@@ -43,9 +43,9 @@ pub(super) struct TunedChannel {
     pub(super) id: u16,
     pub(super) channel: u16,
     pub(super) taxel: u32,
-    /// The tap at the start.
+    /// The wiper at the start.
     before: u8,
-    /// Whether its board has confirmed the wanted tap.
+    /// Whether its board has confirmed the wanted wiper.
     pub(super) is_set: bool,
     /// Why not, if it has not.
     pub(super) trouble: Option<&'static str>,
@@ -88,12 +88,12 @@ impl Guide {
 }
 
 impl TuningSession {
-    /// For `source`, whose wiring is `wiring` with a tap on each channel.
+    /// For `source`, whose wiring is `wiring` with a wiper on each channel.
     pub(super) fn new(source: SerialSource, wiring: &Wiring, stop: Arc<AtomicBool>) -> Self {
         let mut places = Vec::new();
         for (board, wired) in wiring.boards().iter().enumerate() {
-            for (channel, (taxel, tap)) in (0..).zip(wired.taxels.iter().zip(&wired.taps)) {
-                if let (Some(taxel), Some(before)) = (*taxel, *tap) {
+            for (channel, (taxel, wiper)) in (0..).zip(wired.taxels.iter().zip(&wired.wipers)) {
+                if let (Some(taxel), Some(before)) = (*taxel, *wiper) {
                     let id = wired.id;
                     places.push(TunedChannel { board, id, channel, taxel, before, is_set: false, trouble: None });
                 }
@@ -105,39 +105,39 @@ impl TuningSession {
         Self { lines, feed, stop, enter: None, places, guide }
     }
 
-    /// Tuning of the sensors at their first taps.
+    /// Tuning of the sensors at their first wipers.
     pub(super) fn tuning(&mut self) -> Result<Tuning> {
         let accounts = self.lines.accounts();
         let most = |board: usize| f64::from((1_u32 << accounts[board].bits.unwrap_or(10)) - 1);
         let sensors: Vec<_> = self.places.iter().map(|at| (at.taxel, most(at.board), at.before)).collect();
         let mut tuning = Tuning::new(&sensors);
-        self.mark_failed_taps(&mut tuning);
+        self.mark_failed_wipers(&mut tuning);
         if accounts.iter().all(|account| account.state == BoardState::Awaited) {
             return Err(Error::failed("no board answered; `somatic devices` shows the ports"));
         }
-        let taps = self.lines.taps();
-        if self.places.iter().all(|at| taps[at.board][usize::from(at.channel)].set.is_none()) {
+        let wipers = self.lines.wipers();
+        if self.places.iter().all(|at| wipers[at.board][usize::from(at.channel)].set.is_none()) {
             return Err(Error::failed(
-                "no board sets a tap; does its firmware know the command, and has it potentiometers?",
+                "no board sets a wiper; does its firmware know the command, and has it potentiometers?",
             ));
         }
         Ok(tuning)
     }
 
-    /// Requests taps, by sensor index.
-    pub(super) fn set(&mut self, taps: &[(usize, u8)]) {
-        for &(index, tap) in taps {
+    /// Requests wipers, by sensor index.
+    pub(super) fn set(&mut self, wipers: &[(usize, u8)]) {
+        for &(index, wiper) in wipers {
             let at = self.places[index];
-            self.lines.set_tap(at.board, usize::from(at.channel), tap);
+            self.lines.set_wiper(at.board, usize::from(at.channel), wiper);
         }
     }
 
-    /// Number of taps that are requested, not confirmed and not given up.
+    /// Number of wipers that are requested, not confirmed and not given up.
     fn due(&self) -> usize {
-        let due = self.lines.taps();
+        let due = self.lines.wipers();
         due.iter()
             .flatten()
-            .filter(|tap| tap.wanted.is_some() && tap.wanted != tap.set && tap.trouble.is_none())
+            .filter(|wiper| wiper.wanted.is_some() && wiper.wanted != wiper.set && wiper.trouble.is_none())
             .count()
     }
 
@@ -147,7 +147,7 @@ impl TuningSession {
         }
     }
 
-    /// Waits until all taps are confirmed or given up.
+    /// Waits until all wipers are confirmed or given up.
     pub(super) fn settle(&mut self) -> Result<PhaseEnd> {
         let (mut since, mut before) = (Instant::now(), usize::MAX);
         loop {
@@ -165,7 +165,7 @@ impl TuningSession {
                 self.guide.clear();
                 return Ok(PhaseEnd::Completed);
             }
-            self.guide.show(|| format!("  {due} taps to set"));
+            self.guide.show(|| format!("  {due} wipers to set"));
             self.take(|_| ())?;
         }
     }
@@ -242,33 +242,33 @@ impl TuningSession {
         enter.try_iter().count() > 0
     }
 
-    pub(super) fn mark_failed_taps(&mut self, tuning: &mut Tuning) {
-        let taps = self.lines.taps();
+    pub(super) fn mark_failed_wipers(&mut self, tuning: &mut Tuning) {
+        let wipers = self.lines.wipers();
         for (index, at) in self.places.iter().enumerate() {
-            let tap = taps[at.board][usize::from(at.channel)];
-            if tap.wanted != tap.set {
-                tuning.not_set(index, tap.set.unwrap_or(at.before));
+            let wiper = wipers[at.board][usize::from(at.channel)];
+            if wiper.wanted != wiper.set {
+                tuning.not_set(index, wiper.set.unwrap_or(at.before));
             }
         }
     }
 
     pub(super) fn places(&self, wiring: &Wiring) -> Vec<TunedChannel> {
-        let taps = self.lines.taps();
-        debug_assert_eq!(taps.len(), wiring.boards().len());
+        let wipers = self.lines.wipers();
+        debug_assert_eq!(wipers.len(), wiring.boards().len());
         let now = |at: &TunedChannel| {
-            let tap = taps[at.board][usize::from(at.channel)];
-            let is_set = tap.wanted == tap.set;
-            let trouble = (!is_set).then(|| tap.trouble.map_or("is not there", |trouble| trouble.word()));
+            let wiper = wipers[at.board][usize::from(at.channel)];
+            let is_set = wiper.wanted == wiper.set;
+            let trouble = (!is_set).then(|| wiper.trouble.map_or("is not there", |trouble| trouble.word()));
             TunedChannel { is_set, trouble, ..*at }
         };
         self.places.iter().map(now).collect()
     }
 
-    /// Restores the first taps; returns the result in words.
-    pub(super) fn restore_taps(&mut self) -> String {
+    /// Restores the first wipers; returns the result in words.
+    pub(super) fn restore_wipers(&mut self) -> String {
         self.guide.clear();
         for at in &self.places {
-            self.lines.set_tap(at.board, usize::from(at.channel), at.before);
+            self.lines.set_wiper(at.board, usize::from(at.channel), at.before);
         }
         let start = Instant::now();
         while self.due() > 0 && start.elapsed() < RESTORE_TIMEOUT {
@@ -276,21 +276,21 @@ impl TuningSession {
             std::thread::sleep(Duration::from_millis(20));
         }
         self.tell();
-        let taps = self.lines.taps();
+        let wipers = self.lines.wipers();
         let other: Vec<String> = self
             .places
             .iter()
-            .filter(|at| taps[at.board][usize::from(at.channel)].set != Some(at.before))
-            .map(|at| match taps[at.board][usize::from(at.channel)].set {
-                Some(tap) => format!("taxel {} has {tap}", at.taxel),
+            .filter(|at| wipers[at.board][usize::from(at.channel)].set != Some(at.before))
+            .map(|at| match wipers[at.board][usize::from(at.channel)].set {
+                Some(wiper) => format!("taxel {} has {wiper}", at.taxel),
                 None => format!("taxel {} is not known", at.taxel),
             })
             .collect();
         self.close();
         match other.len() {
-            0 => "all taps are as they were at first".to_owned(),
-            n if n == self.places.len() => "no tap could be put back".to_owned(),
-            n => format!("all but {n} taps are as they were at first: {}", other.join(", ")),
+            0 => "all wipers are as they were at first".to_owned(),
+            n if n == self.places.len() => "no wiper could be put back".to_owned(),
+            n => format!("all but {n} wipers are as they were at first: {}", other.join(", ")),
         }
     }
 

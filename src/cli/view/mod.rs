@@ -82,7 +82,7 @@ fn shown(arg: clap::Arg) -> clap::Arg {
 
 /// Flags of `run` that a page has no use for.
 const HIDDEN: [&str; 12] = [
-    "in",
+    "relative-to",
     "sink",
     "header",
     "verify",

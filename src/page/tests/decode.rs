@@ -74,7 +74,7 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
     frame["newestEvent"] = newest.into();
     frame["engineMicroseconds"] = from.f32();
     let answers = from.u32();
-    for part in ["pressure", "health", "pose", "percepts", "touches", "contacts", "samples"] {
+    for part in ["pressure", "health", "pose", "percepts", "touches", "selfContacts", "samples"] {
         frame[part] = Value::Null;
     }
     let taxels = scene.counts.taxels as u32;
@@ -114,8 +114,8 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
             json!({"identity": identity, "sides": sides, "position": from.f32s(3), "distance": from.f32(), "angle": from.f32()})
         };
         let known = number != u32::MAX;
-        let contacts: Vec<Value> = (0..if known { number } else { 0 }).map(&mut contact).collect();
-        frame["contacts"] = json!({"known": known, "list": contacts});
+        let self_contacts: Vec<Value> = (0..if known { number } else { 0 }).map(&mut contact).collect();
+        frame["selfContacts"] = json!({"known": known, "list": self_contacts});
         from.pad();
     }
     if sections & 16 != 0 {

@@ -4,7 +4,7 @@ import { Boards } from "./boards.js";
 import { Camera, chooseDirection } from "./camera.js";
 import { ChartPanel } from "./chart.js";
 import { Choices, MARKS } from "./choices.js";
-import { ContactsPanel } from "./contacts.js";
+import { SelfContactsPanel } from "./self_contacts.js";
 import { atMostEvery, byId, setText } from "./dom.js";
 import { PerceptPanel } from "./explain.js";
 import { Fields } from "./fields.js";
@@ -45,7 +45,7 @@ const chart = new ChartPanel(
   model,
   choices,
 );
-const contacts = new ContactsPanel(model, (field) => choices.choose(field));
+const selfContacts = new SelfContactsPanel(model, (field) => choices.choose(field));
 new Boards(model);
 new Log(
   model,
@@ -174,7 +174,7 @@ model.on("connection", () => {
 const updatePanels = atMostEvery(100, () => {
   fields.update();
   percept.update();
-  contacts.update();
+  selfContacts.update();
   legend.updateStates();
   if (byId("chart-panel", HTMLDetailsElement).open) chart.draw();
 });

@@ -17,7 +17,7 @@ const MOTION = ["no_chart", "no_previous", "bad_dt", "held", "jumped"];
 const REASONS = {
   centroid: ["no_chart"],
   orientation: ["no_chart", "one_taxel", "coincident"],
-  axis: ["no_chart", "one_taxel", "coincident", "isotropic"],
+  principal_axis: ["no_chart", "one_taxel", "coincident", "isotropic"],
   anisotropy: ["no_chart", "one_taxel", "coincident"],
   displacement: MOTION,
   distance: MOTION,
@@ -50,8 +50,8 @@ export class Model extends Observed {
     this.inContact = new Map();
     /** @type {import("./wire.js").Touch[]} */
     this.touches = [];
-    /** Touches of two links at one place. @type {import("./wire.js").Contacts} */
-    this.contacts = noContacts();
+    /** Touches of two links at one place. @type {import("./wire.js").SelfContacts} */
+    this.selfContacts = noSelfContacts();
     /** The newest frame's head. @type {Frame | null} */
     this.frame = null;
     /** @type {import("./wire.js").Scale} */
@@ -99,7 +99,7 @@ export class Model extends Observed {
     this.percepts = null;
     this.inContact = new Map();
     this.touches = [];
-    this.contacts = noContacts();
+    this.selfContacts = noSelfContacts();
     this.frame = null;
     this.boards = [];
     this.ended = null;
@@ -145,9 +145,9 @@ export class Model extends Observed {
       this.inContact = new Map(Array.from(frame.percepts.field, (field, k) => [field, k]));
     }
     if (frame.touches) this.touches = frame.touches;
-    if (frame.contacts) {
-      this.contacts = frame.contacts;
-      this.tell("contacts");
+    if (frame.selfContacts) {
+      this.selfContacts = frame.selfContacts;
+      this.tell("selfContacts");
     }
     if (frame.samples) {
       this.samples = frame.samples;
@@ -313,8 +313,8 @@ export class Model extends Observed {
 }
 
 /** Before a frame has told of any.
- * @returns {import("./wire.js").Contacts} */
-const noContacts = () => ({ known: false, list: [] });
+ * @returns {import("./wire.js").SelfContacts} */
+const noSelfContacts = () => ({ known: false, list: [] });
 
 /** What is known of a recording before its first message. */
 function noTimeline() {

@@ -1,4 +1,4 @@
-/** Marks of percepts over the picture: place, identity, load, orientation, axis, motion, contacts between links. */
+/** Marks of percepts over the picture: place, identity, load, orientation, axis, motion, self-contacts. */
 
 import { cssColour, fitCanvas, paletteColour } from "./dom.js";
 import { withUnit } from "./format.js";
@@ -64,10 +64,10 @@ export class Marks {
   draw() {
     const { model, camera, choices } = this;
     const marked = choices.marked(model);
-    const contacts = choices.marks === "none" ? [] : model.contacts.list;
+    const selfContacts = choices.marks === "none" ? [] : model.selfContacts.list;
     this.places = [];
-    if (!marked.length && !contacts.length && !this.drawn) return;
-    this.drawn = marked.join() || (contacts.length ? "contacts" : "");
+    if (!marked.length && !selfContacts.length && !this.drawn) return;
+    this.drawn = marked.join() || (selfContacts.length ? "selfContacts" : "");
     const fitted = fitCanvas(this.canvas);
     if (!fitted) return;
     const { context } = fitted;
@@ -108,7 +108,7 @@ export class Marks {
       }
     }
     context.globalAlpha = 1;
-    for (const contact of contacts) this.contact(context, contact);
+    for (const contact of selfContacts) this.contact(context, contact);
     // The strongest touches only, from the lowest place up, so that labels stand above what they name.
     labels.sort((a, b) => b.load - a.load).splice(LABELS_MAX);
     labels.sort((a, b) => b.at.y - a.at.y);
@@ -151,7 +151,7 @@ export class Marks {
   /**
    * A diamond where two links touch, seen through the body: a contact lies between them.
    * @param {CanvasRenderingContext2D} context
-   * @param {import("./wire.js").Contact} contact
+   * @param {import("./wire.js").SelfContact} contact
    */
   contact(context, contact) {
     const { x, y } = this.camera.project(toWorld(this.model.rows, NO_LINK, contact.position, 1));

@@ -102,7 +102,7 @@ export function orientationLine(model, f) {
  * @param {number} f
  */
 export function axisEllipse(model, f) {
-  const axis = model.value(f, "axis");
+  const axis = model.value(f, "principal_axis");
   const anisotropy = model.value(f, "anisotropy");
   const area = model.value(f, "area");
   if (!axis || !anisotropy || !area || !(area[0] > 0)) return null;

@@ -21,21 +21,21 @@ export const HEALTH = ["good", "missing", "stale", "faulty", "saturated", "out o
  *   source: string, backend: {name: string, device: string, why: string}, quantity: string, scale: Scale,
  *   time: {start_s: number, end_s: number, frames: number} | null, origin: number[],
  *   links: {name: string, parent: number | null}[], channels: ([string | number, number] | null)[] | null, fields: Field[],
- *   columns: Column[], flags: (string | null)[], contacts: boolean, colours: number[][]}} Welcome
+ *   columns: Column[], flags: (string | null)[], self_contacts: boolean, colours: number[][]}} Welcome
  * @typedef {{position: Float32Array, normal: Float32Array, link: Uint32Array, corners: Uint32Array, taxelId: Uint32Array,
  *   taxelLink: Uint32Array, taxelPosition: Float32Array, taxelNormal: Float32Array, taxelRadius: Float32Array,
  *   taxelArea: Float32Array, restPose: Float32Array}} Mesh
  * @typedef {{field: Uint32Array, flags: Uint32Array, present: Uint32Array, columns: Map<number, Float32Array>}} Percepts
  * @typedef {{field: number, identity: number, total: number, active: number, centroid: [number, number],
  *   position: [number, number, number]}} Touch
- * @typedef {{field: number, touch: number, total: number}} ContactSide
- * @typedef {{identity: number, sides: [ContactSide, ContactSide], position: [number, number, number], distance: number,
- *   angle: number}} Contact
- * @typedef {{known: boolean, list: Contact[]}} Contacts
+ * @typedef {{field: number, touch: number, total: number}} SelfContactSide
+ * @typedef {{identity: number, sides: [SelfContactSide, SelfContactSide], position: [number, number, number], distance: number,
+ *   angle: number}} SelfContact
+ * @typedef {{known: boolean, list: SelfContact[]}} SelfContacts
  * @typedef {{answers: number, t: Float64Array, values: Float32Array[]}} Samples
  * @typedef {{seq: number, frame: number, t: number, skipped: number, p50: number, p99: number, newestEvent: number,
  *   engineMicroseconds: number, pressure: Float32Array | null, health: Uint8Array | null, pose: Float32Array | null,
- *   percepts: Percepts | null, touches: Touch[] | null, contacts: Contacts | null, samples: Samples | null}} Frame
+ *   percepts: Percepts | null, touches: Touch[] | null, selfContacts: SelfContacts | null, samples: Samples | null}} Frame
  * @typedef {{id: number, from: number, to: number, bins: number, least: Float32Array[], most: Float32Array[]}} History
  * @typedef {{field: number, column: string, component: number}} Series
  * @typedef {{seq: number, t_s: number, kind: string, field: number | null, text: string}} Event
@@ -133,8 +133,8 @@ const POSE = 2;
 const PERCEPTS = 4;
 const TOUCHES = 8;
 const SERIES = 16;
-const CONTACTS = 32;
-/** In place of the number of contacts that are not known. */
+const SELF_CONTACTS = 32;
+/** In place of the number of self-contacts that are not known. */
 const UNKNOWN = 0xffffffff;
 
 /**
@@ -162,7 +162,7 @@ export function decodeFrame(buffer, scene) {
     pose: null,
     percepts: null,
     touches: null,
-    contacts: null,
+    selfContacts: null,
     samples: null,
   };
   const from = new Reader(buffer, 64);
@@ -199,11 +199,11 @@ export function decodeFrame(buffer, scene) {
     }
     from.pad();
   }
-  if (sections & CONTACTS) {
+  if (sections & SELF_CONTACTS) {
     const [number] = from.u32(1);
     const known = number !== UNKNOWN;
-    frame.contacts = { known, list: [] };
-    for (let i = 0; known && i < number; i++) frame.contacts.list.push(contact(from));
+    frame.selfContacts = { known, list: [] };
+    for (let i = 0; known && i < number; i++) frame.selfContacts.list.push(contact(from));
     from.pad();
   }
   if (sections & SERIES) {
@@ -219,7 +219,7 @@ export function decodeFrame(buffer, scene) {
 
 /**
  * @param {Reader} from
- * @returns {Contact}
+ * @returns {SelfContact}
  */
 function contact(from) {
   const [identity] = from.u32(1);
@@ -228,7 +228,7 @@ function contact(from) {
     const [total] = from.f32(1);
     return { field, touch, total };
   };
-  /** @type {[ContactSide, ContactSide]} */
+  /** @type {[SelfContactSide, SelfContactSide]} */
   const sides = [side(), side()];
   const [x, y, z, distance, angle] = from.f32(5);
   return { identity, sides, position: [x, y, z], distance, angle };

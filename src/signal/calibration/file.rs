@@ -7,13 +7,13 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
-use super::skin::SkinKeys;
+use super::layer::LayerKeys;
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
 use crate::error::{Error, Result, failed};
 use crate::keys::Text;
 use crate::limits::{self, MAX_TOML_BYTES};
-use crate::signal::upkeep::UpkeepKeys;
+use crate::signal::drift::DriftKeys;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -32,8 +32,8 @@ struct File {
     #[serde(default)]
     checks: Checks,
     #[serde(default)]
-    upkeep: UpkeepKeys,
-    skin: Option<SkinKeys>,
+    drift: DriftKeys,
+    layer: Option<LayerKeys>,
 }
 
 impl Calibration {
@@ -94,16 +94,16 @@ impl Calibration {
             missing.clear();
         }
         check_checks(&file.checks)?;
-        file.upkeep.check()?;
+        file.drift.check()?;
         // Sums and changes have the unit that holds for all.
         let factor = all.unit().factor;
         let (contact, fields) = file.contact.read(text)?;
         let contact = contact.times(factor);
         let fields = fields.into_iter().map(|(name, thresholds)| (name, thresholds.times(factor))).collect();
         let change = file.change.read(text)?.times(factor);
-        let skin = file.skin.map(|keys| keys.read(text)).transpose()?;
-        let File { body, checks, upkeep, .. } = file;
-        Ok(Self { body, taxels, missing, curves, contact, fields, change, checks, upkeep, skin })
+        let layer = file.layer.map(|keys| keys.read(text)).transpose()?;
+        let File { body, checks, drift, .. } = file;
+        Ok(Self { body, taxels, missing, curves, contact, fields, change, checks, drift, layer })
     }
 }
 
@@ -160,9 +160,9 @@ mod tests {
         assert_eq!(why("[change]\ndead_band = -1"), "line 2: `dead_band` is -1; it must be 0 or more, in P per second");
         assert_eq!(why("[change]\non = nan"), "line 2: `on` is NaN; it must be 0 or more, in P per second");
         assert_eq!(why("[change]\non = 3\noff = 4"), "line 3: `off` is 4; it must be between 0 and `on`");
-        assert_eq!(why("[skin]\nsigma_m = 0"), "line 2: `sigma_m` is 0; it must be over 0, and at most 1");
-        assert!(why("[skin]\nsigma_m = 0.004\ngain_spread = 1.5").contains("line 3: `gain_spread` is 1.5"));
-        assert!(why("[skin]\ngain_spread = 0.1").contains("sigma_m"));
+        assert_eq!(why("[layer]\nsigma_m = 0"), "line 2: `sigma_m` is 0; it must be over 0, and at most 1");
+        assert!(why("[layer]\nsigma_m = 0.004\ngain_spread = 1.5").contains("line 3: `gain_spread` is 1.5"));
+        assert!(why("[layer]\ngain_spread = 0.1").contains("sigma_m"));
         assert!(why("[chnge]\non = 3").contains("did you mean `change`"));
         assert!(why("[change]\nfield = 3").starts_with("line 2"));
     }
@@ -206,10 +206,10 @@ mod tests {
     #[test]
     fn a_response_is_read_and_overridden_by_a_taxel() {
         let text = "body = \"hand\"\n[curve.finger]\nraw = [0, 128, 255]\np = [9.5, 4, 0]\n[all]\nsensor = \"fsr\"\n\
-                    tap = 12\nsignal = \"raw\"\n[taxel.3]\ntap = 255\nsignal = \"linear\"\nfull_scale_newton = 4\n\
+                    wiper = 12\nsignal = \"raw\"\n[taxel.3]\nwiper = 255\nsignal = \"linear\"\nfull_scale_newton = 4\n\
                     [taxel.7]\ncurve = \"finger\"\n[taxel.9]\nsensor = \"linear\"";
         let calibration = Calibration::parse(text, &[1, 3, 7, 9]).unwrap();
-        let fsr = |tap, signal, full_scale_newton| Response::Fsr(FsrResponse { tap, signal, full_scale_newton });
+        let fsr = |wiper, signal, full_scale_newton| Response::Fsr(FsrResponse { wiper, signal, full_scale_newton });
         let responses: Vec<Response> = calibration.taxels.iter().map(|taxel| taxel.response).collect();
         let right =
             [fsr(12, FsrSignal::Raw, 10.0), fsr(255, FsrSignal::Linear, 4.0), Response::Curve(0), Response::Linear];
@@ -248,13 +248,17 @@ mod tests {
         assert!(why(&format!("{table}curve = \"finger\"\nsensor = \"fsr\"")).contains("line 5: `curve` and `sensor`"));
         let steep = "[curve.a]\nraw = [0, 0.1]\np = [0, 1]\n[all]\ncurve = \"a\"\ngain = 1e12";
         assert!(why(steep).starts_with("line 6: `gain`"), "{}", why(steep));
-        assert!(why("[all]\nsensor = \"fsr\"\ntap = 256").starts_with("line 3: `tap` is 256; it must be between 0"));
-        assert!(why("[all]\nsensor = \"fsr\"\ntap = 3.5").starts_with("line 3"));
+        assert!(
+            why("[all]\nsensor = \"fsr\"\nwiper = 256").starts_with("line 3: `wiper` is 256; it must be between 0")
+        );
+        assert!(why("[all]\nsensor = \"fsr\"\nwiper = 3.5").starts_with("line 3"));
         assert!(why("[all]\nsensor = \"fsr\"\nsignal = \"log\"").starts_with("line 3: `signal` is `log`"));
         assert!(why("[all]\nsensor = \"fsr\"\nfull_scale_newton = nan").starts_with("line 3: `full_scale_newton`"));
         assert!(why("[all]\nsensor = \"piezo\"").starts_with("line 2: `sensor` is `piezo`"));
-        assert!(why("[all]\ntap = 3").starts_with("line 2: `tap` is for the paper's circuit"));
-        assert!(why("[all]\nsensor = \"fsr\"\n[taxel.3]\nsensor = \"linear\"\ntap = 3").starts_with("line 5: `tap`"));
+        assert!(why("[all]\nwiper = 3").starts_with("line 2: `wiper` is for the paper's circuit"));
+        assert!(
+            why("[all]\nsensor = \"fsr\"\n[taxel.3]\nsensor = \"linear\"\nwiper = 3").starts_with("line 5: `wiper`")
+        );
         assert!(why("[curv.a]\nraw = [0, 1]").contains("did you mean `curve`"));
     }
 

@@ -30,7 +30,7 @@ pub(super) struct Keys {
     mask: Option<bool>,
     curve: Option<Spanned<String>>,
     sensor: Option<Spanned<String>>,
-    tap: Option<Spanned<i64>>,
+    wiper: Option<Spanned<i64>>,
     signal: Option<Spanned<String>>,
     full_scale_newton: Option<Spanned<f64>>,
 }
@@ -190,9 +190,9 @@ impl Draft {
                 }
             };
         }
-        if let Some(tap) = &keys.tap {
-            self.fsr.tap = u8::try_from(*tap.get_ref()).map_err(|_| {
-                text.wrong(tap.span(), format!("`tap` is {}; it must be between 0 and 255", tap.get_ref()))
+        if let Some(wiper) = &keys.wiper {
+            self.fsr.wiper = u8::try_from(*wiper.get_ref()).map_err(|_| {
+                text.wrong(wiper.span(), format!("`wiper` is {}; it must be between 0 and 255", wiper.get_ref()))
             })?;
         }
         if let Some(signal) = &keys.signal {
@@ -272,7 +272,7 @@ impl Draft {
 /// Rejects keys of the circuit for other sensors.
 pub(super) fn only_for_fsr(keys: &Keys, is_fsr: bool, text: Text<'_>) -> Result<()> {
     let starts = [
-        ("tap", keys.tap.as_ref().map(Spanned::span)),
+        ("wiper", keys.wiper.as_ref().map(Spanned::span)),
         ("signal", keys.signal.as_ref().map(Spanned::span)),
         ("full_scale_newton", keys.full_scale_newton.as_ref().map(Spanned::span)),
     ];

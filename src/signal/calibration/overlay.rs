@@ -17,7 +17,7 @@ pub struct LaidOver {
 }
 
 /// Keys that mean something for the paper's circuit only.
-const OF_CIRCUIT: [&str; 3] = ["tap", "signal", "full_scale_newton"];
+const OF_CIRCUIT: [&str; 3] = ["wiper", "signal", "full_scale_newton"];
 
 impl Calibration {
     /// Lays the calibration `given` over `own`, both TOML. A key of `given` under `[all]` also replaces those under the
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn a_response_replaces_another_with_its_keys() {
-        let own = "[all]\nsensor = \"fsr\"\ntap = 12\n[taxel.3]\ntap = 7\n";
+        let own = "[all]\nsensor = \"fsr\"\nwiper = 12\n[taxel.3]\nwiper = 7\n";
         let (_, read) = laid(own, "[curve.a]\nraw = [0, 1]\np = [0, 2]\n[all]\ncurve = \"a\"\n");
         assert_eq!([0, 1].map(|taxel| read.taxels[taxel].response), [Response::Curve(0); 2]);
         assert!(Calibration::lay_over(own, "[all").is_err());

@@ -27,9 +27,9 @@ impl WiredBoard {
         key("baud", self.baud.map(|baud| baud.to_string()));
         key("channels", Some(self.taxels.len().to_string()));
         text += "taxels = [\n";
-        let has_tap = |channel: usize| self.taps.get(channel).copied().flatten().is_some();
+        let has_wiper = |channel: usize| self.wipers.get(channel).copied().flatten().is_some();
         let wired: Vec<usize> = (0..self.taxels.len()).filter(|&channel| self.taxels[channel].is_some()).collect();
-        for run in wired.chunk_by(|&a, &b| a + 1 == b && has_tap(a) == has_tap(b)) {
+        for run in wired.chunk_by(|&a, &b| a + 1 == b && has_wiper(a) == has_wiper(b)) {
             text += &self.run(run[0], run[run.len() - 1] + 1);
         }
         text + "]\n"
@@ -41,9 +41,9 @@ impl WiredBoard {
         let ascends = ids.windows(2).all(|pair| pair[0].checked_add(1) == Some(pair[1]));
         let what =
             if ascends { format!("first = {}, count = {}", ids[0], ids.len()) } else { format!("ids = {ids:?}") };
-        let taps: Vec<u8> = (from..end).filter_map(|channel| self.taps.get(channel).copied().flatten()).collect();
-        let taps = if taps.is_empty() { String::new() } else { format!(", taps = {taps:?}") };
-        format!("  {{ channel = {from}, {what}{taps} }},\n")
+        let wipers: Vec<u8> = (from..end).filter_map(|channel| self.wipers.get(channel).copied().flatten()).collect();
+        let wipers = if wipers.is_empty() { String::new() } else { format!(", wipers = {wipers:?}") };
+        format!("  {{ channel = {from}, {what}{wipers} }},\n")
     }
 }
 
@@ -56,17 +56,17 @@ mod tests {
         let hand = include_str!("../../../examples/wirings/hand.toml");
         let boards = include_str!("../../../examples/wirings/hand-boards.toml");
         let more = "[[board]]\nid = 9\nbits = 12\nport = \"/dev/\\\"a\"\nbaud = 1000\ntaxels = [\n\
-                    { channel = 3, ids = [7, 3], taps = [0, 255] }, { channel = 5, first = 11 }]\n";
+                    { channel = 3, ids = [7, 3], wipers = [0, 255] }, { channel = 5, first = 11 }]\n";
         for text in [hand, boards, more] {
             let wiring = Wiring::from_text(text).unwrap();
-            let taps = wiring.with_taps(|board, channel| channel.is_multiple_of(3).then_some(board as u8));
-            for wiring in [wiring, taps] {
+            let wipers = wiring.with_wipers(|board, channel| channel.is_multiple_of(3).then_some(board as u8));
+            for wiring in [wiring, wipers] {
                 let written = wiring.to_toml();
                 assert_eq!(Wiring::from_text(&written).unwrap(), wiring, "{written}");
             }
         }
         let read = Wiring::from_text(more).unwrap();
-        assert_eq!(read.boards()[0].taps, [None, None, None, Some(0), Some(255), None]);
-        assert_eq!(read.with_taps(|_, _| Some(8)).boards()[0].taps[..4], [None, None, None, Some(8)]);
+        assert_eq!(read.boards()[0].wipers, [None, None, None, Some(0), Some(255), None]);
+        assert_eq!(read.with_wipers(|_, _| Some(8)).boards()[0].wipers[..4], [None, None, None, Some(8)]);
     }
 }

@@ -13,8 +13,8 @@ use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    Row, TableColumn, TableType, ValueOf, contact_columns, contact_rows, percept_columns, rows, touch_columns,
-    touch_rows,
+    Row, TableColumn, TableType, ValueOf, percept_columns, rows, self_contact_columns, self_contact_rows,
+    touch_columns, touch_rows,
 };
 use crate::percept::{ContactKind, Flags, Percepts};
 use crate::sink::{FieldNames, Session};
@@ -38,7 +38,7 @@ pub enum TableKind {
     /// Each separate touch of each frame.
     Touches,
     /// Each contact of each frame.
-    Contacts,
+    SelfContacts,
 }
 
 /// The words of the columns of words, and of flags.
@@ -64,7 +64,7 @@ impl ArrowTable {
     pub fn new(kind: TableKind, session: &Session<'_>) -> Self {
         let columns = match kind {
             TableKind::Touches => touch_columns(session),
-            TableKind::Contacts => contact_columns(session),
+            TableKind::SelfContacts => self_contact_columns(session),
             TableKind::Touched | TableKind::AllFields => percept_columns(session),
         };
         let flags = Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect();
@@ -112,7 +112,7 @@ impl ArrowTable {
         assert_eq!(percepts.fields(), self.words.names.len(), "a table is told the name of every field");
         match self.kind {
             TableKind::Touches => touch_rows(percepts, frame).for_each(|row| self.push_row(&row)),
-            TableKind::Contacts => contact_rows(percepts, frame).for_each(|row| self.push_row(&row)),
+            TableKind::SelfContacts => self_contact_rows(percepts, frame).for_each(|row| self.push_row(&row)),
             kind => rows(percepts, frame, kind == TableKind::AllFields).for_each(|row| self.push_row(&row)),
         }
     }
@@ -190,9 +190,7 @@ impl Builder {
                 };
                 let others: Vec<&str> = match column.value {
                     ValueOf::Link => names.first().map(|name| name.world.as_str()).into_iter().collect(),
-                    ValueOf::Output(..) | ValueOf::TouchFootprint(..) => {
-                        ContactKind::ALL.map(ContactKind::name).to_vec()
-                    }
+                    ValueOf::Output(..) | ValueOf::TouchFit(..) => ContactKind::ALL.map(ContactKind::name).to_vec(),
                     _ => Vec::new(),
                 };
                 let (mut words, mut key_of) = (Vec::new(), HashMap::new());

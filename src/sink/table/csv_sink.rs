@@ -8,8 +8,8 @@ use csv::{QuoteStyle, Writer, WriterBuilder};
 use serde::Serialize;
 
 use super::{
-    Row, TableColumn, TableType, ValueOf, contact_columns, contact_rows, output_columns, percept_columns, rows,
-    touch_columns, touch_rows,
+    Row, TableColumn, TableType, ValueOf, output_columns, percept_columns, rows, self_contact_columns,
+    self_contact_rows, touch_columns, touch_rows,
 };
 use crate::error::{Error, Result, failed};
 use crate::output::{OutputFile, OutputPath};
@@ -23,7 +23,7 @@ const BETWEEN_WORDS: &str = ";";
 pub struct CsvSink {
     percepts: Option<CsvFile>,
     touches: Option<CsvFile>,
-    contacts: Option<CsvFile>,
+    self_contacts: Option<CsvFile>,
     rows: Rows,
     names: Vec<FieldNames>,
     flags: Vec<(Flags, String)>,
@@ -46,15 +46,15 @@ struct CsvFile {
 }
 
 impl CsvSink {
-    /// Writes percepts to `output`, where the file appears when the sink is finished, separate touches to `touches`, and contacts to
-    /// `contacts`; each if it is given. With `wide` there is one row per frame, and every field has columns of its own.
+    /// Writes percepts to `output`, where the file appears when the sink is finished, separate touches to `touches`, and self-contacts to
+    /// `self_contacts`; each if it is given. With `wide` there is one row per frame, and every field has columns of its own.
     ///
     /// # Errors
     /// A file cannot be made.
     pub fn create(
         output: Option<OutputPath>,
         touches: Option<OutputPath>,
-        contacts: Option<OutputPath>,
+        self_contacts: Option<OutputPath>,
         wide: bool,
         session: &Session<'_>,
     ) -> Result<Self> {
@@ -63,7 +63,9 @@ impl CsvSink {
         let mut sink = Self {
             percepts: output.map(|output| CsvFile::begin(output, percept_columns(session))).transpose()?,
             touches: touches.map(|output| CsvFile::begin(output, touch_columns(session))).transpose()?,
-            contacts: contacts.map(|output| CsvFile::begin(output, contact_columns(session))).transpose()?,
+            self_contacts: self_contacts
+                .map(|output| CsvFile::begin(output, self_contact_columns(session)))
+                .transpose()?,
             rows: Rows::PerField { all_fields: session.all_fields },
             names,
             flags,
@@ -85,7 +87,7 @@ impl CsvSink {
         } else if let Some(percepts) = &mut sink.percepts {
             percepts.record(titles_of(percepts))?;
         }
-        for file in [&mut sink.touches, &mut sink.contacts].into_iter().flatten() {
+        for file in [&mut sink.touches, &mut sink.self_contacts].into_iter().flatten() {
             file.record(titles_of(file))?;
         }
         Ok(sink)
@@ -93,7 +95,7 @@ impl CsvSink {
 
     /// All of its files, the one that names it first.
     fn files(&mut self) -> impl Iterator<Item = &mut CsvFile> {
-        [&mut self.percepts, &mut self.touches, &mut self.contacts].into_iter().flatten()
+        [&mut self.percepts, &mut self.touches, &mut self.self_contacts].into_iter().flatten()
     }
 
     fn flow(&mut self, written: io::Result<()>) -> Result<Flow> {
@@ -102,7 +104,7 @@ impl CsvSink {
     }
 
     fn write_all(&mut self, percepts: &Percepts) -> Result<(), csv::Error> {
-        let Self { percepts: file, touches, contacts, rows: how, names, flags, .. } = self;
+        let Self { percepts: file, touches, self_contacts, rows: how, names, flags, .. } = self;
         for frame in 0..percepts.frames() {
             match (how as &Rows, file.as_mut()) {
                 (_, None) => {}
@@ -132,9 +134,9 @@ impl CsvSink {
                     touches.row(&row, names, flags)?;
                 }
             }
-            if let Some(contacts) = contacts {
-                for row in contact_rows(percepts, frame) {
-                    contacts.row(&row, names, flags)?;
+            if let Some(self_contacts) = self_contacts {
+                for row in self_contact_rows(percepts, frame) {
+                    self_contacts.row(&row, names, flags)?;
                 }
             }
         }
@@ -262,7 +264,7 @@ impl Sink for CsvSink {
             // The rest has no reader.
             return Ok(());
         }
-        let files = [self.percepts, self.touches, self.contacts].into_iter().flatten();
+        let files = [self.percepts, self.touches, self.self_contacts].into_iter().flatten();
         let mut files = files.map(CsvFile::finish).collect::<Result<Vec<_>>>()?.into_iter();
         files.next().map_or(Ok(()), |first| first.finish_with(files.collect()))
     }
@@ -271,8 +273,8 @@ impl Sink for CsvSink {
         if self.flush()? == Flow::Closed {
             return Ok(None);
         }
-        let Self { percepts, touches, contacts, .. } = *self;
-        let Some(first) = percepts.or(touches).or(contacts) else { return Ok(None) };
+        let Self { percepts, touches, self_contacts, .. } = *self;
+        let Some(first) = percepts.or(touches).or(self_contacts) else { return Ok(None) };
         let name = first.name.clone();
         Ok(first.finish()?.appears_when_finished().then_some(name))
     }

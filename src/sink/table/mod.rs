@@ -1,6 +1,6 @@
 //! Percepts as a table: one row per frame and field in contact, a column for each component of an output.
 //!
-//! [`percept_columns`], [`touch_columns`] and [`contact_columns`] list the columns; sinks write by these lists.
+//! [`percept_columns`], [`touch_columns`] and [`self_contact_columns`] list the columns; sinks write by these lists.
 
 #[cfg(feature = "arrow")]
 mod arrow_table;
@@ -17,7 +17,7 @@ pub use parquet_sink::ParquetSink;
 pub(super) use path_beside::path_beside;
 
 use super::{FieldNames, Session};
-use crate::percept::{Column, Contact, ContactKind, Flags, Outputs, Percepts, Touch, Unit};
+use crate::percept::{Column, ContactKind, Flags, Outputs, Percepts, SelfContact, Touch, Unit};
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +88,7 @@ enum ValueOf {
     TouchActive,
     TouchCentroid(usize),
     TouchPosition(usize),
-    TouchFootprint(&'static Column, usize),
+    TouchFit(&'static Column, usize),
     ContactId,
     ContactPosition(usize),
     ContactDistance,
@@ -229,18 +229,18 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
             ValueOf::TouchPosition(component),
         ));
     }
-    let footprint = session.outputs.of_each_touch();
-    columns.extend(columns_of(footprint, session, ValueOf::TouchFootprint));
-    if !footprint.is_empty() {
-        let help = "Why its footprint, or a part of it, is absent, by name.";
+    let fit = session.outputs.of_each_touch();
+    columns.extend(columns_of(fit, session, ValueOf::TouchFit));
+    if !fit.is_empty() {
+        let help = "Why its fit, or a part of it, is absent, by name.";
         columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
     }
     columns
 }
 
-/// The columns of a session's contacts, one row each.
+/// The columns of a session's self-contacts, one row each.
 #[must_use]
-pub fn contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
+pub fn self_contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
     let p = unit_of(Unit::P, session);
     let mut columns = vec![
         TableColumn::new("t", "s", TableType::F64, "Time of the frame.", ValueOf::Time),
@@ -284,8 +284,8 @@ struct Row<'a> {
     field: usize,
     /// In the table of touches.
     touch: Option<&'a Touch>,
-    /// In the table of contacts.
-    contact: Option<&'a Contact>,
+    /// In the table of self-contacts.
+    contact: Option<&'a SelfContact>,
 }
 
 /// A number of a row, in double precision or as a whole number.
@@ -306,7 +306,7 @@ impl Row<'_> {
             ValueOf::TouchTotal => self.touch.map(|touch| touch.total),
             ValueOf::TouchCentroid(component) => self.touch?.centroid.map(|centroid| centroid[component]),
             ValueOf::TouchPosition(component) => self.touch?.position.map(|position| position[component]),
-            ValueOf::TouchFootprint(column, component) => Some(self.touch?.value(column)?[component]),
+            ValueOf::TouchFit(column, component) => Some(self.touch?.value(column)?[component]),
             ValueOf::ContactPosition(component) => self.contact.map(|contact| contact.position[component]),
             ValueOf::ContactDistance => self.contact.map(|contact| contact.distance),
             ValueOf::ContactAngle => self.contact?.angle,
@@ -364,10 +364,10 @@ fn touch_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>
     })
 }
 
-/// The rows of a frame's contacts.
-fn contact_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>> {
-    let contacts = percepts.contacts(frame).unwrap_or_default().iter();
-    contacts.map(move |contact| Row {
+/// The rows of a frame's self-contacts.
+fn self_contact_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>> {
+    let self_contacts = percepts.self_contacts(frame).unwrap_or_default().iter();
+    self_contacts.map(move |contact| Row {
         percepts,
         frame,
         field: contact.sides[0].field,

@@ -23,7 +23,7 @@ const GROUP_ROWS: usize = 1 << 17;
 pub struct ParquetSink {
     percepts: ParquetFile,
     touches: Option<ParquetFile>,
-    contacts: Option<ParquetFile>,
+    self_contacts: Option<ParquetFile>,
 }
 
 struct ParquetFile {
@@ -34,14 +34,14 @@ struct ParquetFile {
 
 impl ParquetSink {
     /// Writes to `output`, where the file appears when the sink is finished, separate touches to `touches`, and
-    /// contacts to `contacts`.
+    /// self-contacts to `self_contacts`.
     ///
     /// # Errors
     /// A file cannot be made.
     pub fn create(
         output: OutputPath,
         touches: Option<OutputPath>,
-        contacts: Option<OutputPath>,
+        self_contacts: Option<OutputPath>,
         session: &Session<'_>,
     ) -> Result<Self> {
         let kind = if session.all_fields { TableKind::AllFields } else { TableKind::Touched };
@@ -51,7 +51,7 @@ impl ParquetSink {
         Ok(Self {
             percepts: ParquetFile::begin(output, ArrowTable::new(kind, session))?,
             touches: beside(touches, TableKind::Touches)?,
-            contacts: beside(contacts, TableKind::Contacts)?,
+            self_contacts: beside(self_contacts, TableKind::SelfContacts)?,
         })
     }
 }
@@ -109,7 +109,7 @@ impl Sink for ParquetSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
         for frame in 0..percepts.frames() {
             self.percepts.push(percepts, frame)?;
-            for file in [&mut self.touches, &mut self.contacts].into_iter().flatten() {
+            for file in [&mut self.touches, &mut self.self_contacts].into_iter().flatten() {
                 file.push(percepts, frame)?;
             }
         }
@@ -123,7 +123,7 @@ impl Sink for ParquetSink {
 
     fn finish(self: Box<Self>) -> Result<()> {
         let percepts = self.percepts.finish()?;
-        let beside = [self.touches, self.contacts].into_iter().flatten();
+        let beside = [self.touches, self.self_contacts].into_iter().flatten();
         percepts.finish_with(beside.map(ParquetFile::finish).collect::<Result<_>>()?)
     }
     fn finish_early(self: Box<Self>) -> Result<Option<String>> {

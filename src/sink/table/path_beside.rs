@@ -1,4 +1,4 @@
-//! Where the tables of touches and contacts are beside that of percepts.
+//! Where the tables of touches and self-contacts are beside that of percepts.
 
 use std::path::{Path, PathBuf};
 

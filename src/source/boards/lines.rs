@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::merge::BoardFrame;
-use super::taps::{self, ChannelTap, TapTrouble};
+use super::wipers::{self, ChannelWiper, WiperTrouble};
 use crate::error::{Error, failed};
 use crate::signal::Wiring;
 
@@ -123,16 +123,16 @@ pub struct Lines(pub(in crate::source) Arc<Shared>);
 impl Lines {
     /// The potentiometers, one per channel, board by board in the order of the wiring.
     #[must_use]
-    pub fn taps(&self) -> Vec<Vec<ChannelTap>> {
-        self.0.lock().taps.clone()
+    pub fn wipers(&self) -> Vec<Vec<ChannelWiper>> {
+        self.0.lock().wipers.clone()
     }
 
-    /// Requests `tap` on a channel of the wiring's board at index `board`, now and after every restart of the board;
-    /// [`Lines::taps`] has the result. Does nothing if there is no such channel.
-    pub fn set_tap(&self, board: usize, channel: usize, tap: u8) {
+    /// Requests `wiper` on a channel of the wiring's board at index `board`, now and after every restart of the board;
+    /// [`Lines::wipers`] has the result. Does nothing if there is no such channel.
+    pub fn set_wiper(&self, board: usize, channel: usize, wiper: u8) {
         let mut state = self.0.lock();
-        if let Some(channel) = state.taps.get_mut(board).and_then(|channels| channels.get_mut(channel)) {
-            (channel.wanted, channel.trouble) = (Some(tap), None);
+        if let Some(channel) = state.wipers.get_mut(board).and_then(|channels| channels.get_mut(channel)) {
+            (channel.wanted, channel.trouble) = (Some(wiper), None);
         }
     }
 
@@ -205,7 +205,7 @@ pub(in crate::source) struct State {
     pub(in crate::source) queue: VecDeque<(BoardFrame, Instant)>,
     pub(in crate::source) accounts: Vec<BoardAccount>,
     /// One per channel, board by board.
-    pub(in crate::source) taps: Vec<Vec<ChannelTap>>,
+    pub(in crate::source) wipers: Vec<Vec<ChannelWiper>>,
     percepts: VecDeque<LimbPercepts>,
     /// Whom to tell of percepts.
     wake: Option<Arc<dyn Fn() + Send + Sync>>,
@@ -232,13 +232,13 @@ impl Shared {
     pub(in crate::source) fn of_boards(wiring: &Wiring, lines: usize, start: Instant) -> Self {
         let account = |board: u16| BoardAccount { board, ..BoardAccount::default() };
         let accounts = wiring.boards().iter().map(|board| account(board.id)).collect();
-        Self::new(accounts, taps::wanted(wiring), lines, start)
+        Self::new(accounts, wipers::wanted(wiring), lines, start)
     }
 
     /// The state of whatever `accounts` stand for, with potentiometers or none, that `lines` readers read.
     pub(in crate::source) fn new(
         accounts: Vec<BoardAccount>,
-        taps: Vec<Vec<ChannelTap>>,
+        wipers: Vec<Vec<ChannelWiper>>,
         lines: usize,
         start: Instant,
     ) -> Self {
@@ -251,7 +251,7 @@ impl Shared {
             verdicts: vec![Verdict::Pending; lines],
             owners: vec![None; accounts.len()],
             gaps: vec![0; accounts.len()],
-            taps,
+            wipers,
             accounts,
             closed: false,
             readers: lines,
@@ -318,15 +318,15 @@ impl Shared {
 }
 
 impl State {
-    /// The next channel of `board` to set, and its tap.
-    pub(in crate::source) fn next_tap(&self, board: usize) -> Option<(u16, u8)> {
-        (0..).zip(&self.taps[board]).find_map(|(channel, tap)| Some((channel, tap.due()?)))
+    /// The next channel of `board` to set, and its wiper.
+    pub(in crate::source) fn next_wiper(&self, board: usize) -> Option<(u16, u8)> {
+        (0..).zip(&self.wipers[board]).find_map(|(channel, wiper)| Some((channel, wiper.due()?)))
     }
 
-    /// Stops requesting taps of `board`. Returns the number of channels without the requested tap.
-    pub(in crate::source) fn abandon_taps(&mut self, board: usize, why: TapTrouble) -> usize {
-        let due = self.taps[board].iter_mut().filter(|tap| tap.due().is_some());
-        due.map(|tap| tap.trouble = Some(why)).count()
+    /// Stops requesting wipers of `board`. Returns the number of channels without the requested wiper.
+    pub(in crate::source) fn abandon_wipers(&mut self, board: usize, why: WiperTrouble) -> usize {
+        let due = self.wipers[board].iter_mut().filter(|wiper| wiper.due().is_some());
+        due.map(|wiper| wiper.trouble = Some(why)).count()
     }
 
     pub(in crate::source) fn take(&mut self) -> Option<(BoardFrame, Instant)> {

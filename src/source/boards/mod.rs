@@ -6,7 +6,7 @@ mod clock;
 mod lines;
 mod merge;
 mod merged;
-mod taps;
+mod wipers;
 
 #[cfg(feature = "zenoh")]
 pub(super) use clock::Clock;
@@ -14,4 +14,4 @@ pub use lines::{BoardAccount, BoardState, LimbPercepts, Lines, Notice};
 pub(super) use lines::{Shared, Verdict};
 pub(super) use merge::{BoardFrame, Merge, Pace};
 pub(super) use merged::Merged;
-pub use taps::{ChannelTap, TapTrouble};
+pub use wipers::{ChannelWiper, WiperTrouble};

@@ -60,8 +60,8 @@ impl LimbSource {
             ..BoardAccount::default()
         };
         let accounts = (1..).zip(keys).map(account).collect();
-        let no_taps = vec![Vec::new(); keys.len()];
-        let shared = Arc::new(Shared::new(accounts, no_taps, keys.len(), start).with_readers(1));
+        let no_wipers = vec![Vec::new(); keys.len()];
+        let shared = Arc::new(Shared::new(accounts, no_wipers, keys.len(), start).with_readers(1));
         let taxels = Arc::new(Taxels::new(ids));
         let mut limbs = Vec::new();
         for (index, key) in keys.iter().enumerate() {

@@ -2,7 +2,7 @@
 //! No I/O, no clock.
 
 mod board_checks;
-mod taps;
+mod wipers;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -74,7 +74,7 @@ struct LineState {
     /// The board whose frames are counted, even while its identity is to be confirmed, and its id.
     joined: Option<(usize, u16)>,
     started: bool,
-    /// Whether to start it once its taps are set.
+    /// Whether to start it once its wipers are set.
     starts: bool,
     stopped: bool,
     silent: bool,
@@ -224,8 +224,8 @@ impl LineState {
             && ended.command != Command::Identify
             && self.stage == Stage::Speaking
         {
-            if matches!(ended.command, Command::Tap { .. }) {
-                return self.tap_ended(ended);
+            if matches!(ended.command, Command::Wiper { .. }) {
+                return self.wiper_ended(ended);
             }
             self.notify(&format!("the board does not answer `{}`", word(ended.command)));
         }
@@ -235,7 +235,7 @@ impl LineState {
             Stage::Probing(index) if over(PROBE_TIMEOUT + bits_duration(self.baud)) => self.probe(index + 1, now),
             Stage::NothingFound if over(PROBE_INTERVAL) => self.set_stage(Stage::Identifying, self.config.baud, now),
             Stage::Speaking => {
-                self.set_taps(now);
+                self.set_wipers(now);
                 self.watch(now);
             }
             _ => {}
@@ -282,7 +282,7 @@ impl LineState {
             }
             return;
         }
-        // A board that waits for its taps has nothing to send yet.
+        // A board that waits for its wipers has nothing to send yet.
         if now < self.last_frame + SILENT_AFTER || self.stopped || self.starts {
             return;
         }
@@ -343,8 +343,8 @@ impl LineState {
                     self.frame(head, frame, now, read_at);
                 }
                 let ended = self.dialogue.receive(event);
-                if let Some(ended) = ended.filter(|ended| matches!(ended.command, Command::Tap { .. })) {
-                    self.tap_ended(ended);
+                if let Some(ended) = ended.filter(|ended| matches!(ended.command, Command::Wiper { .. })) {
+                    self.wiper_ended(ended);
                 } else if let Some((ended, Outcome::Refused(status))) = ended.map(|ended| (ended, ended.outcome)) {
                     let why = match status {
                         Status::Unknown => "does not know",
@@ -386,7 +386,7 @@ fn word(command: Command) -> &'static str {
     match command {
         Command::Identify => "identify",
         Command::Rate { .. } => "rate",
-        Command::Tap { .. } => "tap",
+        Command::Wiper { .. } => "wiper",
         Command::Start => "start",
         Command::Stop => "stop",
     }

@@ -74,5 +74,5 @@ fn counts_keys(circuit: FsrCircuit, open: u16) -> Vec<(&'static str, String)> {
     // The raw signal needs the wider dead band; it is used for both if it ends below the smallest force.
     let raw = circuit.logarithmic(open);
     let dead_band = if raw < linear(circuit.counts(FsrCircuit::BREAK_NEWTON)) { raw } else { linear(open) };
-    vec![("sensor", "\"fsr\"".to_owned()), ("tap", circuit.tap.to_string()), ("dead_band", dead_band.to_string())]
+    vec![("sensor", "\"fsr\"".to_owned()), ("wiper", circuit.wiper.to_string()), ("dead_band", dead_band.to_string())]
 }

@@ -44,7 +44,7 @@ impl Indenter {
 
 /// The compliant layer over the taxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Skin {
+pub(super) struct Layer {
     pub(super) thickness_m: f64,
     /// Standard deviation of a point force's pressure at the bottom, as a share of the thickness.
     pub(super) spread: f64,
@@ -55,7 +55,7 @@ pub(super) struct Skin {
     pub(super) contact: Pressure,
 }
 
-impl Skin {
+impl Layer {
     /// The Gaussian that has the same peak as Boussinesq's pressure at this depth: 1/√3.
     pub(super) const SPREAD: f64 = 0.577_350_269_189_625_8;
     /// A soft silicone rubber.
@@ -75,7 +75,7 @@ impl Skin {
 
     /// The calibration's table of the layer; empty where taxels lie bare.
     pub(super) fn calibration(&self) -> String {
-        if self.thickness_m > 0.0 { format!("\n[skin]\nsigma_m = {}\n", self.sigma_m()) } else { String::new() }
+        if self.thickness_m > 0.0 { format!("\n[layer]\nsigma_m = {}\n", self.sigma_m()) } else { String::new() }
     }
 
     /// Compliance 1/E* with an indenter whose own is `other`; a bare taxel does not give.
@@ -106,11 +106,11 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// The footprint of `indenter` pressed with `force_newton` on `skin`.
-    pub(super) fn new(indenter: &Indenter, skin: &Skin, force_newton: f64) -> Self {
+    /// The footprint of `indenter` pressed with `force_newton` on `layer`.
+    pub(super) fn new(indenter: &Indenter, layer: &Layer, force_newton: f64) -> Self {
         let compliance = match indenter {
-            Indenter::Fingertip { .. } => skin.compliance(1.0 / FINGERTIP_STIFFNESS_PA),
-            _ => skin.compliance(0.0),
+            Indenter::Fingertip { .. } => layer.compliance(1.0 / FINGERTIP_STIFFNESS_PA),
+            _ => layer.compliance(0.0),
         };
         // Hertz: b² = 4(F/L)R/πE* across a rod, a³ = 3FR/4E* around a ball.
         let (patch_m, half_along_m) = match *indenter {
@@ -124,10 +124,10 @@ impl Footprint {
             }
             Indenter::Flat { radius_m } => (radius_m, 0.0),
         };
-        if (skin.kernel, skin.contact) == (Kernel::Gaussian, Pressure::Gaussian) {
-            return Self::blurred(indenter, skin.sigma_m().max(MIN_SIGMA_M), patch_m, half_along_m);
+        if (layer.kernel, layer.contact) == (Kernel::Gaussian, Pressure::Gaussian) {
+            return Self::blurred(indenter, layer.sigma_m().max(MIN_SIGMA_M), patch_m, half_along_m);
         }
-        Self::exact(indenter, skin, patch_m, half_along_m)
+        Self::exact(indenter, layer, patch_m, half_along_m)
     }
 
     /// With only the variance of Hertz's patch, and a Gaussian of σ = `layer`.
@@ -174,14 +174,14 @@ impl Footprint {
     }
 
     /// With Hertz's profile as it is, and the layer's own kernel.
-    fn exact(indenter: &Indenter, skin: &Skin, patch_m: f64, half_along_m: f64) -> Self {
+    fn exact(indenter: &Indenter, layer: &Layer, patch_m: f64, half_along_m: f64) -> Self {
         let least = MIN_DEPTH_SHARE * patch_m;
-        let blur = match skin.kernel {
+        let blur = match layer.kernel {
             Kernel::Gaussian => {
-                let sigma = skin.sigma_m().max(least);
+                let sigma = layer.sigma_m().max(least);
                 Blur::Gaussian { sigma_across_m: sigma, sigma_along_m: sigma }
             }
-            Kernel::Boussinesq => Blur::Boussinesq { depth_m: skin.thickness_m.max(least) },
+            Kernel::Boussinesq => Blur::Boussinesq { depth_m: layer.thickness_m.max(least) },
         };
         let scale_m = patch::scale_m(blur);
         let loads = match indenter {
@@ -190,7 +190,7 @@ impl Footprint {
             Indenter::Ball { .. } | Indenter::Fingertip { .. } => patch::dome(patch_m, scale_m),
             Indenter::Flat { .. } => patch::disc(patch_m, scale_m),
         };
-        let loads = if skin.kernel == Kernel::Boussinesq { patch::points(loads, scale_m) } else { loads };
+        let loads = if layer.kernel == Kernel::Boussinesq { patch::points(loads, scale_m) } else { loads };
         Self { loads, blur, half_across_m: patch_m, half_along_m: half_along_m.max(patch_m) }
     }
 
@@ -221,7 +221,7 @@ impl Footprint {
 mod tests {
     use super::*;
 
-    const SKIN: Skin = Skin { thickness_m: 7e-3, ..Skin::NONE };
+    const LAYER: Layer = Layer { thickness_m: 7e-3, ..Layer::NONE };
     const ALL: [Indenter; 5] = [
         Indenter::Rod { radius_m: 0.0127, length_m: 0.05 },
         Indenter::Ball { radius_m: 0.01 },
@@ -233,8 +233,8 @@ mod tests {
     #[test]
     fn tiles_without_gaps_feel_all_of_the_force() {
         for indenter in ALL {
-            for (skin, pitch) in [(SKIN, 4e-3), (SKIN, 1.3e-3), (Skin::NONE, 4e-3)] {
-                let footprint = Footprint::new(&indenter, &skin, 5.0);
+            for (layer, pitch) in [(LAYER, 4e-3), (LAYER, 1.3e-3), (Layer::NONE, 4e-3)] {
+                let footprint = Footprint::new(&indenter, &layer, 5.0);
                 let steps = (0.09 / pitch) as i32;
                 let at = |i: i32| 0.37 * pitch + f64::from(i) * pitch;
                 let sum: f64 = (-steps..=steps)
@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn footprints_are_as_wide_as_the_model_says() {
-        let sigma = SKIN.sigma_m();
+        let sigma = LAYER.sigma_m();
         let (force, pitch) = (5.0_f64, 1e-3);
         // Of Hertz's patches by their textbook formulas; an even line has a variance of L²/12, an even disc of R²/4.
         let rod = force / 0.05 * 0.0127 / (PI * 400e3);
@@ -264,7 +264,7 @@ mod tests {
             (0.0, 0.03 * 0.03 / 12.0),
         ];
         for (indenter, (across, along)) in ALL.iter().zip(right) {
-            let footprint = Footprint::new(indenter, &SKIN, force);
+            let footprint = Footprint::new(indenter, &LAYER, force);
             let (mut got_across, mut got_along) = (0.0, 0.0);
             for (i, j) in (-70..=70).flat_map(|i| (-70..=70).map(move |j| (f64::from(i) * pitch, f64::from(j) * pitch)))
             {
@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn a_larger_force_presses_a_larger_patch_up_to_the_indenters_size() {
         for indenter in &ALL[..3] {
-            let peak = |force: f64| Footprint::new(indenter, &SKIN, force).share_on(0.0, 0.0, 1e-3);
+            let peak = |force: f64| Footprint::new(indenter, &LAYER, force).share_on(0.0, 0.0, 1e-3);
             assert!(peak(1.0) > peak(10.0));
             assert_eq!(peak(1e6), peak(1e7));
         }
@@ -291,23 +291,23 @@ mod tests {
     #[test]
     fn a_point_force_has_boussinesqs_peak() {
         let ball = Indenter::Ball { radius_m: 1e-9 };
-        let (side, z) = (1e-5, SKIN.thickness_m);
-        let peak = Footprint::new(&ball, &SKIN, 1.0).share_on(0.0, 0.0, side) / (side * side);
+        let (side, z) = (1e-5, LAYER.thickness_m);
+        let peak = Footprint::new(&ball, &LAYER, 1.0).share_on(0.0, 0.0, side) / (side * side);
         let right = 3.0 / (2.0 * PI * z * z);
         assert!((peak / right - 1.0).abs() < 1e-6, "{peak} {right}");
     }
 
     /// Skins of every model but the plain one.
-    fn exact_skins() -> [Skin; 3] {
-        let hertz = Skin { contact: Pressure::Hertz, ..SKIN };
-        let deep = Skin { kernel: Kernel::Boussinesq, ..hertz };
-        [hertz, deep, Skin { thickness_m: 3e-3, ..deep }]
+    fn exact_layers() -> [Layer; 3] {
+        let hertz = Layer { contact: Pressure::Hertz, ..LAYER };
+        let deep = Layer { kernel: Kernel::Boussinesq, ..hertz };
+        [hertz, deep, Layer { thickness_m: 3e-3, ..deep }]
     }
 
     #[test]
     fn exact_footprints_conserve_the_force_and_its_middle() {
-        for (indenter, skin) in ALL.iter().flat_map(|indenter| exact_skins().map(|skin| (indenter, skin))) {
-            let footprint = Footprint::new(indenter, &skin, 5.0);
+        for (indenter, layer) in ALL.iter().flat_map(|indenter| exact_layers().map(|layer| (indenter, layer))) {
+            let footprint = Footprint::new(indenter, &layer, 5.0);
             let (pitch, steps) = (4e-3, 40);
             let (mut sum, mut moment) = (0.0, 0.0);
             for (i, j) in (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (f64::from(i), f64::from(j)))) {
@@ -317,20 +317,20 @@ mod tests {
             }
             // Boussinesq's pressure has a tail: what lies beyond r of a point is z³/(r² + z²)^(3/2).
             let edge = (f64::from(steps) + 0.5) * pitch - footprint.half_along_m;
-            let tail = match skin.kernel {
+            let tail = match layer.kernel {
                 Kernel::Gaussian => 0.0,
-                Kernel::Boussinesq => (skin.thickness_m / edge).powi(3),
+                Kernel::Boussinesq => (layer.thickness_m / edge).powi(3),
             };
-            assert!((sum - 1.0).abs() <= tail + 1e-10, "{indenter:?} {skin:?}: {:e}", sum - 1.0);
-            assert!(skin.kernel == Kernel::Gaussian || 1.0 - sum > 1e-6, "the tail is there: {:e}", 1.0 - sum);
+            assert!((sum - 1.0).abs() <= tail + 1e-10, "{indenter:?} {layer:?}: {:e}", sum - 1.0);
+            assert!(layer.kernel == Kernel::Gaussian || 1.0 - sum > 1e-6, "the tail is there: {:e}", 1.0 - sum);
             assert!(moment.abs() < 1e-12, "{indenter:?}: {moment:e}");
         }
     }
 
     #[test]
     fn more_loads_change_nothing() {
-        for (indenter, skin) in ALL.iter().flat_map(|indenter| exact_skins().map(|skin| (indenter, skin))) {
-            let footprint = Footprint::new(indenter, &skin, 5.0);
+        for (indenter, layer) in ALL.iter().flat_map(|indenter| exact_layers().map(|layer| (indenter, layer))) {
+            let footprint = Footprint::new(indenter, &layer, 5.0);
             let scale = patch::scale_m(footprint.blur);
             let peak = footprint.share_on(0.0, 0.0, 4e-3);
             let with = |scale: f64| {
@@ -341,7 +341,7 @@ mod tests {
                     Indenter::Flat { .. } => patch::disc(patch, scale),
                     _ => patch::dome(patch, scale),
                 };
-                let loads = if skin.kernel == Kernel::Boussinesq { patch::points(loads, scale) } else { loads };
+                let loads = if layer.kernel == Kernel::Boussinesq { patch::points(loads, scale) } else { loads };
                 Footprint { loads, ..footprint.clone() }
             };
             let off = |other: &Footprint| {
@@ -353,22 +353,22 @@ mod tests {
             };
             assert_eq!(off(&with(scale)), 0.0);
             let finer = off(&with(scale / 3.0));
-            assert!(finer < 1e-5 * peak, "{indenter:?} {skin:?}: {:e}", finer / peak);
+            assert!(finer < 1e-5 * peak, "{indenter:?} {layer:?}: {:e}", finer / peak);
         }
     }
 
     #[test]
     fn the_exact_models_differ_from_the_plain_one() {
         let ball = Indenter::Ball { radius_m: 0.01 };
-        let peak = |skin: &Skin| Footprint::new(&ball, skin, 5.0).share_on(0.0, 0.0, 1e-3);
-        let [hertz, deep, _] = exact_skins();
+        let peak = |layer: &Layer| Footprint::new(&ball, layer, 5.0).share_on(0.0, 0.0, 1e-3);
+        let [hertz, deep, _] = exact_layers();
         // Under a thick layer Hertz's profile is as good as its variance; Boussinesq's tails are not a Gaussian's.
-        let ratio = peak(&hertz) / peak(&SKIN);
+        let ratio = peak(&hertz) / peak(&LAYER);
         assert!((ratio - 1.0).abs() < 0.05 && ratio != 1.0, "{ratio}");
-        let far = |skin: &Skin| Footprint::new(&ball, skin, 5.0).share_on(20e-3, 0.0, 1e-3);
-        assert!(far(&deep) > 50.0 * far(&SKIN), "{:e} {:e}", far(&deep), far(&SKIN));
+        let far = |layer: &Layer| Footprint::new(&ball, layer, 5.0).share_on(20e-3, 0.0, 1e-3);
+        assert!(far(&deep) > 50.0 * far(&LAYER), "{:e} {:e}", far(&deep), far(&LAYER));
         // Bare of any layer's blur a dome stays a dome: zero pressure beyond the patch, 1.5 times the mean in its middle.
-        let thin = Skin { thickness_m: 1e-4, contact: Pressure::Hertz, ..Skin::NONE };
+        let thin = Layer { thickness_m: 1e-4, contact: Pressure::Hertz, ..Layer::NONE };
         let footprint = Footprint::new(&ball, &thin, 5.0);
         let (patch, side) = (footprint.half_across_m, 1e-4);
         let mean = side * side / (PI * patch * patch);
@@ -378,7 +378,7 @@ mod tests {
 
     #[test]
     fn a_disc_is_even_inside_and_nothing_outside() {
-        let bare = Footprint::new(&Indenter::Flat { radius_m: 0.02 }, &Skin::NONE, 1.0);
+        let bare = Footprint::new(&Indenter::Flat { radius_m: 0.02 }, &Layer::NONE, 1.0);
         let side = 2e-3;
         let even = side * side / (PI * 0.02 * 0.02);
         for (x, y) in [(0.0, 0.0), (0.01, 0.003), (-0.005, 0.012)] {

@@ -11,7 +11,7 @@ pub(super) struct File {
     pub(super) duration_s: Spanned<f64>,
     #[serde(default)]
     pub(super) seed: u64,
-    pub(super) skin: Option<SkinKeys>,
+    pub(super) layer: Option<LayerKeys>,
     #[serde(default)]
     pub(super) sensor: SensorKeys,
     #[serde(default)]
@@ -22,7 +22,7 @@ pub(super) struct File {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SkinKeys {
+pub(super) struct LayerKeys {
     pub(super) thickness_m: Spanned<f64>,
     pub(super) spread: Option<Spanned<f64>>,
     pub(super) stiffness_pa: Option<Spanned<f64>>,
@@ -75,7 +75,7 @@ pub(super) enum OutputName {
 pub(super) struct SensorKeys {
     #[serde(default)]
     pub(super) kind: SensorName,
-    pub(super) tap: Option<Spanned<i64>>,
+    pub(super) wiper: Option<Spanned<i64>>,
     pub(super) output: Option<Spanned<OutputName>>,
     pub(super) full_scale_newton: Option<Spanned<f64>>,
     pub(super) offset: Option<Spanned<f64>>,

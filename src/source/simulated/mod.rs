@@ -26,7 +26,7 @@ use glam::DVec3;
 pub use record::{write_recording, write_recording_with_progress};
 pub use truth::Truth;
 
-use self::contact::{Footprint, Skin};
+use self::contact::{Footprint, Layer};
 use self::file::File;
 use self::sensor::{Reading, Sensor};
 use self::setup::{Setup, Touch};
@@ -45,7 +45,7 @@ pub struct SimulatedSource {
     body: Body,
     rate_hz: f64,
     frames: u64,
-    skin: Skin,
+    layer: Layer,
     sensor: Sensor,
     /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
     ids: Vec<u32>,
@@ -158,7 +158,7 @@ impl SimulatedSource {
         let taxels = pressure().map(|(index, taxel)| Ok((index, side(taxel)?))).collect::<Result<Vec<_>>>()?;
         let fields = FieldSet::new(&body)?;
         let mut setup = Setup { text, body: &body, fields: &fields, surfaces: BTreeMap::new(), duration_s };
-        let skin = setup.skin(file.skin.as_ref())?;
+        let layer = setup.layer(file.layer.as_ref())?;
         let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
         let mut touches = Vec::with_capacity(file.touch.len());
         let mut places = BTreeMap::new();
@@ -183,7 +183,7 @@ impl SimulatedSource {
             name: name.to_owned(),
             rate_hz,
             frames: frames as u64,
-            skin,
+            layer,
             sensor,
             forces_newton: vec![0.0; ids.len()],
             ids,
@@ -231,7 +231,7 @@ impl SimulatedSource {
     pub fn calibration(&self) -> String {
         let body = Path::new(&self.body.name).file_name().unwrap_or_default();
         let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids);
-        text + &self.skin.calibration()
+        text + &self.layer.calibration()
     }
 
     /// By how much the gain of each taxel differs from what the calibration says, in the order of [`Source::taxels`]: the
@@ -265,7 +265,7 @@ impl SimulatedSource {
         let angle = touch.angle.as_ref().map(|angle| angle.held(t_s));
         let along = touch.path.direction(&place, angle.unwrap_or(0.0));
         let across = along.cross(place.normal_in_link);
-        let footprint = Footprint::new(&touch.indenter, &self.skin, force_newton);
+        let footprint = Footprint::new(&touch.indenter, &self.layer, force_newton);
         for ((force, (position, normal)), (_, side_m)) in
             self.forces_newton.iter_mut().zip(taxels.iter()).zip(&self.taxels)
         {

@@ -60,7 +60,7 @@ pub(super) fn sensors(
 fn kind(text: Text<'_>, keys: &SensorKeys) -> Result<Kind> {
     let why = "for this kind of sensor";
     if keys.kind != SensorName::Fsr {
-        text.refuse("tap", keys.tap.as_ref(), why)?;
+        text.refuse("wiper", keys.wiper.as_ref(), why)?;
         text.refuse("output", keys.output.as_ref(), why)?;
         text.refuse("full_scale_newton", keys.full_scale_newton.as_ref(), why)?;
     }
@@ -73,8 +73,8 @@ fn kind(text: Text<'_>, keys: &SensorKeys) -> Result<Kind> {
     Ok(match keys.kind {
         SensorName::Ideal => Kind::Ideal,
         SensorName::Fsr => {
-            let tap = text.int("tap", keys.tap.as_ref(), 0..256)?;
-            let circuit = tap.map_or_else(FsrCircuit::default, |tap| FsrCircuit { tap: tap as u8 });
+            let wiper = text.int("wiper", keys.wiper.as_ref(), 0..256)?;
+            let circuit = wiper.map_or_else(FsrCircuit::default, |wiper| FsrCircuit { wiper: wiper as u8 });
             let output = keys.output.as_ref().map_or(OutputName::Counts, |output| *output.get_ref());
             if output != OutputName::Linearised {
                 text.refuse("full_scale_newton", keys.full_scale_newton.as_ref(), "unless `output` is linearised")?;

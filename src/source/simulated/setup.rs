@@ -6,8 +6,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use toml::Spanned;
 
-use super::contact::{Indenter, Skin};
-use super::file::{AngleKeys, ContactName, IndenterName, KernelName, SkinKeys, TouchKeys};
+use super::contact::{Indenter, Layer};
+use super::file::{AngleKeys, ContactName, IndenterName, KernelName, LayerKeys, TouchKeys};
 use super::layer::Kernel;
 use super::patch::Pressure;
 use super::path::{Path, PathFrame};
@@ -58,8 +58,8 @@ pub(super) struct Setup<'a> {
 }
 
 impl Setup<'_> {
-    pub(super) fn skin(&self, keys: Option<&SkinKeys>) -> Result<Skin> {
-        let Some(keys) = keys else { return Ok(Skin::NONE) };
+    pub(super) fn layer(&self, keys: Option<&LayerKeys>) -> Result<Layer> {
+        let Some(keys) = keys else { return Ok(Layer::NONE) };
         let or = |key: &str, value: &Option<Spanned<f64>>, default: f64| {
             value.as_ref().map_or(Ok(default), |value| self.text.positive(key, value))
         };
@@ -85,10 +85,10 @@ impl Setup<'_> {
         } else {
             self.text.positive("thickness_m", &keys.thickness_m)?
         };
-        Ok(Skin {
+        Ok(Layer {
             thickness_m,
-            spread: or("spread", &keys.spread, Skin::SPREAD)?,
-            stiffness_pa: or("stiffness_pa", &keys.stiffness_pa, Skin::STIFFNESS_PA)?,
+            spread: or("spread", &keys.spread, Layer::SPREAD)?,
+            stiffness_pa: or("stiffness_pa", &keys.stiffness_pa, Layer::STIFFNESS_PA)?,
             kernel,
             contact,
         })

@@ -1,15 +1,15 @@
 //! A simulated board that speaks the serial protocol as firmware does. No I/O, no clock.
 
 mod faults;
-mod tap;
+mod wiper;
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 pub use faults::{FaultCounts, Faults, FaultyLine, Window};
-pub use tap::RECORDED_TAP;
+pub use wiper::RECORDED_WIPER;
 
-use self::tap::at_tap;
+use self::wiper::at_wiper;
 use super::decode::{Decoder, Event};
 use super::encode;
 use super::format::{ANY_BOARD, Answer, Bits, Command, Head, Identity, MAX_CHANNELS, MAX_ENCODED_BYTES, Status};
@@ -17,10 +17,10 @@ use super::format::{ANY_BOARD, Answer, Bits, Command, Head, Identity, MAX_CHANNE
 /// Interval of full frames among partial ones.
 const FULL_EVERY: Duration = Duration::from_secs(1);
 
-/// How a simulated board responds to the command `tap`.
+/// How a simulated board responds to the command `wiper`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Potentiometers {
-    /// It sets the tap.
+    /// It sets the wiper.
     #[default]
     Obeyed,
     /// It answers "unknown command", as firmware without potentiometers does.
@@ -46,9 +46,9 @@ pub struct BoardConfig {
     pub running: bool,
     /// Whether it sends changed channels only, with a full frame once a second.
     pub partial: bool,
-    /// Whether readings fall under pressure, which decides how a tap changes them.
+    /// Whether readings fall under pressure, which decides how a wiper changes them.
     pub falls: bool,
-    /// How it responds to the command `tap`.
+    /// How it responds to the command `wiper`.
     pub potentiometers: Potentiometers,
     /// Relative error of its clock; positive runs fast.
     pub drift: f64,
@@ -62,7 +62,7 @@ pub struct VirtualBoard {
     sequence: u32,
     running: bool,
     rate_mhz: u32,
-    taps: Vec<u8>,
+    wipers: Vec<u8>,
     due: Duration,
     full_due: Duration,
     last: Vec<Option<u16>>,
@@ -83,7 +83,7 @@ impl VirtualBoard {
             sequence: 0,
             running: false,
             rate_mhz: 0,
-            taps: vec![RECORDED_TAP; channels],
+            wipers: vec![RECORDED_WIPER; channels],
             due: now,
             full_due: now,
             last: vec![None; channels],
@@ -104,7 +104,7 @@ impl VirtualBoard {
         self.sequence = 0;
         self.running = self.config.running;
         self.rate_mhz = self.config.rate_mhz;
-        self.taps.fill(RECORDED_TAP);
+        self.wipers.fill(RECORDED_WIPER);
         (self.due, self.full_due) = (now, now);
         self.last.fill(None);
         self.decoder.rejoin();
@@ -124,10 +124,10 @@ impl VirtualBoard {
         self.commands
     }
 
-    /// The current taps, one per channel.
+    /// The current wipers, one per channel.
     #[must_use]
-    pub fn taps(&self) -> &[u8] {
-        &self.taps
+    pub fn wipers(&self) -> &[u8] {
+        &self.wipers
     }
 
     /// Whether it sends frames.
@@ -165,10 +165,10 @@ impl VirtualBoard {
                 (self.rate_mhz, value) = (rate_mhz, rate_mhz);
                 self.due = now;
             }
-            Command::Tap { .. } if self.config.potentiometers == Potentiometers::Ignored => return,
-            Command::Tap { .. } if self.config.potentiometers == Potentiometers::Unknown => status = Status::Unknown,
-            Command::Tap { channel, tap } => match self.taps.get_mut(usize::from(channel)) {
-                Some(set) => (*set, value) = (tap, tap.into()),
+            Command::Wiper { .. } if self.config.potentiometers == Potentiometers::Ignored => return,
+            Command::Wiper { .. } if self.config.potentiometers == Potentiometers::Unknown => status = Status::Unknown,
+            Command::Wiper { channel, wiper } => match self.wipers.get_mut(usize::from(channel)) {
+                Some(set) => (*set, value) = (wiper, wiper.into()),
                 None => status = Status::Bad,
             },
             Command::Start => self.running = true,
@@ -184,7 +184,7 @@ impl VirtualBoard {
         let identity = Identity {
             request,
             running: self.running,
-            channels: self.taps.len() as u16,
+            channels: self.wipers.len() as u16,
             bits: self.config.bits,
             layout: self.config.layout,
             rate_mhz: self.rate_mhz,
@@ -226,7 +226,7 @@ impl VirtualBoard {
         self.rate_mhz == 0
     }
 
-    /// Sends a frame of `readings`, one per channel, as recorded at tap 38.
+    /// Sends a frame of `readings`, one per channel, as recorded at wiper 38.
     pub fn send(&mut self, readings: &[Option<u16>], now: Duration) {
         if self.rate_mhz > 0 {
             let period = Duration::from_secs_f64(1e3 / f64::from(self.rate_mhz));
@@ -237,9 +237,9 @@ impl VirtualBoard {
             }
         }
         let (bits, falls) = (self.config.bits, self.config.falls);
-        let read = |(reading, &tap): (Option<u16>, &u8)| reading.map(|value| at_tap(value, bits, tap, falls));
+        let read = |(reading, &wiper): (Option<u16>, &u8)| reading.map(|value| at_wiper(value, bits, wiper, falls));
         let padded = readings.iter().copied().chain(std::iter::repeat(None));
-        let values: Vec<Option<u16>> = padded.zip(&self.taps).map(read).collect();
+        let values: Vec<Option<u16>> = padded.zip(&self.wipers).map(read).collect();
         let full = !self.config.partial || now >= self.full_due;
         if full {
             self.full_due = now + FULL_EVERY;

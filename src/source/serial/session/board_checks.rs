@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::{LineConfig, LineState};
 use crate::signal::WiredBoard;
-use crate::source::boards::{BoardFrame, BoardState, ChannelTap, Verdict};
+use crate::source::boards::{BoardFrame, BoardState, ChannelWiper, Verdict};
 use crate::wire::{Bits, Command, Head, Identity, NO_LAYOUT, PacketOrder, layout_hash};
 
 impl LineState {
@@ -15,7 +15,7 @@ impl LineState {
         state.accounts[board].lost += u64::from(order.lost);
         self.lost += order.lost;
         if order.restarted {
-            state.taps[board].iter_mut().for_each(ChannelTap::forget);
+            state.wipers[board].iter_mut().for_each(ChannelWiper::forget);
             state.accounts[board].restarts += 1;
             state.notify(format!("{}: board {id} has started again", self.config.port));
             drop(state);
@@ -56,7 +56,7 @@ impl LineState {
             self.ask(Command::Rate { rate_mhz }, now);
         }
         self.config.shared.lock().accounts[board].bits = Some(identity.bits.count());
-        // Taps come before frames.
+        // Wipers come before frames.
         (self.starts, self.started) = (!identity.running, self.started || !identity.running);
     }
 
@@ -111,8 +111,8 @@ impl LineState {
             if let Some((other, _)) = self.joined {
                 state.accounts[other].state = BoardState::Silent;
             }
-            // Its count begins here, and its taps are unknown.
-            state.taps[board].iter_mut().for_each(ChannelTap::forget);
+            // Its count begins here, and its wipers are unknown.
+            state.wipers[board].iter_mut().for_each(ChannelWiper::forget);
             (self.joined, self.lost, self.clock_restarted) = (Some((board, id)), 0, true);
         }
         drop(state);
@@ -141,8 +141,8 @@ impl LineState {
         (self.last_frame, self.stopped) = (now, false);
         let mut frame = frame;
         {
-            let taps = &self.config.shared.lock().taps[board];
-            frame.values.retain(|(channel, _)| !taps.get(*channel as usize).is_some_and(|tap| tap.is_unknown()));
+            let wipers = &self.config.shared.lock().wipers[board];
+            frame.values.retain(|(channel, _)| !wipers.get(*channel as usize).is_some_and(|wiper| wiper.is_unknown()));
         }
         let (lost, restarted) = (std::mem::take(&mut self.lost), std::mem::take(&mut self.clock_restarted));
         self.config.shared.deliver(BoardFrame { board, lost, restarted, ..frame }, read_at);
@@ -173,8 +173,8 @@ mod tests {
 
     #[test]
     fn a_board_fits_its_wiring_or_it_is_said_why() {
-        let (taxels, taps) = (vec![Some(4), None, Some(9)], vec![None; 3]);
-        let wired = WiredBoard { id: 1, bits: Some(10), port: None, baud: None, taxels, taps };
+        let (taxels, wipers) = (vec![Some(4), None, Some(9)], vec![None; 3]);
+        let wired = WiredBoard { id: 1, bits: Some(10), port: None, baud: None, taxels, wipers };
         let hash = |taxels: &[Option<u32>]| layout_hash(taxels.iter().copied());
         let right = Identity {
             request: 1,

@@ -1,0 +1,52 @@
+/** Where the robot touches itself: a list of the self-contacts. */
+
+import { byId, make, setText } from "./dom.js";
+import { withUnit } from "./format.js";
+
+/** @typedef {import("./wire.js").SelfContact} SelfContact */
+
+export class SelfContactsPanel {
+  /**
+   * @param {import("./model.js").Model} model
+   * @param {(field: number) => void} choose
+   */
+  constructor(model, choose) {
+    this.model = model;
+    this.choose = choose;
+    this.panel = byId("self-contacts-panel", HTMLElement);
+    this.list = byId("self-contacts", HTMLElement);
+    this.count = byId("self-contact-count", HTMLElement);
+  }
+
+  update() {
+    const { welcome, selfContacts, inContact } = this.model;
+    this.panel.hidden = !welcome?.self_contacts;
+    if (this.panel.hidden) return;
+    const unknown = !selfContacts.known && inContact.size > 0;
+    setText(this.count, unknown ? "–" : String(selfContacts.list.length));
+    const note = unknown
+      ? "Where touches are in the world is not known: the frame has no pose."
+      : "No two links touch at one place.";
+    this.list.replaceChildren(
+      ...(selfContacts.list.length
+        ? selfContacts.list.map((contact) => this.row(contact))
+        : [make("p", "note", note)]),
+    );
+  }
+
+  /** @param {SelfContact} contact */
+  row(contact) {
+    const { model } = this;
+    const row = make("div", "contact");
+    row.append(make("i"));
+    for (const { field, total } of contact.sides) {
+      const button = make("button", "contact-side", model.welcome?.fields[field]?.label ?? "");
+      button.title = "Choose this field";
+      button.addEventListener("click", () => this.choose(field));
+      row.append(button, make("span", "contact-total", withUnit(total, "P", model.quantity)));
+    }
+    const angle = Number.isNaN(contact.angle) ? "" : ` · ${Math.round((contact.angle * 180) / Math.PI)}°`;
+    row.append(make("span", "contact-numbers", `${(contact.distance * 1e3).toFixed(1)} mm apart${angle}`));
+    return row;
+  }
+}

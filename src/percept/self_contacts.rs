@@ -1,0 +1,41 @@
+//! Self-contacts: touches of two links at one place in the world.
+
+/// A touch of each of two links, at one place in the world: the robot touches itself there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SelfContact {
+    /// Lasts as long as both touches do, and is never used again.
+    pub id: u64,
+    /// The touch on either link, the one whose field comes first in the plan first.
+    pub sides: [SelfContactSide; 2],
+    /// Halfway between the places of both touches, in the world, m.
+    pub position: [f64; 3],
+    /// How far these places are apart, m.
+    pub distance: f64,
+    /// The angle between the outward normals there, rad in [0, π]: π where they oppose. Absent where a field has no chart.
+    pub angle: Option<f64>,
+}
+
+impl SelfContact {
+    /// A contact of `sides`.
+    pub(crate) const fn new(
+        id: u64,
+        sides: [SelfContactSide; 2],
+        position: [f64; 3],
+        distance: f64,
+        angle: Option<f64>,
+    ) -> Self {
+        Self { id, sides, position, distance, angle }
+    }
+}
+
+/// One side of a [`SelfContact`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SelfContactSide {
+    /// Index of the field, as [`crate::Percept::field`] counts.
+    pub field: usize,
+    /// The touch, as [`crate::Touch::id`] has it.
+    pub touch: u64,
+    /// Σ wᵢPᵢ of the touch, in the unit of P.
+    pub total: f64,
+}

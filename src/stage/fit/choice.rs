@@ -1,0 +1,275 @@
+//! Fits all kinds of contact and chooses one.
+
+use glam::DVec2;
+
+use super::descent::{Fitted, STEPS, descend};
+use super::kinds::{Blob, Contact, Kind, Line, Point, Segment};
+use super::objective::Sensor;
+use super::real::Real;
+use super::shape::{Parameter, Shape};
+use super::touch::{Start, Touch};
+use crate::percept::{ContactKind, Fit, FitSigma, Flags};
+use crate::stage::angle;
+
+/// What a parameter costs: two more lower χ² by over twice as much in one touch of a hundred by chance, e^−PENALTY.
+pub(super) const PENALTY: f64 = 4.6;
+/// χ² a pressed taxel more than parameters over which a contact does not explain a touch: residuals of 2σ on average.
+const MISFIT: f64 = 4.0;
+/// A descent has come to rest when it could still lower χ² by this: parameters are within 0.1σ.
+const AT_REST: f64 = 0.01;
+
+/// The fits of a touch, or of several in lanes. Those with more parameters are made for touches with enough taxels.
+#[derive(Clone, Copy)]
+pub(crate) struct Fits<R> {
+    point: Fitted<R, 4>,
+    line: Fitted<R, 4>,
+    long: Option<[Fitted<R, 6>; 2]>,
+}
+
+/// Where the descents of a touch, or of several in lanes, ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ends<R> {
+    pub(crate) point: Shape<R>,
+    pub(crate) line: Shape<R>,
+    /// Of a segment and a blob, for touches with enough taxels.
+    pub(crate) long: Option<[Shape<R>; 2]>,
+    pub(crate) gain_variance: R,
+}
+
+impl<R: Copy> Ends<R> {
+    /// A start that is there already: from it, a fit says how good it is.
+    #[inline(always)]
+    pub(crate) fn start(&self) -> Start<R> {
+        let Self { point, line, long, gain_variance } = *self;
+        let [segment, blob] = long.unwrap_or([line, point]);
+        let half_length = segment.length;
+        let reached = Some(segment);
+        Start { point, line, blob, half_length, gain_variance, steps: 0, is_long: long.is_some(), reached }
+    }
+}
+
+/// Fits all kinds to `sensors`, from `start`.
+#[inline(always)]
+pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
+    let (gains, steps) = (start.gain_variance, start.steps);
+    let is_reached = start.reached.is_some();
+    let point = if is_reached { start.point } else { with_force::<R, Point, 4>(sensors, start.point) };
+    let point = descend::<R, Point, 4>(sensors, gains, point, steps);
+    let line = if is_reached { start.line } else { with_force::<R, Line, 4>(sensors, start.line) };
+    let line = descend::<R, Line, 4>(sensors, gains, line, steps);
+    let mut long = None;
+    if start.is_long {
+        // As much force as the line has on the segment's length.
+        let force = line.shape.force + start.half_length + std::f64::consts::LN_2;
+        let segment = start.reached.unwrap_or(Shape { force, length: start.half_length, ..line.shape });
+        let blob = if is_reached { start.blob } else { with_force::<R, Blob, 6>(sensors, start.blob) };
+        long = Some([
+            descend::<R, Segment, 6>(sensors, gains, segment, steps),
+            descend::<R, Blob, 6>(sensors, gains, blob, steps),
+        ]);
+    }
+    Fits { point, line, long }
+}
+
+/// The same of one touch alone: compiled once, as it is long.
+#[inline(never)]
+pub(crate) fn fit_alone(sensors: &[Sensor<f64>], start: &Start<f64>) -> Fits<f64> {
+    fit(sensors, start)
+}
+
+/// `shape`, which has a force of 1, with the force that explains the pressed sensors best.
+#[inline(always)]
+fn with_force<R: Real, M: Kind<K>, const K: usize>(sensors: &[Sensor<R>], shape: Shape<R>) -> Shape<R> {
+    let (contact, zero) = (Contact::of(&shape), shape.force.all(0.0));
+    let (mut both, mut own) = (zero, shape.force.all(f64::MIN_POSITIVE));
+    for sensor in sensors {
+        let (felt, _) = M::felt(&contact, sensor.at, sensor.margin);
+        let felt = R::choose(zero.is_below(sensor.pressed), felt, zero);
+        both = both + R::choose(zero.is_below(sensor.pressed), felt * sensor.pressure, zero);
+        own = own + felt * felt;
+    }
+    Shape { force: (both / own).at_least(f64::MIN_POSITIVE).ln(), ..shape }
+}
+
+impl<R: Copy> Fits<R> {
+    /// Where the descents ended, under gains that vary with `gain_variance`.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn ends(&self, gain_variance: R) -> Ends<R> {
+        let long = self.long.as_ref().map(|long| long.each_ref().map(|fitted| fitted.shape));
+        Ends { point: self.point.shape, line: self.line.shape, long, gain_variance }
+    }
+
+    /// Each number by `of`, as a lane's.
+    pub(crate) fn map<T>(&self, of: impl Fn(R) -> T + Copy) -> Fits<T> {
+        Fits {
+            point: mapped(&self.point, of),
+            line: mapped(&self.line, of),
+            long: self.long.as_ref().map(|long| long.each_ref().map(|long| mapped(long, of))),
+        }
+    }
+}
+
+#[cfg(test)]
+impl<R: Copy> Fits<R> {
+    /// By kind the cost, and what a step would still take away of it.
+    pub(crate) fn reached(&self) -> Vec<(R, R)> {
+        let mut all = vec![(self.point.cost, self.point.ahead), (self.line.cost, self.line.ahead)];
+        all.extend(self.long.iter().flatten().map(|fitted| (fitted.cost, fitted.ahead)));
+        all
+    }
+}
+
+fn mapped<R: Copy, T, const K: usize>(fitted: &Fitted<R, K>, of: impl Fn(R) -> T + Copy) -> Fitted<T, K> {
+    let Fitted { shape: Shape { place, along, force, width, length }, cost, chi_squared, ahead, covariance } = *fitted;
+    Fitted {
+        shape: Shape {
+            place: place.map(of),
+            along: along.map(of),
+            force: of(force),
+            width: of(width),
+            length: of(length),
+        },
+        cost: of(cost),
+        chi_squared: of(chi_squared),
+        ahead: of(ahead),
+        covariance: covariance.map(|row| row.map(of)),
+    }
+}
+
+/// The fit of one kind.
+struct Candidate {
+    kind: ContactKind,
+    parameters: usize,
+    shape: Shape<f64>,
+    cost: f64,
+    chi_squared: f64,
+    ahead: f64,
+    /// By [`Parameter`]; 0 for what the kind does not have.
+    variances: [f64; 6],
+    /// Of across and along.
+    shared: f64,
+}
+
+impl Candidate {
+    fn of<const K: usize>(kind: ContactKind, free: [Parameter; K], fitted: &Fitted<f64, K>) -> Self {
+        let mut variances = [0.0; 6];
+        for (k, parameter) in free.into_iter().enumerate() {
+            variances[parameter as usize] = fitted.covariance[k][k];
+        }
+        let shared = if free[1] == Parameter::Along { fitted.covariance[1][0] } else { 0.0 };
+        let &Fitted { shape, cost, chi_squared, ahead, .. } = fitted;
+        Self { kind, parameters: K, shape, cost, chi_squared, ahead, variances, shared }
+    }
+
+    fn variance(&self, parameter: Parameter) -> f64 {
+        self.variances[parameter as usize]
+    }
+
+    fn each(fits: &Fits<f64>) -> impl Iterator<Item = Self> {
+        let short = [
+            Self::of(ContactKind::Point, Point::FREE, &fits.point),
+            Self::of(ContactKind::Line, Line::FREE, &fits.line),
+        ];
+        let long = fits.long.as_ref().map(|[segment, blob]| {
+            [Self::of(ContactKind::Segment, Segment::FREE, segment), Self::of(ContactKind::Blob, Blob::FREE, blob)]
+        });
+        short.into_iter().chain(long.into_iter().flatten())
+    }
+}
+
+/// What the contact that explains a touch best makes its taxels feel.
+pub(crate) struct Explained {
+    /// By taxel, in the unit of P.
+    pub(crate) felt: Vec<f64>,
+    /// The standard deviation of its pressure across, at the sensors.
+    pub(crate) width_m: f64,
+}
+
+impl Touch {
+    /// What the best of `fits` makes the taxels feel, however well it explains them: what they differ by may be their gains.
+    pub(crate) fn explained(&self, fits: &Fits<f64>) -> Option<Explained> {
+        let best = self.best(Some(fits))?;
+        if best.ahead > AT_REST || !self.reaches(DVec2::from_array(best.shape.place)) {
+            return None;
+        }
+        let contact = Contact::of(&best.shape);
+        let felt = |sensor: &Sensor<f64>| {
+            let (at, margin) = (sensor.at, sensor.margin);
+            let felt = match best.kind {
+                ContactKind::Point => Point::felt(&contact, at, margin).0,
+                ContactKind::Line => Line::felt(&contact, at, margin).0,
+                ContactKind::Segment => Segment::felt(&contact, at, margin).0,
+                ContactKind::Blob => Blob::felt(&contact, at, margin).0,
+            };
+            felt * self.peak
+        };
+        let width_m = libm::exp(best.shape.width) * self.unit_m;
+        Some(Explained { felt: self.sensors().iter().map(felt).collect(), width_m })
+    }
+
+    /// The kind with the least cost of those that the taxels are enough for.
+    fn best(&self, fits: Option<&Fits<f64>>) -> Option<Candidate> {
+        let candidates = Candidate::each(fits?).filter(|candidate| self.pressed > candidate.parameters);
+        let penalised = |candidate: &Candidate| candidate.cost + 2.0 * PENALTY * candidate.parameters as f64;
+        candidates.min_by(|a, b| penalised(a).total_cmp(&penalised(b)))
+    }
+
+    /// The fit of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent.
+    pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Fit>, Flags) {
+        let Some(best) = self.best(fits) else { return (None, Flags::FEW_TAXELS) };
+        let spare = (self.pressed - best.parameters) as f64;
+        // Not a number is not within either. Of a descent that is cut short there is less to ask.
+        let explains = self.steps < 2 || best.chi_squared <= MISFIT * spare;
+        let rests = self.steps < STEPS || best.ahead <= AT_REST;
+        if !(explains && rests) {
+            return (None, Flags::POOR_FIT);
+        }
+        self.checked(&best)
+    }
+
+    fn checked(&self, best: &Candidate) -> (Option<Fit>, Flags) {
+        let Shape { place, along, force, width, length } = best.shape;
+        let (mut place, along) = (DVec2::from_array(place), DVec2::from_array(along));
+        let (half, is_line) = (libm::exp(length), best.kind == ContactKind::Line);
+        if is_line {
+            // The point of the line that is nearest to the touch's mean, which is the origin.
+            place -= along * place.dot(along);
+        }
+        if !self.reaches(place) {
+            return (None, Flags::OFF_FIELD);
+        }
+        let ends =
+            if best.kind == ContactKind::Segment { [place - along * half, place + along * half] } else { [place; 2] };
+        let is_whole = !is_line && ends.into_iter().all(|end| self.reaches(end));
+        let force = libm::exp(force) * self.peak;
+        let [across, lengthwise] = [Parameter::Across, Parameter::Along].map(|parameter| best.variance(parameter));
+        let sides = DVec2::new(-along.y, along.x);
+        // Of a line only what it is off across.
+        let place_variance = sides * sides * across + along * along * lengthwise + 2.0 * sides * along * best.shared;
+        // Of what has a logarithm as its parameter the standard deviation is a share.
+        let share_of = |parameter: Parameter| best.variance(parameter).sqrt();
+        let length = match best.kind {
+            ContactKind::Point | ContactKind::Line => None,
+            ContactKind::Segment => is_whole.then_some(2.0 * half * self.unit_m),
+            ContactKind::Blob => Some(half * self.unit_m),
+        };
+        let width = libm::exp(width) * self.unit_m;
+        let sigma = FitSigma {
+            place: (place_variance.max(DVec2::ZERO).map(f64::sqrt) * self.unit_m).to_array(),
+            force: force * share_of(Parameter::Force),
+            angle: best.variance(Parameter::Turn).sqrt(),
+            width: width * share_of(Parameter::Width),
+            length: length.unwrap_or(0.0) * share_of(Parameter::Length),
+        };
+        let fit = Fit {
+            kind: best.kind,
+            place: (place * self.unit_m + self.origin).to_array(),
+            force: is_whole.then_some(force),
+            angle: (best.kind != ContactKind::Point).then(|| angle::of_line(along.x, along.y)),
+            width,
+            length,
+            sigma: self.has_noise.then_some(sigma),
+        };
+        (Some(fit), if is_whole { Flags::empty() } else { Flags::OFF_FIELD })
+    }
+}
