@@ -11,6 +11,7 @@ use std::{fmt, io};
 use serde::de::DeserializeOwned;
 
 use crate::plain;
+use crate::renamed::new_name;
 
 /// `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -204,6 +205,16 @@ pub fn suggestion<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> 
     }
 }
 
+/// What to say of `asked`, which is no `what` among the `known` names: what it is called now, or what to try instead.
+#[must_use]
+pub fn unknown<'a>(what: &str, asked: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    match new_name(asked, known.iter().copied()) {
+        Some(new) => format!("`{asked}` is `{new}` now"),
+        None => format!("there is no {what} `{asked}`; {}", suggestion(asked, known)),
+    }
+}
+
 /// Maximum number of names in a [`suggestion`].
 const MAX_SUGGESTIONS: usize = 30;
 
@@ -242,10 +253,10 @@ fn explain(message: &str) -> String {
     let Some(word) = quoted.next() else { return message.to_owned() };
     let known: Vec<&str> = quoted.collect();
     // The unit at the end of a key is often forgotten.
-    let with_unit = known.iter().find(|name| name.strip_prefix(word).is_some_and(|unit| unit.starts_with('_')));
-    let hint =
-        with_unit.map_or_else(|| suggestion(word, known.iter().copied()), |near| format!("did you mean `{near}`?"));
-    format!("there is no {kind} `{word}`; {hint}")
+    match known.iter().find(|name| name.strip_prefix(word).is_some_and(|unit| unit.starts_with('_'))) {
+        Some(near) => format!("there is no {kind} `{word}`; did you mean `{near}`?"),
+        None => unknown(kind, word, known),
+    }
 }
 
 #[cfg(test)]
@@ -288,5 +299,10 @@ mod tests {
             "there is no choice `x`; it is one of ball, rod"
         );
         assert_eq!(explain("missing field `body`"), "`body` is missing");
+        assert_eq!(explain("unknown field `upkeep`, expected one of `all`, `drift`"), "`upkeep` is `drift` now");
+        assert_eq!(
+            explain("unknown field `upkeep`, expected `taxels`"),
+            "there is no key `upkeep`; it is one of taxels"
+        );
     }
 }

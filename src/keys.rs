@@ -6,7 +6,7 @@ use std::ops::Range;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
-use crate::error::{Error, Result, parse_toml, place_in, suggestion};
+use crate::error::{Error, Result, parse_toml, place_in, unknown};
 
 /// Larger numbers are not credible in any unit.
 const MAX_CREDIBLE: f64 = 1e9;
@@ -103,8 +103,7 @@ impl Text<'_> {
         what: &str,
         known: impl IntoIterator<Item = &'n str>,
     ) -> Error {
-        let hint = suggestion(asked.get_ref(), known);
-        self.wrong(asked.span(), format!("there is no {what} `{}`; {hint}", asked.get_ref()))
+        self.wrong(asked.span(), unknown(what, asked.get_ref(), known))
     }
 }
 

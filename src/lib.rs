@@ -94,6 +94,7 @@ pub mod plain;
 pub mod plot;
 #[cfg(feature = "mcap")]
 pub mod recording;
+pub mod renamed;
 pub mod robot;
 pub mod scene;
 pub mod signal;

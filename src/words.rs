@@ -31,8 +31,8 @@ macro_rules! words {
                 match word {
                     $($word => Ok(Self::$variant),)+
                     _ => {
-                        let hint = $crate::error::suggestion(word, Self::WORDS.iter().copied());
-                        Err($crate::error::Error::usage(format!("there is no {} `{word}`; {hint}", $what)))
+                        let what = $crate::error::unknown($what, word, Self::WORDS.iter().copied());
+                        Err($crate::error::Error::usage(what))
                     }
                 }
             }

@@ -16,7 +16,6 @@ from ._flags import Flags
 from ._native import (
     Body,
     Calibration,
-    SelfContacts,
     Engine,
     EngineState,
     Field,
@@ -24,6 +23,7 @@ from ._native import (
     Picture,
     Recording,
     Scene,
+    SelfContacts,
     Simulation,
     Touches,
     View,
@@ -40,7 +40,6 @@ from ._native import (
 __all__ = [
     "Body",
     "Calibration",
-    "SelfContacts",
     "Engine",
     "EngineState",
     "Field",
@@ -50,6 +49,7 @@ __all__ = [
     "Picture",
     "Recording",
     "Scene",
+    "SelfContacts",
     "Simulation",
     "SomaticError",
     "Touches",

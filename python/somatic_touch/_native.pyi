@@ -8,7 +8,6 @@ import numpy.typing as npt
 __all__ = [
     "Body",
     "Calibration",
-    "SelfContacts",
     "Engine",
     "EngineState",
     "Field",
@@ -16,6 +15,7 @@ __all__ = [
     "Picture",
     "Recording",
     "Scene",
+    "SelfContacts",
     "Simulation",
     "Touches",
     "View",

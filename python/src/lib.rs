@@ -5,7 +5,6 @@ mod arrays;
 mod author;
 mod body;
 mod calibration;
-mod self_contacts;
 #[cfg(feature = "gpu")]
 mod drawing;
 mod engine;
@@ -15,6 +14,7 @@ mod picture;
 mod recording;
 mod runner;
 mod scene;
+mod self_contacts;
 mod session;
 mod simulation;
 mod sinks;
@@ -38,8 +38,6 @@ mod native {
     #[pymodule_export]
     use calibration::PyCalibration;
     #[pymodule_export]
-    use self_contacts::PySelfContacts;
-    #[pymodule_export]
     use engine::PyEngine;
     #[pymodule_export]
     use percepts::PyPercepts;
@@ -51,6 +49,8 @@ mod native {
     use runner::{metadata, run};
     #[pymodule_export]
     use scene::PyScene;
+    #[pymodule_export]
+    use self_contacts::PySelfContacts;
     #[pymodule_export]
     use simulation::{PySimulation, simulate};
     #[pymodule_export]

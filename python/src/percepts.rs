@@ -3,16 +3,18 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
-use somatic::error::suggestion;
+use somatic::error::{suggestion, unknown};
 use somatic::percept::ColumnValues;
+use somatic::renamed::new_name;
 use somatic::sink::TableKind;
 use somatic::{COLUMNS, Column, Flags, Outputs, Percepts};
 
 use crate::arrays::array;
-use crate::self_contacts::PySelfContacts;
 use crate::error::usage;
+use crate::self_contacts::PySelfContacts;
 use crate::session::Run;
 use crate::stream::stream;
 use crate::threads::free;
@@ -57,10 +59,7 @@ impl PyPercepts {
                 _ if COLUMNS.iter().any(|column| column.name == name) => {
                     format!("`{name}` was not asked for; add it to the scene's outputs")
                 }
-                _ => format!(
-                    "there is no output `{name}`; {}",
-                    suggestion(name, outputs.columns().map(|column| column.name))
-                ),
+                _ => unknown("output", name, outputs.columns().map(|column| column.name)),
             },
         ))
     }
@@ -208,6 +207,13 @@ impl PyPercepts {
             return Err(usage(py, "`touches` were not asked for; add them to the scene's outputs"));
         }
         Ok(PyTouches { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
+    }
+
+    fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
+        Err(PyAttributeError::new_err(match new_name(name, ["self_contacts"]) {
+            Some(new) => format!("`{name}` is `{new}` now"),
+            None => format!("'Percepts' object has no attribute '{name}'"),
+        }))
     }
 
     /// The self-contacts, with output `self_contacts`: where the robot touches itself.

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use somatic::recording::{BODY, CALIBRATION, Reader};
 use somatic::signal::{Pose, UnitOfP};
 use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec, VendorFormat, VendorOptions, VendorSource};
-use somatic::{Error, Frame, RawValue, bundled};
+use somatic::{Calibration, Error, Frame, RawValue, bundled};
 
 use crate::arrays::array;
 use crate::body::PyBody;
@@ -239,7 +239,8 @@ fn attached(path: &Path) -> somatic::Result<(Option<NamedBytes>, Option<String>)
     let body = body.map(|(attached, bytes)| (attached.name, bytes));
     let calibration = reader.find_attached(|attached| attached.name == CALIBRATION)?;
     let text = calibration.map(|(_, bytes)| String::from_utf8(bytes)).transpose();
-    Ok((body, text.map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))?))
+    let text = text.map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))?;
+    Ok((body, text.map(|text| Calibration::with_names_of_now(text).0)))
 }
 
 /// Opens the source and finds what comes with it: the source, its body, the text of its calibration.

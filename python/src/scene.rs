@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyDictMethods, PyFloat, PyInt, PyString};
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use somatic::error::{parse_toml, suggestion};
+use somatic::error::{parse_toml, unknown};
+use somatic::renamed::new_name;
 use somatic::scene::{
     Arithmetic, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy,
 };
@@ -107,7 +108,7 @@ impl FromStr for Named {
     fn from_str(name: &str) -> somatic::Result<Self> {
         Outputs::named(name).map(Self).ok_or_else(|| {
             let names: Vec<String> = Outputs::all().names().collect();
-            Error::usage(format!("there is no output `{name}`; {}", suggestion(name, names.iter().map(String::as_str))))
+            Error::usage(unknown("output", name, names.iter().map(String::as_str)))
         })
     }
 }
@@ -219,7 +220,7 @@ impl PyScene {
                 let what =
                     text.strip_prefix(error.place().unwrap_or_default()).and_then(|rest| rest.strip_prefix(": "));
                 let what = what.unwrap_or(&text);
-                return Err(match what.starts_with("there is no key") {
+                return Err(match what.starts_with("there is no key") || what.starts_with(&format!("`{key}` is `")) {
                     true => usage(py, what),
                     false => usage(py, format!("{key}: {what}")),
                 });
@@ -298,6 +299,9 @@ fn refuse_the_commands(py: Python<'_>, table: &toml::Table) -> PyResult<()> {
         let what =
             format!("accuracy: `{wish}` is measured by the command: `somatic tradeoff --write`; give knobs here");
         return Err(usage(py, what));
+    }
+    if let Some((key, new)) = table.keys().find_map(|key| Some((key, new_name(key, OF_THE_COMMAND)?))) {
+        return Err(usage(py, format!("`{key}` is `{new}` now, and for the command; leave it out of this scene")));
     }
     match table.keys().find(|key| *key != "accuracy" && OF_THE_COMMAND.contains(&key.as_str())) {
         Some(key) => Err(usage(py, format!("`{key}` is for the command; leave it out of this scene"))),

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
+use somatic::renamed::new_name;
 use somatic::sink::TableKind;
-use somatic::{Percepts, Touch};
+use somatic::{Outputs, Percepts, Touch};
 
 use crate::arrays::array;
 use crate::error::usage;
@@ -111,6 +112,10 @@ impl PyTouches {
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
         let asked = self.percepts.outputs().of_each_touch();
         let Some(column) = asked.columns().find(|column| column.name == name) else {
+            let of_fits = Outputs::all().of_each_touch();
+            if let Some(new) = new_name(name, of_fits.columns().map(|column| column.name)) {
+                return Err(usage(py, format!("`{name}` is `{new}` now")));
+            }
             let names: Vec<&str> = asked.columns().map(|column| column.name).collect();
             let has = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
             return Err(usage(py, format!("no output of the fit `{name}` was asked for; there are: {has}")));

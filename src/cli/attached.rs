@@ -1,11 +1,14 @@
 //! Files attached to a recording, which are used if no body is named.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use somatic::body::Original;
 use somatic::limits::{self, MAX_BODY_BYTES};
 use somatic::recording::{BODY, CALIBRATION, Reader};
-use somatic::{Error, Result, bundled};
+use somatic::{Calibration, Error, Result, bundled};
+
+use super::stdio::say;
 
 /// The body in the recording at `path`: its name, and its bytes as `.glb`.
 pub(super) fn body(path: &Path) -> Result<Option<(String, Vec<u8>)>> {
@@ -14,12 +17,20 @@ pub(super) fn body(path: &Path) -> Result<Option<(String, Vec<u8>)>> {
     Ok(found.map(|(attached, bytes)| (attached.name, bytes)))
 }
 
-/// The text of the calibration in the recording at `path`.
-pub(super) fn calibration(path: &Path) -> Result<Option<String>> {
+/// Whether it has been said that names were other ones: a command may need the calibration several times.
+static SAID: AtomicBool = AtomicBool::new(false);
+
+/// The text of the calibration in the recording at `path`. Says once which of its names are others now, unless `quiet`.
+pub(super) fn calibration(path: &Path, quiet: bool) -> Result<Option<String>> {
     let mut reader = Reader::open(path)?;
     let Some((_, bytes)) = reader.find_attached(|attached| attached.name == CALIBRATION)? else { return Ok(None) };
-    let text = String::from_utf8(bytes);
-    text.map(Some).map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))
+    let text = String::from_utf8(bytes)
+        .map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))?;
+    let (text, renamed) = Calibration::with_names_of_now(text);
+    if !renamed.is_empty() && !quiet && !SAID.swap(true, Ordering::Relaxed) {
+        say(&format!("{}: its calibration was written under old names: {}", path.display(), renamed.join(", ")));
+    }
+    Ok(Some(text))
 }
 
 /// The body `name`, a file or a bundled one, as a self-contained `.glb`.

@@ -204,7 +204,7 @@ fn files(
         let own = match (export, from) {
             (Some(export), _) => export.calibration().map(|text| (export.path().to_owned(), text)),
             (None, SourceSpec::Mcap(file)) if arguments.body.is_none() => {
-                attached::calibration(file)?.map(|text| (file.clone(), text))
+                attached::calibration(file, false)?.map(|text| (file.clone(), text))
             }
             _ => None,
         };

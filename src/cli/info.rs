@@ -166,7 +166,7 @@ fn recorded(path: &std::path::Path) -> Result<Option<Contacts>> {
     let Some((name, bytes)) = attached::body(path)? else { return Ok(None) };
     let Ok(body) = Body::from_bytes(&name, &bytes) else { return Ok(None) };
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let calibration = attached::calibration(path)?.map(|text| Calibration::parse(&text, &ids)).transpose();
+    let calibration = attached::calibration(path, false)?.map(|text| Calibration::parse(&text, &ids)).transpose();
     let mut reader = Reader::open(path)?;
     // What cannot be run is described all the same.
     let Ok(Ok(mut contacts)) = calibration.map(|calibration| Contacts::new(&body, calibration, &reader)) else {

@@ -31,6 +31,7 @@ mod keys;
 mod latency;
 mod lines;
 mod live;
+mod old_names;
 mod overlaid;
 mod paper;
 mod plan;
@@ -55,11 +56,13 @@ mod verify;
 mod view;
 mod words;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
-use somatic::Result;
+use std::process::ExitCode;
 
+use clap::{CommandFactory as _, Parser, Subcommand};
+use somatic::{Error, Result};
+
+pub(crate) use self::stdio::say;
 use self::stdio::{DONE, print};
-pub(crate) use self::stdio::{answer, say};
 
 /// What `somatic` alone prints.
 const GREETING: &str = concat!(
@@ -135,6 +138,18 @@ enum Command {
     Tune(tune::Arguments),
     Devices(devices::Arguments),
     Completions(completions::Arguments),
+}
+
+/// Prints what the arguments are answered with, help or what is wrong with them, and gives the exit code.
+pub(crate) fn answer(answer: &clap::Error) -> ExitCode {
+    match old_names::told(answer, &Arguments::command()) {
+        Some(what) => {
+            let error = Error::usage(what);
+            say(&format!("{}: {error}", console::style("error").red().bold().for_stderr()));
+            ExitCode::from(error.exit_code())
+        }
+        None => stdio::answer(answer),
+    }
 }
 
 /// Does what was asked for and gives the exit code.

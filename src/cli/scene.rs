@@ -37,7 +37,8 @@ use super::first_source::FirstSource;
 use super::ports::LineFlags;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
-/// its name; paths in a file are relative to that file. Flags come before keys.
+/// its name; of `--force` and `--speed` keys say more: `overwrite`, `playback_speed`. Paths in a file are relative to that file.
+/// Flags come before keys.
 #[derive(Args, Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 #[schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do")]

@@ -123,13 +123,13 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     let now = session.places(&start);
     session.close();
 
-    let tapped = |board: u16, channel: u16| {
+    let wiper_of = |board: u16, channel: u16| {
         let sensor = now.iter().zip(tuning.sensors()).find(|(place, _)| (place.id, place.channel) == (board, channel));
         // A wiper that was not confirmed is unknown.
         sensor.filter(|(place, _)| place.is_set).map(|(_, sensor)| sensor.wiper).or_else(|| own(board, channel))
     };
     if let Some(output) = output {
-        output.write(report::wiring(&wiring.with_wipers(tapped)).as_bytes())?;
+        output.write(report::wiring(&wiring.with_wipers(wiper_of)).as_bytes())?;
     }
     print(&if arguments.json { report::json(&tuning, &now) } else { report::table(&tuning, &now) })?;
     if let Some(output) = fsr_calibration {

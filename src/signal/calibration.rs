@@ -5,6 +5,7 @@
 mod file;
 mod keys;
 mod layer;
+mod old_names;
 mod overlay;
 mod thresholds;
 

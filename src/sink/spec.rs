@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use super::table::path_beside;
 use super::{CsvSink, NdjsonSink, Session, Sink, header};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, nearest, unknown};
 use crate::limb::{LimbSends, checked_key};
 use crate::output::{OutputPath, OutputPaths, STANDARD_OUTPUT};
 use crate::percept::Outputs;
@@ -108,9 +108,7 @@ impl FromStr for TableName {
         if let Some((_, table)) = all.iter().find(|(known, _)| *known == name) {
             return Ok(*table);
         }
-        let near = nearest(name, all.map(|(name, _)| name)).map(|near| format!("; did you mean `{near}`?"));
-        let hint = near.unwrap_or_else(|| "; choose of fields, touches and self_contacts".to_owned());
-        Err(Error::usage(format!("there is no table `{name}`{hint}")))
+        Err(Error::usage(unknown("table", name, all.map(|(known, _)| known))))
     }
 }
 

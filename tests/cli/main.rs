@@ -37,7 +37,6 @@ mod paper;
 mod plan;
 mod plot;
 mod python;
-mod self_contacts;
 // The library's own numbers that look like chance.
 #[path = "../../src/author/random.rs"]
 mod random;
@@ -53,6 +52,7 @@ mod ros2_live;
 #[cfg(all(unix, feature = "ros2"))]
 mod ros2_peer;
 mod run;
+mod self_contacts;
 #[cfg(unix)]
 mod serial;
 #[cfg(unix)]

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use somatic::Body;
 
-use super::{done, file, output, somatic, text_of};
+use super::{done, fails, file, output, somatic, stderr, text_of};
 
 /// Sets the title, writes the clipboard, clears the screen; ends a line; turns what follows; a C1 sequence; none at all.
 const HOSTILE: &str = "\u{1b}]0;P\u{7}\u{1b}]52;c;aGk=\u{7}\u{1b}[2J\nforged\r\u{202e}\u{9b}31m\u{8}\0";
@@ -165,4 +165,106 @@ fn what_xml_cannot_hold_is_written_so_that_people_can_read_it() {
     std::fs::write(at("t.csv"), "t,0,1,2,3,4,5,6,7,8\n0,0,0,0,0,0,0,0,0,0\n0.1,9,9,9,9,9,9,9,9,9\n").unwrap();
     done(&["plot", &at("t.csv"), "--body", &at("a.glb"), "-o", &at("a.svg")]);
     is_svg_with(Path::new(&at("a.svg")), "a\\u001b\\u0000b");
+}
+
+/// A flag, an output, a table or a way under the name that it had before.
+#[test]
+fn whoever_gives_an_old_name_is_told_the_new_one_in_one_line() {
+    let told = |code: i32, arguments: &[&str], new: &str| {
+        let said = fails(code, arguments);
+        assert!(said.trim_end().ends_with(new) && said.lines().count() == 1, "{arguments:?}: {said}");
+    };
+    for (arguments, new) in [
+        (&["run", "--outputs", "total,axis"][..], "--outputs: `axis` is `principal_axis` now"),
+        (&["run", "--outputs", "axis_sigma"], "--outputs: `axis_sigma` is `principal_axis_sigma` now"),
+        (&["run", "--outputs", "contacts"], "--outputs: `contacts` is `self_contacts` now"),
+        (&["plan", "--outputs", "footprint_angle"], "--outputs: `footprint_angle` is `fit_angle` now"),
+        (&["run", "--outputs", "footprint"], "--outputs: `footprint` is `fit_*` now"),
+        (&["run", "--outputs", "total", "--table", "contacts"], "--table: `contacts` is `self_contacts` now"),
+        (&["run", "--orientation-by", "footprint"], "--orientation-by: `footprint` is `fit` now"),
+        (&["run", "--orientation-by", "footprint-2"], "--orientation-by: `footprint-2` is `fit-2` now"),
+        (&["run", "--in", "hand"], "`--in` is `--relative-to` now"),
+        (&["calibrate", "--body", "hand", "--skin=touches.csv"], "`--skin` is `--gains-from` now"),
+        (&["tune", "--source", "serial:a", "--tap", "3"], "`--tap` is `--wiper` now"),
+    ] {
+        told(2, arguments, new);
+    }
+    #[cfg(unix)]
+    told(2, &["board", "--taps", "ignored"], "`--taps` is `--wipers` now");
+    // What another command was never called so is not said to be.
+    assert!(!fails(2, &["author", "--skin", "a.csv"]).contains("now"));
+
+    let folder = tempfile::tempdir().unwrap();
+    let told_of = |code: i32, text: &str, arguments: &[&str], new: &str| {
+        let path = folder.path().join("old.toml");
+        std::fs::write(&path, text).unwrap();
+        let source = format!("sim:{}", text_of(&path));
+        let of = |word: &&str| match *word {
+            "OLD" => text_of(&path).to_owned(),
+            "SIM" => source.clone(),
+            word => word.to_owned(),
+        };
+        let words: Vec<String> = arguments.iter().map(of).collect();
+        told(code, &words.iter().map(String::as_str).collect::<Vec<_>>(), new);
+    };
+    for (key, new) in [
+        ("in = \"hand\"", "line 1, column 1: `in` is `relative_to` now"),
+        ("force = true", "line 1, column 1: `force` is `overwrite` now"),
+        ("tare = true\nspeed = 2", "line 2, column 1: `speed` is `playback_speed` now"),
+        ("outputs = [\"total\", \"axis\"]", "`axis` is `principal_axis` now"),
+        ("[accuracy]\norientation_by = \"footprint-1\"", "`footprint-1` is `fit-1` now"),
+    ] {
+        told_of(2, key, &["run", "OLD"], new);
+    }
+    let calibrated = ["run", "--backend", "cpu", "--calibration", "OLD"];
+    told_of(1, "[upkeep]\ndead_s = 2\n", &calibrated, "line 1, column 2: `upkeep` is `drift` now");
+    told_of(1, "[skin]\nsigma_m = 0.004\n", &calibrated, "line 1, column 2: `skin` is `layer` now");
+    told_of(1, "[all]\nsensor = \"fsr\"\ntap = 38\n", &calibrated, "line 3, column 1: `tap` is `wiper` now");
+    let simulation = "body = \"hand\"\nrate_hz = 10\nduration_s = 1\n";
+    let simulated = ["run", "--source", "SIM"];
+    told_of(
+        1,
+        &format!("{simulation}[skin]\nthickness_m = 0.004\n"),
+        &simulated,
+        "line 4, column 2: `skin` is `layer` now",
+    );
+    let sensor = format!("{simulation}[sensor]\nkind = \"fsr\"\ntap = 38\n");
+    told_of(1, &sensor, &simulated, "line 6, column 1: `tap` is `wiper` now");
+    #[cfg(unix)]
+    told_of(
+        1,
+        "[[board]]\nid = 1\ntaxels = [{ channel = 0, first = 0, count = 1, taps = [3] }]\n",
+        &["run", "--body", "hand", "--source", "serial:/dev/null", "--wiring", "OLD"],
+        "`taps` is `wipers` now",
+    );
+}
+
+/// A recording cannot be changed: the calibration that it carries is read, whatever its names were then.
+#[test]
+fn a_recording_with_a_calibration_of_old_names_is_read_with_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| text_of(&folder.path().join(name)).to_owned();
+    let touches = at("touches.csv");
+    let values: Vec<String> = (0..40).map(|id| (200 + 10 * id).to_string()).collect();
+    let ids: Vec<String> = (0..40).map(|id| id.to_string()).collect();
+    std::fs::write(&touches, format!("t,{}\n0,{}\n0.1,{}\n", ids.join(","), values.join(","), values.join(",")))
+        .unwrap();
+    let of_names = |recording: &str, layer: &str, drift: &str, wiper: &str| {
+        let calibration =
+            format!("[all]\nsensor = \"fsr\"\n{wiper} = 60\n[{layer}]\nsigma_m = 0.004\n[{drift}]\ndead_s = 2\n");
+        std::fs::write(at("calibration.toml"), calibration).unwrap();
+        done(&["convert", &touches, &at(recording), "--body", "hand", "--calibration", &at("calibration.toml")]);
+        let run = output(&["run", "--backend", "cpu", "--source", &at(recording), "--sink", "-"]);
+        assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
+        (String::from_utf8(run.stdout).unwrap(), stderr(&run))
+    };
+    let (old, said) = of_names("old.mcap", "skin", "upkeep", "tap");
+    let (new, silent) = of_names("new.mcap", "layer", "drift", "wiper");
+    let line = "old.mcap: its calibration was written under old names: `[skin]` is `[layer]` now, `[upkeep]` is `[drift]` now, \
+                `tap` is `wiper` now";
+    assert_eq!(said.matches(line).count(), 1, "{said}");
+    assert!(!silent.contains("old names"), "{silent}");
+    let of_frames = |text: &str| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(of_frames(&old), of_frames(&new));
+    assert!(of_frames(&old).len() == 2 && old.contains("\"total\""), "{old}");
 }

@@ -17,6 +17,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("length", vec![]),
         ("limits", vec![]),
         ("plain", vec![]),
+        ("renamed", vec![]),
         ("setters", vec![]),
         ("words", vec!["error"]),
         ("parallel", vec![]),
@@ -64,7 +65,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
 }
 
 /// What every module may use, and which use nothing.
-const FOR_ALL: [&str; 2] = ["limits", "plain"];
+const FOR_ALL: [&str; 3] = ["limits", "plain", "renamed"];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {

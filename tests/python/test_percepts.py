@@ -202,3 +202,23 @@ def test_units(hand: st.Body) -> None:
     assert (p.unit("total"), p.unit("force"), p.unit("centroid"), p.unit("anisotropy")) == ("Pa", "N", "m", "1")
     assert p["peak"].max() == 1000
     assert st.Engine(hand, backend="cpu").step(0, [1] * 40).unit("total") == "count"
+
+
+def test_whoever_gives_an_old_name_is_told_the_new_one(touch: st.Recording) -> None:
+    for scene, new in [
+        ({"outputs": ["axis"]}, "`axis` is `principal_axis` now"),
+        ({"outputs": ["footprint_angle"]}, "`footprint_angle` is `fit_angle` now"),
+        ({"in": "hand"}, "`in` is `relative_to` now"),
+        ({"force": True}, "`force` is `overwrite` now"),
+        ("speed = 2", "`speed` is `playback_speed` now"),
+    ]:
+        with pytest.raises(st.UsageError if isinstance(scene, dict) else st.SomaticError, match=new):
+            st.Scene(**scene) if isinstance(scene, dict) else touch.engine(scene, backend="cpu")
+    p = touch.engine({"outputs": ["principal_axis"]}, backend="cpu").process(touch.t[:2], touch.values[:2])
+    with pytest.raises(st.UsageError, match="`axis` is `principal_axis` now"):
+        p["axis"]
+    with pytest.raises(AttributeError, match="`contacts` is `self_contacts` now"):
+        p.contacts
+    with pytest.raises(AttributeError, match="no attribute 'banana'"):
+        p.banana
+    assert not hasattr(p, "__array__")

@@ -40,7 +40,7 @@ impl RunOptions {
             _ => {}
         }
         let Some(recording) = self.recording()? else { return Ok(None) };
-        Ok(attached::calibration(&recording)?.map(|text| (recording, text)))
+        Ok(attached::calibration(&recording, self.quiet)?.map(|text| (recording, text)))
     }
 
     /// The text of the calibration that is used, and what it comes with: the named one, laid over the own one of an export or

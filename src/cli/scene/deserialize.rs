@@ -7,14 +7,14 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use somatic::error::suggestion;
+use somatic::error::unknown;
 use somatic::scene::MotionFilter;
 use somatic::{Error, Outputs, Result};
 
 pub(in crate::cli) fn output(name: &str) -> Result<Outputs> {
     Outputs::named(name).ok_or_else(|| {
         let names: Vec<String> = Outputs::all().names().collect();
-        Error::usage(format!("there is no output `{name}`; {}", suggestion(name, names.iter().map(String::as_str))))
+        Error::usage(unknown("output", name, names.iter().map(String::as_str)))
     })
 }
 

@@ -7,6 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::{Map, Value};
 use somatic::percept::Measure;
 use somatic::recording::Reader;
+use somatic::renamed::old_name;
 use somatic::sink::FieldNames;
 use somatic::{COLUMNS, Column, Percept, Percepts, Plan, Result};
 
@@ -125,7 +126,7 @@ impl Recorded {
                 ["field", "letter", "signal"].map(|key| values.get(key).and_then(Value::as_str).map(str::to_owned));
             if let Some(&field) = self.fields.get(&key) {
                 recorded.insert(field, values);
-                let new = COLUMNS.iter().filter(|column| values.contains_key(column.name));
+                let new = COLUMNS.iter().filter(|column| recorded_of(column, values).is_some());
                 let new: Vec<&Column> = new.filter(|column| !self.columns.contains(column)).collect();
                 self.columns.extend(new);
             }
@@ -149,9 +150,14 @@ impl Recorded {
     }
 }
 
+/// The recorded value of `column`, also from before it was called so.
+fn recorded_of<'v>(column: &Column, values: &'v Map<String, Value>) -> Option<&'v Value> {
+    values.get(column.name).or_else(|| values.get(&old_name(column.name)?))
+}
+
 /// The recorded value of `column`, if it differs from that of `percept`.
 fn different(column: &Column, percept: &Percept, values: Option<&Map<String, Value>>) -> Option<Different> {
-    let recorded = values.and_then(|values| values.get(column.name)).and_then(|value| match value {
+    let recorded = values.and_then(|values| recorded_of(column, values)).and_then(|value| match value {
         Value::Array(parts) => parts.iter().map(Value::as_f64).collect(),
         one => one.as_f64().map(|one| vec![one]),
     });
