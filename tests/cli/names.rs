@@ -157,7 +157,7 @@ fn what_xml_cannot_hold_is_written_so_that_people_can_read_it() {
     done(&["author", "--csv-skin", text_of(&table), "-o", &at("a.glb")]);
     let told = output(&["convert", &at("a.glb"), "-o", &at("a.urdf")]);
     assert_eq!(told.status.code(), Some(0));
-    let told = super::stderr(&told);
+    let told = stderr(&told);
     assert!(told.contains("XML has no place for some characters in the names of 1 links"), "{told}");
     let text = std::fs::read_to_string(at("a.urdf")).unwrap();
     let urdf = roxmltree::Document::parse(&text).unwrap();
@@ -256,7 +256,8 @@ fn a_recording_with_a_calibration_of_old_names_is_read_with_a_line() {
         done(&["convert", &touches, &at(recording), "--body", "hand", "--calibration", &at("calibration.toml")]);
         let run = output(&["run", "--backend", "cpu", "--source", &at(recording), "--sink", "-"]);
         assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
-        (String::from_utf8(run.stdout).unwrap(), stderr(&run))
+        let told = stderr(&run);
+        (String::from_utf8(run.stdout).unwrap(), told)
     };
     let (old, said) = of_names("old.mcap", "skin", "upkeep", "tap");
     let (new, silent) = of_names("new.mcap", "layer", "drift", "wiper");

@@ -307,7 +307,7 @@ fn the_principal_axis_of_a_rod_is_its_truth() {
                  path = [[0.0004, 0.0009]]\nhold = {{ newton = 2 }}"
             ),
         );
-        let got = percept(&mut simulation).axis.unwrap();
+        let got = percept(&mut simulation).principal_axis.unwrap();
         let truth = simulation.truth()[0].angle.unwrap();
         assert!((truth - f64::from(angle).to_radians()).abs() < 1e-15);
         // Second moments off by `error` turn the axis by at most asin(2 · error / apart) / 2. Beside sampling and

@@ -203,7 +203,7 @@ fn put<T: Pod>(device: &Device, buffer: &mut wgpu::Buffer, name: &str, rows: &[T
 
 #[cfg(test)]
 mod tests {
-    use super::super::shaders::fit;
+    use super::super::shaders;
     use super::super::skips::skip;
     use super::*;
     use crate::backend::cpu::fit::{fit_each, judge_each};
@@ -275,7 +275,7 @@ mod tests {
 
     /// Compares a step of all descents where the device has `numbers` with the same step in double precision under `layer`.
     fn compared(device: &Device, numbers: &[(String, f64)], layer: Layer) -> Compared {
-        let mut descents = Descents::new(device, &fit(numbers));
+        let mut descents = Descents::new(device, &shaders::fit(numbers));
         let (_, starts) = ended(device, &mut descents, 0);
         let (_, ends) = ended(device, &mut descents, 1);
         let mut compared = Compared::default();
@@ -341,7 +341,7 @@ mod tests {
     #[test]
     fn descents_reach_the_objective_that_double_precision_reaches() {
         let Some(device) = device() else { return };
-        let mut descents = Descents::new(&device, &fit(&numbers()));
+        let mut descents = Descents::new(&device, &shaders::fit(&numbers()));
         let (touches, ends) = ended(&device, &mut descents, 6);
         let pointers: Vec<&Touch> = touches.iter().collect();
         let ends: Vec<_> = ends.into_iter().map(Some).collect();
