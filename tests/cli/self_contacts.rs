@@ -254,7 +254,7 @@ fn a_table_of_contacts_has_what_ndjson_has() {
     assert!(Path::new(&folder.path().join("a.touches.csv")).is_file());
     let described =
         done(&["run", "--describe", "--outputs", "self_contacts", "--sink", text_of(&folder.path().join("b.csv"))]);
-    assert!(described.contains("one row per frame and contact") && described.contains("field_b"), "{described}");
+    assert!(described.contains("one row per frame and self-contact") && described.contains("field_b"), "{described}");
 }
 
 #[test]

@@ -101,7 +101,7 @@ pub(super) fn fsr(tuning: &Tuning, body: &str) -> Result<String> {
     tuning.sensors().iter().for_each(|sensor| *counts.entry(sensor.wiper).or_insert(0) += 1);
     let usual = counts.iter().max_by_key(|(_, count)| **count).map_or(FsrCircuit::MIDDLE_WIPER, |(wiper, _)| *wiper);
     let body = Value::from(body);
-    let mut text = format!("body = {body}\n\n[all]\nsensor = \"fsr\"\ntap = {usual}\n");
+    let mut text = format!("body = {body}\n\n[all]\nsensor = \"fsr\"\nwiper = {usual}\n");
     for sensor in tuning.sensors().iter().filter(|sensor| sensor.wiper != usual) {
         text += &format!("\n[taxel.{}]\nwiper = {}\n", sensor.id, sensor.wiper);
     }
