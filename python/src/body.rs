@@ -242,7 +242,7 @@ impl PyBody {
     }
 
     /// Its sensors, an array of structures [taxels] by ascending id: `id`; `link`, an index into `links`; `position` and `normal`
-    /// [3] in the link's frame, in metres; `place`, the position in the body at rest; `area`, in m², 0 where unknown; `modality`.
+    /// [3] in the link's frame, in metres; `place`, the position in the world with the body at rest; `area`, in m², 0 where unknown; `modality`.
     ///
     /// >>> import somatic_touch as st
     /// >>> taxels = st.Body.bundled("hand").taxels
@@ -253,7 +253,7 @@ impl PyBody {
         let taxels = &self.inner.taxels;
         let count = taxels.len();
         let place = |taxel: &somatic::body::Taxel| {
-            self.inner.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link).to_array()
+            self.inner.links[taxel.link].world_from_link().transform_point3(taxel.position_in_link).to_array()
         };
         let vectors = |of: &dyn Fn(&somatic::body::Taxel) -> [f64; 3]| {
             array(py, taxels.iter().flat_map(of).collect::<Vec<f64>>(), &[count, 3])

@@ -190,7 +190,7 @@ impl PyPercepts {
         found.ok_or_else(|| usage(py, format!("there is no field `{name}`; {}", suggestion(name, labels()))))
     }
 
-    /// Whether positions and normals are in the world, bool [frames, fields]: where frames carry poses.
+    /// Whether positions and normals are in the world (z up, x forward, y left), bool [frames, fields]: where frames carry poses.
     #[getter]
     fn in_world(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.once(py, "in_world", || {

@@ -71,7 +71,7 @@ impl PyRecording {
         self.taxels.clone()
     }
 
-    /// By link its poses in the world, float64 [frames, 7]: x, y, z in metres, and a quaternion qx, qy, qz, qw.
+    /// By link its poses in the world (z up, x forward, y left), float64 [frames, 7]: x, y, z in metres, and a quaternion qx, qy, qz, qw.
     #[getter]
     fn pose(&self, py: Python<'_>) -> Py<PyDict> {
         self.pose.clone_ref(py)

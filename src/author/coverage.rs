@@ -61,7 +61,7 @@ impl Coverage {
     }
 }
 
-/// A sample of bare surface, in the world at rest.
+/// A sample of bare surface, in the body at rest.
 struct Sample {
     position: DVec3,
     normal: DVec3,
@@ -114,7 +114,7 @@ pub fn coverage(body: &Body) -> Coverage {
     Coverage { links, holes }
 }
 
-/// The taxels, in the world at rest.
+/// The taxels, in the body at rest.
 struct Taxels {
     tree: PointTree,
     normals: Vec<DVec3>,
@@ -123,10 +123,10 @@ struct Taxels {
 
 impl Taxels {
     fn of(body: &Body) -> Self {
-        let of_world = |taxel: &Taxel| body.links[taxel.link].world_from_link;
-        let place = |taxel: &Taxel| of_world(taxel).transform_point3(taxel.position_in_link);
+        let of_body = |taxel: &Taxel| body.links[taxel.link].body_from_link;
+        let place = |taxel: &Taxel| of_body(taxel).transform_point3(taxel.position_in_link);
         let places: Vec<DVec3> = body.taxels.iter().map(place).collect();
-        let normals = body.taxels.iter().map(|taxel| of_world(taxel).transform_vector3(taxel.normal_in_link)).collect();
+        let normals = body.taxels.iter().map(|taxel| of_body(taxel).transform_vector3(taxel.normal_in_link)).collect();
         let tree = point_tree(places.iter().copied());
         let mut taxels = Self { tree, normals, spacings: Vec::new() };
         let spacing = |(&p, &normal): (&DVec3, &DVec3)| {
@@ -184,8 +184,8 @@ fn holes(body: &Body, mut bare: Vec<Sample>, seen: &[f64], each: f64) -> Vec<Hol
         let mean = members.iter().map(|&i| bare[i].position).sum::<DVec3>() / members.len() as f64;
         let off = |&i: &usize| bare[i].position.distance_squared(mean);
         let middle = &bare[members.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)))?];
-        let link_from_world = body.links[middle.link].world_from_link.inverse();
-        let position_in_link = link_from_world.transform_point3(middle.position);
+        let link_from_body = body.links[middle.link].body_from_link.inverse();
+        let position_in_link = link_from_body.transform_point3(middle.position);
         Some(Hole { link: middle.link, position_in_link, area: members.len() as f64 * each })
     };
     parts.iter().take(MAX_HOLES).filter_map(hole).collect()

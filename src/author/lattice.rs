@@ -25,9 +25,9 @@ const EDGE_MARGIN: f64 = 1e-6;
 pub(super) struct Lattice {
     pub(super) hexagonal: bool,
     pub(super) pitch_m: f64,
-    /// Its origin is the nearest surface point, in the world; the middle of the region by default.
+    /// Its origin is the nearest surface point, in the body; the middle of the region by default.
     pub(super) origin: Option<DVec3>,
-    /// Direction of its rows, in the world.
+    /// Direction of its rows, in the body.
     pub(super) u: Option<DVec3>,
 }
 

@@ -16,7 +16,7 @@ use crate::limits::{self, MAX_TABLE_BYTES};
 
 pub(super) struct GivenPoint {
     pub(super) id: Option<u32>,
-    position_in_world: DVec3,
+    position_in_body: DVec3,
     /// Its area, m², if given.
     area_m2: Option<f64>,
     name: String,
@@ -42,11 +42,11 @@ pub(super) fn of_marks(rest_surface: &RestSurface<'_>, names: &Globs) -> Result<
     }
     marks.sort_by_key(|mark| natural(&mark.name));
     let given = marks.iter().flat_map(|mark| {
-        mark.positions_in_world.iter().enumerate().map(|(index, &position_in_world)| GivenPoint {
+        mark.positions_in_body.iter().enumerate().map(|(index, &position_in_body)| GivenPoint {
             id: None,
-            position_in_world,
+            position_in_body,
             area_m2: None,
-            name: if mark.positions_in_world.len() > 1 {
+            name: if mark.positions_in_body.len() > 1 {
                 format!("point {index} of `{}`", mark.name)
             } else {
                 format!("`{}`", mark.name)
@@ -84,13 +84,13 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPo
     })?;
     let mut given = Vec::new();
     for row in read_taxel_table(file, false)? {
-        let mut position_in_world = row.position;
+        let mut position_in_body = row.position;
         if let Some(name) = &row.link {
             let link = find_link(rest_surface.body, name).map_err(|e| e.at(format!("line {}", row.line)))?;
-            position_in_world = rest_surface.body.links[link].world_from_link.transform_point3(position_in_world);
+            position_in_body = rest_surface.body.links[link].body_from_link.transform_point3(position_in_body);
         }
         let name = format!("line {}: taxel {}", row.line, row.id);
-        given.push(GivenPoint { id: Some(row.id), position_in_world, area_m2: row.area_m2, name });
+        given.push(GivenPoint { id: Some(row.id), position_in_body, area_m2: row.area_m2, name });
     }
     Ok(given)
 }
@@ -113,12 +113,12 @@ pub(super) fn of_icub(
     let text = limits::read_to_string(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
     let mut file = IcubFile::read(&text).map_err(place)?;
     let link = find_link(rest_surface.body, link.unwrap_or(&file.part))?;
-    let world_from_link = rest_surface.body.links[link].world_from_link;
+    let body_from_link = rest_surface.body.links[link].body_from_link;
     let chosen = file.taxels().filter(|(_, taxel)| taxel.modality == modality);
     let given: Vec<GivenPoint> = chosen
         .map(|(channel, taxel)| GivenPoint {
             id: Some(first_id.saturating_add(channel)),
-            position_in_world: world_from_link.transform_point3(taxel.position_in_link),
+            position_in_body: body_from_link.transform_point3(taxel.position_in_link),
             area_m2: None,
             name: format!("channel {channel} of {}", path.display()),
         })
@@ -148,9 +148,9 @@ pub(super) fn snap(
     let index = SurfaceIndex::of_triangles(triangles.iter().map(|&triangle| rest_surface.corners(triangle)));
     let mut snapped = Vec::with_capacity(given.len());
     for place in given {
-        let hit = index.nearest(place.position_in_world);
+        let hit = index.nearest(place.position_in_body);
         let hit = hit.ok_or_else(|| Error::failed("the surface has no area to put taxels on"))?;
-        let moved_m = hit.position.distance(place.position_in_world);
+        let moved_m = hit.position.distance(place.position_in_body);
         if moved_m > within_m {
             return Err(failed!(
                 "{} lies {} from the surface, farther than the {} of `within`; correct it, or raise `within`",

@@ -17,7 +17,7 @@ pub(super) struct Region {
     pub(super) material: Option<Globs>,
     /// A painted attribute whose mean over the corners is over a half.
     pub(super) attribute: Option<String>,
-    /// Two corners of a box that the triangle's middle is in, in the world at rest, m.
+    /// Two corners of a box that the triangle's middle is in, in the body at rest, m.
     pub(super) bounds: Option<[DVec3; 2]>,
     /// Names of regions that it is not in.
     pub(super) except: Vec<String>,

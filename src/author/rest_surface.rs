@@ -1,4 +1,4 @@
-//! All surfaces of a body in the world at rest, to place taxels on.
+//! All surfaces of a body in the body at rest, to place taxels on.
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
@@ -14,7 +14,7 @@ use crate::error::{Result, failed, suggestion};
 pub(super) struct RestSurface<'a> {
     pub(super) body: &'a Body,
     pub(super) details: &'a Details,
-    /// Vertices in the world at rest, m.
+    /// Vertices in the body at rest, m.
     pub(super) positions: Vec<DVec3>,
     /// Counter-clockwise seen from outside, mirrored nodes corrected.
     pub(super) triangles: Vec<[u32; 3]>,
@@ -61,21 +61,21 @@ impl<'a> RestSurface<'a> {
         let surface = &self.body.surfaces[part];
         let first = self.positions.len() as u32;
         self.first_vertex.push(first);
-        let in_world = |link: usize, link_from_mesh: &DAffine3| self.body.links[link].world_from_link * *link_from_mesh;
-        let (skinning, world_from_mesh) = match &surface.home {
-            Home::Rigid { link, link_from_mesh } => (None, vec![in_world(*link, link_from_mesh)]),
+        let in_body = |link: usize, link_from_mesh: &DAffine3| self.body.links[link].body_from_link * *link_from_mesh;
+        let (skinning, body_from_mesh) = match &surface.home {
+            Home::Rigid { link, link_from_mesh } => (None, vec![in_body(*link, link_from_mesh)]),
             Home::Skinned { joints, heaviest } => {
                 let skinning = merged(&self.details.parts[part].carriers, joints.len(), heaviest);
-                (Some(skinning), joints.iter().map(|(link, link_from_mesh)| in_world(*link, link_from_mesh)).collect())
+                (Some(skinning), joints.iter().map(|(link, link_from_mesh)| in_body(*link, link_from_mesh)).collect())
             }
         };
         for (vertex, &p) in surface.positions.iter().enumerate() {
             self.positions.push(match &skinning {
-                None => world_from_mesh[0].transform_point3(p),
+                None => body_from_mesh[0].transform_point3(p),
                 Some(skinning) => {
                     let rows = skinning.joints[vertex].iter().zip(&skinning.weights[vertex]);
                     let carried = rows.filter(|(_, weight)| **weight > 0.0).map(|(&joint, &weight)| {
-                        world_from_mesh[usize::from(joint)].transform_point3(p) * f64::from(weight)
+                        body_from_mesh[usize::from(joint)].transform_point3(p) * f64::from(weight)
                     });
                     carried.sum()
                 }
@@ -88,7 +88,7 @@ impl<'a> RestSurface<'a> {
                 Home::Rigid { link, .. } => *link,
                 Home::Skinned { joints, .. } => joints[joint].0,
             };
-            let mirrored = world_from_mesh[joint].matrix3.determinant() < 0.0;
+            let mirrored = body_from_mesh[joint].matrix3.determinant() < 0.0;
             let [b, c] = if mirrored { [c, b] } else { [b, c] };
             self.triangles.push([first + a, first + b, first + c]);
             self.origin.push((part as u32, index as u32));
@@ -101,7 +101,7 @@ impl<'a> RestSurface<'a> {
         self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles))
     }
 
-    /// The corners of `triangle` in the world, m.
+    /// The corners of `triangle` in the body, m.
     pub(super) fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|v| self.positions[v as usize])
     }

@@ -378,11 +378,10 @@ fn add_fields(file: &mut Original, body: &Body, details: &Details, fields: &[Fie
         let taxels: Vec<&Taxel> =
             ids.into_iter().filter_map(|id| body.taxel_index(id)).map(|index| &body.taxels[index]).collect();
         let anchor = body.common_ancestor(taxels.iter().map(|taxel| taxel.link));
-        let in_world = |taxel: &Taxel| body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link);
-        let mean = taxels.iter().map(|taxel| in_world(taxel)).sum::<DVec3>() / taxels.len().max(1) as f64;
-        let world_from_node =
-            anchor.map(|anchor| body.links[anchor].world_from_link * body.links[anchor].link_from_node);
-        let origin = world_from_node.map_or(mean, |world_from_node| world_from_node.inverse().transform_point3(mean));
+        let in_body = |taxel: &Taxel| body.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link);
+        let mean = taxels.iter().map(|taxel| in_body(taxel)).sum::<DVec3>() / taxels.len().max(1) as f64;
+        let body_from_node = anchor.map(|anchor| body.links[anchor].body_from_link * body.links[anchor].link_from_node);
+        let origin = body_from_node.map_or(mean, |body_from_node| body_from_node.inverse().transform_point3(mean));
         // A node with a singular transform has no inverse.
         let origin = if origin.is_finite() { origin } else { DVec3::ZERO };
         addition.field(field, anchor.map(|anchor| details.node_of_link[anchor]), origin);

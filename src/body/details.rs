@@ -80,8 +80,8 @@ impl Paint {
 pub struct Mark {
     /// The node's name.
     pub name: String,
-    /// Positions in the world at rest, m.
-    pub positions_in_world: Vec<DVec3>,
+    /// Positions in the body at rest, m.
+    pub positions_in_body: Vec<DVec3>,
 }
 
 /// The body called `name` in `bytes`, a file with its own buffers, and its details.
@@ -95,10 +95,10 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<(Body, Details)> {
         parts.push(part.map_err(|e| e.at(format!("node `{}`", surface.name)))?);
     }
     let mut marks: Vec<Mark> =
-        sources.points.into_iter().map(|(name, positions_in_world)| Mark { name, positions_in_world }).collect();
+        sources.points.into_iter().map(|(name, positions_in_body)| Mark { name, positions_in_body }).collect();
     for &node in nodes.in_order.iter().filter(|&&node| nodes.raw[node].mesh.is_none() && nodes.field[node].is_none()) {
         if let Some(name) = nodes.raw[node].name.clone() {
-            marks.push(Mark { name, positions_in_world: vec![nodes.world_from_node[node].translation] });
+            marks.push(Mark { name, positions_in_body: vec![nodes.body_from_node[node].translation] });
         }
     }
     let mut node_of_link = vec![0; body.links.len()];

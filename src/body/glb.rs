@@ -7,9 +7,11 @@ use std::collections::BTreeMap;
 use glam::{DAffine3, DVec3};
 use serde_json::{Map, Value, json};
 
+use super::axes::Up;
 use super::joint::{JOINT_KEY, LinkJoint};
 use super::layout::{AREA, FIELD_KEY, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
 use super::model::Taxel;
+use super::urdf_root::{self, URDF_KEY};
 use crate::error::{Error, Result};
 use crate::output::OutputPath;
 
@@ -175,7 +177,13 @@ impl Glb {
     /// Keeps `joint`, which moves the added link `node` against its parent.
     pub fn joint(&mut self, node: usize, joint: &LinkJoint) {
         let own = self.element("nodes", node).expect("only nodes that were added get joints");
-        own["extras"] = json!({JOINT_KEY: joint.to_json()});
+        own["extras"][JOINT_KEY] = joint.to_json().into();
+    }
+
+    /// Keeps that the added link `node` is the root of a URDF in which `up` points up.
+    pub fn urdf_root(&mut self, node: usize, up: Up) {
+        let own = self.element("nodes", node).expect("only nodes that were added are roots");
+        own["extras"][URDF_KEY] = urdf_root::to_json(up).into();
     }
 
     /// Adds a plain material and returns its index.

@@ -2,11 +2,15 @@
 //!
 //! A [`Body`] is the checked content of a glTF file, in metres. `docs/layout.md` specifies the encoding.
 //!
+//! **Axes.** A body's are glTF's: y up, facing +z. Everything outside it is in the world, which is z up, x forward, y left:
+//! [`WORLD_FROM_BODY`] takes the one to the other.
+//!
 //! **Frames.** Every glTF node that is neither a set of taxels nor a field is a [`Link`]. A link's frame is the rigid part
 //! of the node's frame, without scale, shear and mirroring, so that coordinates in it are metres; the node's points are
 //! transformed into it.
 
 mod amend;
+mod axes;
 mod clear_layout;
 mod details;
 mod document;
@@ -26,7 +30,10 @@ mod sheet;
 mod surface;
 mod taxel_table;
 mod topology;
+mod urdf_root;
 
+pub(crate) use axes::WORLD_FROM_OLD_ROOT;
+pub use axes::{BODY_FROM_WORLD, Up, WORLD_FROM_BODY, WORLD_FROM_BODY_ROTATION};
 pub use details::{Details, Mark, Paint, Part};
 pub use glb::{Glb, MeshData, Skinning};
 pub use joint::{LinkJoint, LinkMimic, LinkMotion};

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::axes::{Up, WORLD_FROM_BODY};
 use super::joint::LinkJoint;
 use super::layout::FieldSpec;
 
@@ -15,12 +16,22 @@ pub struct Link {
     pub name: String,
     /// Index of the parent link, if any.
     pub parent: Option<usize>,
-    /// Rigid pose in the body at rest: world_from_link.
-    pub world_from_link: DAffine3,
+    /// Rigid pose in the body at rest, in the body's axes: body_from_link. [`Link::world_from_link`] has it in the world.
+    pub body_from_link: DAffine3,
     /// The node's scale and shear: link_from_node.
     pub link_from_node: DAffine3,
     /// How it moves against its parent, if the file has that and it moves.
     pub joint: Option<LinkJoint>,
+    /// If it was made from the root of a URDF: the axis that points up there.
+    pub urdf_up: Option<Up>,
+}
+
+impl Link {
+    /// Rigid pose in the world, with the body at rest.
+    #[must_use]
+    pub fn world_from_link(&self) -> DAffine3 {
+        WORLD_FROM_BODY * self.body_from_link
+    }
 }
 
 /// The triangles of one mesh, in the mesh's own coordinates.
@@ -209,7 +220,13 @@ impl Body {
         if to == from {
             return DAffine3::IDENTITY;
         }
-        self.links[to].world_from_link.inverse() * self.links[from].world_from_link
+        self.links[to].body_from_link.inverse() * self.links[from].body_from_link
+    }
+
+    /// If it was made from a URDF: the axis that points up there.
+    #[must_use]
+    pub fn urdf_up(&self) -> Option<Up> {
+        self.links.iter().find_map(|link| link.urdf_up)
     }
 
     /// From the root down to `link`, itself included.
@@ -220,18 +237,18 @@ impl Body {
     }
 }
 
-/// The rigid part of `world_from_node`: its translation, and its axes made orthonormal and right-handed.
+/// The rigid part of `body_from_node`: its translation, and its axes made orthonormal and right-handed.
 ///
 /// A transform whose axes are orthonormal to 1e-6 is returned unchanged.
-pub(crate) fn rigid_part(world_from_node: &DAffine3) -> DAffine3 {
-    let m = world_from_node.matrix3;
+pub(crate) fn rigid_part(body_from_node: &DAffine3) -> DAffine3 {
+    let m = body_from_node.matrix3;
     let right_handed = m.determinant() > 0.0;
     let skew = (m.transpose() * m - DMat3::IDENTITY).to_cols_array();
     if right_handed && skew.iter().all(|e| e.abs() < 1e-6) {
-        return *world_from_node;
+        return *body_from_node;
     }
     let unit = |v: DVec3, or: DVec3| v.try_normalize().unwrap_or(or);
     let x = unit(m.x_axis, DVec3::X);
     let y = unit(m.y_axis - x * x.dot(m.y_axis), x.any_orthonormal_vector());
-    DAffine3::from_mat3_translation(DMat3::from_cols(x, y, x.cross(y)), world_from_node.translation)
+    DAffine3::from_mat3_translation(DMat3::from_cols(x, y, x.cross(y)), body_from_node.translation)
 }

@@ -5,11 +5,13 @@ use std::collections::{HashMap, HashSet};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json;
 
+use super::axes::Up;
 use super::document::Document;
 use super::joint::{JOINT_KEY, LinkJoint};
 use super::layout::FIELD_KEY;
 use super::model::{Link, rigid_part};
 use super::primitives::is_taxels;
+use super::urdf_root::{self, URDF_KEY};
 use crate::error::{Error, Result, failed};
 use crate::limits::{MAX_NODE_DEPTH, MAX_NODES};
 
@@ -21,11 +23,12 @@ pub(super) struct Nodes<'a> {
     pub(super) parent: Vec<Option<usize>>,
     /// Every node, a parent before its children.
     pub(super) in_order: Vec<usize>,
-    pub(super) world_from_node: Vec<DAffine3>,
+    pub(super) body_from_node: Vec<DAffine3>,
     /// The link that a node is; `None` for nodes that hold taxels or a field.
     pub(super) link: Vec<Option<usize>>,
     pub(super) field: Vec<Option<String>>,
     joint: Vec<Option<LinkJoint>>,
+    urdf_up: Vec<Option<Up>>,
 }
 
 impl<'a> Nodes<'a> {
@@ -54,7 +57,7 @@ impl<'a> Nodes<'a> {
         if in_order.len() < raw.len() {
             return Err(Error::failed("its nodes form a ring: the file is damaged; export it again"));
         }
-        let mut world_from_node = vec![DAffine3::IDENTITY; raw.len()];
+        let mut body_from_node = vec![DAffine3::IDENTITY; raw.len()];
         let mut depth = vec![1_usize; raw.len()];
         for &node in &in_order {
             depth[node] = parent[node].map_or(1, |up: usize| depth[up] + 1);
@@ -67,8 +70,8 @@ impl<'a> Nodes<'a> {
             if !local.is_finite() {
                 return Err(failed!("node {node} has a transform that is not finite; export it again"));
             }
-            world_from_node[node] = parent[node].map_or(local, |up| world_from_node[up] * local);
-            if !is_in_range(&world_from_node[node]) {
+            body_from_node[node] = parent[node].map_or(local, |up| body_from_node[up] * local);
+            if !is_in_range(&body_from_node[node]) {
                 return Err(failed!(
                     "node {node} is moved or scaled by over {MAX_COORDINATE_M:e}; check the scene's units and export it again"
                 ));
@@ -77,6 +80,7 @@ impl<'a> Nodes<'a> {
         let all = || raw.iter().enumerate();
         let field = all().map(|(index, node)| text_under(FIELD_KEY, index, node)).collect::<Result<Vec<_>>>()?;
         let joint = all().map(|(index, node)| joint_of(index, node)).collect::<Result<Vec<_>>>()?;
+        let urdf_up = all().map(|(index, node)| urdf_up_of(index, node)).collect::<Result<Vec<_>>>()?;
         let mut link = vec![None; raw.len()];
         let mut links = 0;
         for &node in &in_order {
@@ -87,7 +91,7 @@ impl<'a> Nodes<'a> {
                 links += 1;
             }
         }
-        Ok(Self { raw, parent, in_order, world_from_node, link, field, joint })
+        Ok(Self { raw, parent, in_order, body_from_node, link, field, joint, urdf_up })
     }
 
     pub(super) fn links(&self) -> Vec<Link> {
@@ -103,13 +107,14 @@ impl<'a> Nodes<'a> {
                 *number += 1;
                 name = format!("{}#{number}", wanted.unwrap_or(&unnamed));
             }
-            let world_from_link = rigid_part(&self.world_from_node[node]);
+            let body_from_link = rigid_part(&self.body_from_node[node]);
             links.push(Link {
                 name,
                 parent: self.parent[node].and_then(|up| self.link_above(up)),
-                world_from_link,
-                link_from_node: world_from_link.inverse() * self.world_from_node[node],
+                body_from_link,
+                link_from_node: body_from_link.inverse() * self.body_from_node[node],
                 joint: self.joint[node].clone(),
+                urdf_up: self.urdf_up[node],
             });
         }
         links
@@ -148,6 +153,7 @@ fn text_under(key: &str, index: usize, node: &json::Node) -> Result<Option<Strin
         Some(_) => {
             let example = match key {
                 FIELD_KEY => r#"a field as JSON, such as {"version":1,"name":"palm","members":{"1":[1]}}"#,
+                URDF_KEY => r#"JSON, {"version":1,"up":"z"}"#,
                 _ => r#"a joint as JSON, such as {"version":1,"type":"revolute","axis":[0,0,1]}"#,
             };
             Err(failed!("`{key}` should be one string, {example}").at(place(key, index, node)))
@@ -161,9 +167,19 @@ fn joint_of(index: usize, node: &json::Node) -> Result<Option<LinkJoint>> {
     text.map(|text| LinkJoint::from_json(&text).map_err(|e| e.at(place(JOINT_KEY, index, node)))).transpose()
 }
 
+/// What points up in the URDF whose root `node` is, if it is one.
+fn urdf_up_of(index: usize, node: &json::Node) -> Result<Option<Up>> {
+    let text = text_under(URDF_KEY, index, node)?;
+    text.map(|text| urdf_root::from_json(&text).map_err(|e| e.at(place(URDF_KEY, index, node)))).transpose()
+}
+
 fn place(key: &str, index: usize, node: &json::Node) -> String {
-    let kind = if key == FIELD_KEY { "field" } else { "joint" };
-    format!("{kind} node `{}`", node.name.clone().unwrap_or_else(|| format!("node_{index}")))
+    let kind = match key {
+        FIELD_KEY => "field node",
+        JOINT_KEY => "joint node",
+        _ => "node",
+    };
+    format!("{kind} `{}`", node.name.clone().unwrap_or_else(|| format!("node_{index}")))
 }
 
 fn holds_taxels(document: &Document, node: &json::Node) -> bool {

@@ -22,7 +22,7 @@ use crate::limits::{self, MAX_BODY_BYTES, MAX_FIELD_DEPTH, MAX_TRIANGLES, MAX_VE
 pub(super) struct Sources {
     /// Per surface its node, and the primitive within the node's mesh.
     pub(super) surfaces: Vec<(usize, usize)>,
-    /// Points that are no taxels: the node's name, and positions in the world at rest, m.
+    /// Points that are no taxels: the node's name, and positions in the body at rest, m.
     pub(super) points: Vec<(String, Vec<DVec3>)>,
     /// Per taxel of the body, in its order.
     pub(super) taxels: Vec<TaxelSource>,
@@ -225,7 +225,7 @@ fn read_meshes(
             _ => Vec::new(),
         };
         // link_from_mesh of a point: its heaviest joint's, or its node's.
-        let link_from_node = body.links[carrier].world_from_link.inverse() * nodes.world_from_node[node];
+        let link_from_node = body.links[carrier].body_from_link.inverse() * nodes.body_from_node[node];
         let of_point = |point: usize| match (&joints, heaviest.get(point)) {
             (Some(joints), Some(&joint)) => joints[joint],
             _ => (carrier, link_from_node),
@@ -255,12 +255,12 @@ fn read_meshes(
         let triangles = read_triangles(document, primitive, positions.len()).map_err(in_place)?;
         if triangles.is_empty() {
             if has_mode(primitive, Mode::Points) {
-                let in_world = |(point, p): (usize, &[f32; 3])| {
+                let in_body = |(point, p): (usize, &[f32; 3])| {
                     let (link, link_from_mesh) = of_point(point);
-                    let world_from_mesh = body.links[link].world_from_link * link_from_mesh;
-                    world_from_mesh.transform_point3(DVec3::from_array(p.map(f64::from)))
+                    let body_from_mesh = body.links[link].body_from_link * link_from_mesh;
+                    body_from_mesh.transform_point3(DVec3::from_array(p.map(f64::from)))
                 };
-                sources.points.push((place.clone(), positions.iter().enumerate().map(in_world).collect()));
+                sources.points.push((place.clone(), positions.iter().enumerate().map(in_body).collect()));
             }
             continue;
         }

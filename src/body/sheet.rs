@@ -24,8 +24,8 @@ pub struct Sheet {
     pub cells: Vec<SheetCell>,
     /// Fields below that of all cells: a name and the ids of cells. They are called `sheet/part`.
     pub parts: Vec<(String, Vec<u32>)>,
-    /// Where the origin of its coordinates is in the world, m.
-    pub origin_in_world: DVec3,
+    /// Where the origin of its coordinates is in the body, m.
+    pub origin_in_body: DVec3,
     /// Whether it is known where its cells are. If not, there is neither a mesh nor a chart.
     pub has_places: bool,
 }
@@ -65,13 +65,13 @@ impl Sheet {
     /// A sheet of `cells` with one field.
     #[must_use]
     pub fn new(name: &str, cells: Vec<SheetCell>) -> Self {
-        Self { name: name.to_owned(), cells, parts: Vec::new(), origin_in_world: DVec3::ZERO, has_places: true }
+        Self { name: name.to_owned(), cells, parts: Vec::new(), origin_in_body: DVec3::ZERO, has_places: true }
     }
 
     /// The same with its origin elsewhere: beside another sheet.
     #[must_use]
-    pub fn at(self, origin_in_world: DVec3) -> Self {
-        Self { origin_in_world, ..self }
+    pub fn at(self, origin_in_body: DVec3) -> Self {
+        Self { origin_in_body, ..self }
     }
 
     /// Its extent along u and v, m: the lower and the upper corner.
@@ -172,7 +172,7 @@ pub fn sheets(sheets: &[Sheet]) -> Result<Glb> {
         {
             return Err(failed!("`{name}` holds cell {id}, which the sheet does not have"));
         }
-        let link = glb.node(&sheet.name, None, sheet.origin_in_world);
+        let link = glb.node(&sheet.name, None, sheet.origin_in_body);
         let mesh = sheet.mesh();
         // Cells of an unknown size have no triangles.
         if sheet.has_places && !mesh.triangles.is_empty() {

@@ -23,7 +23,7 @@ impl Body {
         seen.flat_map(|(surface, link_from_mesh)| surface.corners_through(link_from_mesh))
     }
 
-    /// All triangles in the world at rest, counter-clockwise seen from outside, each with its link. Corners of a skinned one
+    /// All triangles in the body at rest, counter-clockwise seen from outside, each with its link. Corners of a skinned one
     /// are transformed by the joint with the largest weight.
     #[must_use]
     pub fn triangles_at_rest(&self) -> Vec<(usize, [DVec3; 3])> {
@@ -31,11 +31,11 @@ impl Body {
         for surface in &self.surfaces {
             match &surface.home {
                 Home::Rigid { link, link_from_mesh } => {
-                    let world_from_mesh = self.links[*link].world_from_link * *link_from_mesh;
-                    triangles.extend(surface.corners_through(world_from_mesh).map(|corners| (*link, corners)));
+                    let body_from_mesh = self.links[*link].body_from_link * *link_from_mesh;
+                    triangles.extend(surface.corners_through(body_from_mesh).map(|corners| (*link, corners)));
                 }
                 Home::Skinned { joints, heaviest } => {
-                    let way = |&(link, way): &(usize, DAffine3)| (link, self.links[link].world_from_link * way);
+                    let way = |&(link, way): &(usize, DAffine3)| (link, self.links[link].body_from_link * way);
                     let ways: Vec<(usize, DAffine3)> = joints.iter().map(way).collect();
                     let mirrored = ways.first().is_some_and(|(_, way)| way.matrix3.determinant() < 0.0);
                     let of = |v: u32| ways[heaviest[v as usize]];

@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "URDF")]
     joints: Option<PathBuf>,
 
-    /// Axis that points up in the URDF of --joints [default: z].
+    /// Axis that points up in the URDF of --joints [default: what the body was made with, else z].
     #[arg(long, requires = "joints", value_name = "AXIS")]
     up: Option<Up>,
 }
@@ -70,9 +70,13 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     };
     let poses = match &arguments.joints {
         None => DrawnPoses::of_own_joints(&body),
-        Some(urdf) => Some(Kinematics::load(urdf).and_then(|robot| {
-            drawn_poses(&robot, &body, arguments.up.unwrap_or(Up::Z)).map_err(|e| e.at(urdf.display()))
-        })?),
+        Some(urdf) => {
+            let up = arguments.up.or_else(|| body.urdf_up()).unwrap_or(Up::Z);
+            Some(
+                Kinematics::load(urdf)
+                    .and_then(|robot| drawn_poses(&robot, &body, up).map_err(|e| e.at(urdf.display())))?,
+            )
+        }
     };
     let mut bar = Bar::new("looking for defects");
     let odd = lint_with_progress(&body, &fields, poses.as_ref(), &mut |share| bar.show(share));

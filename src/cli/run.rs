@@ -61,7 +61,8 @@ Examples:
 A frame on standard input is a line such as
   {\"t\":0.5,\"values\":{\"4\":12.0},\"pose\":{\"hand\":[0.1,0,0.3,0,0,0,1]}}
 t in seconds, raw values by taxel id, and, if links move, where each is in the world: x,y,z in
-metres and a quaternion qx,qy,qz,qw. With --source csv:- it is a row under t,<taxel id>,...
+metres (x forward, y left, z up) and a quaternion qx,qy,qz,qw. With --source csv:- it is a row
+under t,<taxel id>,...
 At a terminal a table of the touched fields is shown until q or Ctrl-C; into a pipe goes a line
 of JSON a frame.";
 

@@ -254,7 +254,7 @@ pub(super) struct RunOptions {
     #[arg(long, help_heading = LIVE, value_name = "FILE.json5")]
     pub(super) zenoh_config: Option<PathBuf>,
 
-    /// The robot's URDF: joint states, which frames carry or --joint-states has, say where links are. Needs --up.
+    /// The robot's URDF: joint states, which frames carry or --joint-states has, say where links are.
     #[arg(long, help_heading = ROBOT, value_name = "FILE.urdf")]
     pub(super) joints: Option<PathBuf>,
 
@@ -263,7 +263,7 @@ pub(super) struct RunOptions {
     #[arg(long, help_heading = ROBOT, value_name = "FILE")]
     pub(super) joint_states: Option<PathBuf>,
 
-    /// The axis that points up in the URDF: z in nearly all. The body's is y, as in glTF.
+    /// The axis that points up in the URDF: z, or y where its axes are glTF's [default: what the body was made with, else z].
     #[arg(long, help_heading = ROBOT, value_name = "AXIS", value_parser = one_of::<Up>(Up::WORDS))]
     #[serde(deserialize_with = "word")]
     #[schemars(with = "Option<String>", extend("enum" = Up::WORDS))]

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DAffine3;
 
-use crate::body::Body;
+use crate::body::{Body, Link};
 use crate::scene::{Coordinates, PlanField, Scene};
 use crate::signal::Frame;
 
@@ -17,6 +17,7 @@ pub(super) struct Links {
     pub(super) index_of: HashMap<String, usize>,
     names: Vec<String>,
     parent: Vec<Option<usize>>,
+    /// At rest.
     world_from_link: Vec<DAffine3>,
 }
 
@@ -30,7 +31,7 @@ impl Links {
             index_of: body.links.iter().enumerate().map(|(i, link)| (link.name.clone(), i)).collect(),
             names: body.links.iter().map(|link| link.name.clone()).collect(),
             parent: body.links.iter().map(|link| link.parent).collect(),
-            world_from_link: body.links.iter().map(|link| link.world_from_link).collect(),
+            world_from_link: body.links.iter().map(Link::world_from_link).collect(),
         }
     }
 

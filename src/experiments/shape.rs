@@ -148,9 +148,10 @@ impl Shape {
             links: vec![Link {
                 name: "sheet".to_owned(),
                 parent: None,
-                world_from_link: DAffine3::IDENTITY,
+                body_from_link: DAffine3::IDENTITY,
                 link_from_node: DAffine3::IDENTITY,
                 joint: None,
+                urdf_up: None,
             }],
             surfaces: Vec::new(),
             taxels,

@@ -73,15 +73,15 @@ pub struct RestOverlap {
 pub fn rest_overlaps(body: &Body, tolerance: &ContactTolerance) -> Vec<RestOverlap> {
     type Near = (f64, [BTreeSet<usize>; 2], usize);
     let mut found = BTreeMap::<[usize; 2], Near>::new();
-    let world = |index: usize| {
+    let place = |index: usize| {
         let taxel = &body.taxels[index];
-        let world_from_link = &body.links[taxel.link].world_from_link;
+        let body_from_link = &body.links[taxel.link].body_from_link;
         (
-            world_from_link.transform_point3(taxel.position_in_link),
-            world_from_link.transform_vector3(taxel.normal_in_link).normalize_or_zero(),
+            body_from_link.transform_point3(taxel.position_in_link),
+            body_from_link.transform_vector3(taxel.normal_in_link).normalize_or_zero(),
         )
     };
-    let places: Vec<_> = (0..body.taxels.len()).map(world).collect();
+    let places: Vec<_> = (0..body.taxels.len()).map(place).collect();
     let points = places.iter().enumerate().map(|(index, (place, _))| GeomWithData::new(place.to_array(), index));
     let tree = RTree::bulk_load(points.collect());
     let links: BTreeSet<usize> = body.taxels.iter().map(|taxel| taxel.link).collect();

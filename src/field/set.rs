@@ -12,7 +12,7 @@ use crate::error::{Result, failed};
 /// cos 75°: maximum angle of a member's normal from the mean.
 const MIN_NORMAL_COSINE: f64 = 0.258_819_045_102_520_76;
 
-/// Name of the world frame: of fields whose links share no ancestor, and of percepts in posed frames.
+/// Name of the world frame, which is z up, x forward, y left: of fields whose links share no ancestor, and of percepts in posed frames.
 pub const WORLD: &str = "world";
 
 /// A taxel as a member of a field.
@@ -34,7 +34,7 @@ pub struct Field {
     pub name: String,
     /// Index of the parent field.
     pub parent: Option<usize>,
-    /// The link of the field's frame; `None` is the world at rest.
+    /// The link of the field's frame; `None` is the world, with the body at rest.
     pub anchor: Option<usize>,
     /// Members by ascending taxel id.
     pub members: Vec<Member>,
@@ -207,6 +207,6 @@ pub fn unions(fields: &[FieldSpec]) -> Vec<BTreeSet<u32>> {
 pub(super) fn anchor_from_link(body: &Body, anchor: Option<usize>, link: usize) -> DAffine3 {
     match anchor {
         Some(anchor) => body.rest_transform(anchor, link),
-        None => body.links[link].world_from_link,
+        None => body.links[link].world_from_link(),
     }
 }

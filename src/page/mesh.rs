@@ -57,9 +57,9 @@ impl Mesh {
         mesh
     }
 
-    /// The middle of the surface and the taxels of `body` at rest in the world, m.
+    /// The middle of the surface and the taxels of `body` at rest, in the world, m.
     pub(super) fn centre(&self, body: &Body) -> DVec3 {
-        let at = |link: usize, position| body.links[link].world_from_link.transform_point3(position);
+        let at = |link: usize, position| body.links[link].world_from_link().transform_point3(position);
         let vertices = self.positions.iter().zip(&self.links).map(|(&position, &link)| at(link, position));
         let taxels = body.taxels.iter().map(|taxel| at(taxel.link, taxel.position_in_link));
         let box_of = vertices.chain(taxels).fold(None, |ends: Option<(DVec3, DVec3)>, p| {
@@ -98,9 +98,9 @@ impl Mesh {
 
     /// Area-weighted normals over the triangles around a place; across an edge those of its own side alone.
     fn smooth_normals(&self, body: &Body) -> Vec<DVec3> {
-        let world =
-            |vertex: usize| body.links[self.links[vertex]].world_from_link.transform_point3(self.positions[vertex]);
-        let at_rest: Vec<DVec3> = (0..self.positions.len()).map(world).collect();
+        let way =
+            |vertex: usize| body.links[self.links[vertex]].body_from_link.transform_point3(self.positions[vertex]);
+        let at_rest: Vec<DVec3> = (0..self.positions.len()).map(way).collect();
         let mut own = vec![DVec3::ZERO; at_rest.len()];
         for triangle in &self.triangles {
             let [a, b, c] = triangle.map(|corner| at_rest[corner as usize]);
@@ -118,9 +118,9 @@ impl Mesh {
                 let alone = own[vertex].normalize_or_zero();
                 let alike = vertices.iter().map(|&other| own[other]);
                 let sum: DVec3 = alike.filter(|other| other.normalize_or_zero().dot(alone) >= SMOOTH_COSINE).sum();
-                let in_world = sum.try_normalize().unwrap_or(if alone == DVec3::ZERO { DVec3::Y } else { alone });
-                let link_from_world = body.links[self.links[vertex]].world_from_link.inverse();
-                normals[vertex] = link_from_world.transform_vector3(in_world).normalize_or(DVec3::Y);
+                let in_body = sum.try_normalize().unwrap_or(if alone == DVec3::ZERO { DVec3::Y } else { alone });
+                let link_from_body = body.links[self.links[vertex]].body_from_link.inverse();
+                normals[vertex] = link_from_body.transform_vector3(in_body).normalize_or(DVec3::Y);
             }
         }
         normals
@@ -168,7 +168,7 @@ mod tests {
             assert_eq!(mesh.triangles.len(), triangles.len());
             let at = |vertex: u32| {
                 let vertex = vertex as usize;
-                body.links[mesh.links[vertex]].world_from_link.transform_point3(mesh.positions[vertex])
+                body.links[mesh.links[vertex]].body_from_link.transform_point3(mesh.positions[vertex])
             };
             let (mut agree, mut volume) = (0, 0.0);
             for (corners, (_, expected)) in mesh.triangles.iter().zip(&triangles) {
@@ -177,8 +177,8 @@ mod tests {
                 volume += a.dot(b.cross(c)) / 6.0;
                 let outward = (b - a).cross(c - a);
                 let vertex = corners[0] as usize;
-                let world = body.links[mesh.links[vertex]].world_from_link;
-                agree += usize::from(world.transform_vector3(mesh.normals[vertex]).dot(outward) >= 0.0);
+                let way = body.links[mesh.links[vertex]].body_from_link;
+                agree += usize::from(way.transform_vector3(mesh.normals[vertex]).dot(outward) >= 0.0);
             }
             assert!(agree * 100 > triangles.len() * 98, "{name}: {agree} of {}", triangles.len());
             assert!(volume > 0.0, "{name}: seen from outside");

@@ -25,8 +25,9 @@ impl Poses {
             .iter()
             .enumerate()
             .map(|(index, link)| {
-                let parent_from_link = link.parent.map_or(link.world_from_link, |p| body.rest_transform(p, index));
-                (link.parent, link.world_from_link, parent_from_link)
+                let world_from_link = link.world_from_link();
+                let parent_from_link = link.parent.map_or(world_from_link, |p| body.rest_transform(p, index));
+                (link.parent, world_from_link, parent_from_link)
             })
             .collect();
         let mut poses = Self {
@@ -92,7 +93,7 @@ mod tests {
         let rest = poses.seven().to_vec();
         poses.set(&[]);
         assert_eq!((poses.changes(), poses.seven()), (0, &rest[..]));
-        let at_rest = body.links[parent].world_from_link;
+        let at_rest = body.links[parent].world_from_link();
         let (_, rotation, translation) = at_rest.to_scale_rotation_translation();
         let moved = Pose { translation: translation + DVec3::X, rotation: DQuat::from_rotation_y(0.5) * rotation };
         poses.set(&[(parent as u32, moved)]);

@@ -30,8 +30,15 @@ use somatic::{BackendKind, Engine, Letter, Options, Outputs, Scene};
 /// Three links, two of them with a triangle and taxels and no common ancestor, and three fields, one of them on both.
 fn body() -> Body {
     let link = |name: &str, parent, x: f64| {
-        let world_from_link = DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
-        Link { name: name.to_owned(), parent, world_from_link, link_from_node: DAffine3::IDENTITY, joint: None }
+        let body_from_link = DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
+        Link {
+            name: name.to_owned(),
+            parent,
+            body_from_link,
+            link_from_node: DAffine3::IDENTITY,
+            joint: None,
+            urdf_up: None,
+        }
     };
     let surface = |link: usize| Surface {
         name: format!("surface {link}"),

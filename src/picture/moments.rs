@@ -157,7 +157,7 @@ impl Moments {
             let pressed = |taxel: &usize| self.shown.iter().any(|shown| shown.pressures[*taxel] > Some(0.0));
             let normals = (0..body.taxels.len()).filter(pressed).map(|taxel| {
                 let taxel = &body.taxels[taxel];
-                body.links[taxel.link].world_from_link.transform_vector3(taxel.normal_in_link)
+                body.links[taxel.link].body_from_link.transform_vector3(taxel.normal_in_link)
             });
             options.views = View::best(&normals.collect::<Vec<_>>());
             options.views.truncate(MAX_SIDES);

@@ -31,7 +31,7 @@ const COINCIDENT_M: f64 = 1e-6;
 
 /// The discs of taxels.
 pub(super) struct Dots {
-    /// In the world, m.
+    /// In the body at rest, m.
     pub(super) places: Vec<DVec3>,
     pub(super) normals: Vec<DVec3>,
     /// m.
@@ -43,9 +43,9 @@ pub(super) struct Dots {
 impl Dots {
     /// For `body`'s taxels, at rest, none larger than its area.
     pub(super) fn of(body: &Body) -> Self {
-        let world = |link: usize| body.links[link].world_from_link;
-        let places = body.taxels.iter().map(|t| world(t.link).transform_point3(t.position_in_link)).collect();
-        let normals = body.taxels.iter().map(|t| world(t.link).transform_vector3(t.normal_in_link)).collect();
+        let way = |link: usize| body.links[link].body_from_link;
+        let places = body.taxels.iter().map(|t| way(t.link).transform_point3(t.position_in_link)).collect();
+        let normals = body.taxels.iter().map(|t| way(t.link).transform_vector3(t.normal_in_link)).collect();
         let extent = body
             .triangles_at_rest()
             .iter()

@@ -8,7 +8,7 @@ use super::colour::{PALETTE, PAPER, linear};
 use super::labels::{INK, Labels};
 use super::{Options, Picture, Prepared, stem};
 use crate::backend::gpu::raster;
-use crate::body::Body;
+use crate::body::{BODY_FROM_WORLD, Body};
 use crate::colours::pressure_colours;
 use crate::error::Result;
 use crate::field::Field;
@@ -141,7 +141,7 @@ fn title(body: &Body) -> String {
     stem(&body.name).to_owned()
 }
 
-/// What marks a percept, in the world.
+/// What marks a percept, in the body.
 struct Mark {
     place: DVec3,
     normal: DVec3,
@@ -157,15 +157,15 @@ struct Mark {
 
 impl Mark {
     fn new(body: &Body, field: &Field, percept: &Percept) -> Option<Self> {
-        let world_from_anchor = field.anchor.map_or(glam::DAffine3::IDENTITY, |link| body.links[link].world_from_link);
-        let turned = |direction: DVec3| world_from_anchor.transform_vector3(direction);
+        let body_from_anchor = field.anchor.map_or(BODY_FROM_WORLD, |link| body.links[link].body_from_link);
+        let turned = |direction: DVec3| body_from_anchor.transform_vector3(direction);
         let axes = field.chart.as_ref().ok().map(|chart| [chart.u_in_anchor, chart.v_in_anchor].map(turned));
         let motion = axes
             .zip(percept.direction)
             .zip(percept.speed)
             .map(|(([u, v], direction), speed)| speed * ARROW_S * (u * direction.cos() + v * direction.sin()));
         Some(Self {
-            place: world_from_anchor.transform_point3(DVec3::from_array(percept.position?)),
+            place: body_from_anchor.transform_point3(DVec3::from_array(percept.position?)),
             normal: turned(DVec3::from_array(percept.normal?)),
             axes,
             orientation: percept.orientation,

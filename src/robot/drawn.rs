@@ -4,9 +4,8 @@ use glam::DAffine3;
 
 use super::kinematics::Kinematics;
 use super::matching::LinkMatches;
-use crate::author::mesh::{Up, y_up_from};
 use crate::author::{DrawnPoses, drawn_position};
-use crate::body::Body;
+use crate::body::{Body, Up};
 use crate::error::Result;
 
 /// Poses of `body` with the joints of `robot`, of which axis `up` points up, as [`DrawnPoses::of_own_joints`] draws them. A link
@@ -22,7 +21,7 @@ pub fn drawn_poses(robot: &Kinematics, body: &Body, up: Up) -> Result<DrawnPoses
             in_robot[link] = Some(*index);
         }
     }
-    let y_up = y_up_from(up);
+    let body_from_root = up.body_from_root();
     Ok(DrawnPoses::draw(body, |random| {
         let joints = robot.joint_names().len();
         let position = |joint| drawn_position(robot.limits(joint), robot.unit(joint) == "rad", random);
@@ -31,11 +30,11 @@ pub fn drawn_poses(robot: &Kinematics, body: &Body, up: Up) -> Result<DrawnPoses
         let mut poses: Vec<DAffine3> = Vec::with_capacity(body.links.len());
         for (link, index) in body.links.iter().zip(&in_robot) {
             poses.push(match (index, link.parent) {
-                (Some(index), _) => y_up * moved[*index].1,
+                (Some(index), _) => body_from_root * moved[*index].1,
                 (None, Some(parent)) => {
-                    poses[parent] * body.links[parent].world_from_link.inverse() * link.world_from_link
+                    poses[parent] * body.links[parent].body_from_link.inverse() * link.body_from_link
                 }
-                (None, None) => link.world_from_link,
+                (None, None) => link.body_from_link,
             });
         }
         poses
@@ -53,17 +52,17 @@ mod tests {
             <parent link="arm"/><child link="hand"/><origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="1" upper="2"/></joint></robot>"#;
         let robot = Kinematics::from_urdf("r", urdf).unwrap();
         let mut glb = Glb::new();
-        let arm = glb.placed_node("arm", None, y_up_from(Up::Z));
+        let arm = glb.placed_node("arm", None, Up::Z.body_from_root());
         let hand = glb.node("hand", Some(arm), glam::DVec3::Z);
         glb.node("finger", Some(hand), glam::DVec3::X);
         let body = Body::from_bytes("b", &glb.to_bytes().unwrap()).unwrap();
         let poses = drawn_poses(&robot, &body, Up::Z).unwrap();
         let mut seen = poses.of_link(2);
-        assert!(seen.next().unwrap().translation.abs_diff_eq(glam::DVec3::new(1.0, 1.0, 0.0), 1e-6));
+        assert!(seen.next().unwrap().translation.abs_diff_eq(glam::DVec3::new(0.0, 1.0, 1.0), 1e-6));
         let mut count = 0;
         for pose in seen {
             let at = pose.translation;
-            assert!((2.0..3.0).contains(&at.y) && (at.x - 1.0).abs() < 1e-6 && at.z.abs() < 1e-6, "{at}");
+            assert!((2.0..3.0).contains(&at.y) && (at.z - 1.0).abs() < 1e-6 && at.x.abs() < 1e-6, "{at}");
             count += 1;
         }
         assert_eq!(count, 4);

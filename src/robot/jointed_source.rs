@@ -7,8 +7,7 @@ use glam::{DAffine3, DQuat};
 use super::joint_remarks::JointRemarks;
 use super::kinematics::Kinematics;
 use super::matching::LinkMatches;
-use crate::author::mesh::{Up, y_up_from};
-use crate::body::Body;
+use crate::body::{Body, Up};
 use crate::error::{Result, failed};
 use crate::signal::{Frame, FrameTime, Pose};
 use crate::source::{JointPosition, JointStates, Source};
@@ -122,7 +121,7 @@ impl JointedSource {
         let joints = robot.joint_names().len();
         Ok(Self {
             source,
-            world_from_root: y_up_from(options.up),
+            world_from_root: options.up.world_from_root(),
             has_come: vec![false; matches.needed.len()],
             matches,
             options,

@@ -3,8 +3,7 @@
 use glam::{DAffine3, DQuat};
 
 use super::kinematics::Kinematics;
-use crate::author::mesh::{Up, y_up_from};
-use crate::body::{Body, Taxel};
+use crate::body::{Body, Taxel, Up, WORLD_FROM_OLD_ROOT};
 use crate::error::{Error, Result, failed};
 use crate::signal::Pose;
 
@@ -87,10 +86,16 @@ impl LinkMatches {
     }
 
     fn check_rest(&self, robot: &Kinematics, body: &Body, up: Up) -> Result<()> {
-        let Some((name, distance_m, angle_rad)) = self.farthest(robot, body, up) else { return Ok(()) };
+        let Some((name, distance_m, angle_rad)) = self.farthest(robot, body, &up.world_from_root()) else {
+            return Ok(());
+        };
         let other = if up == Up::Z { Up::Y } else { Up::Z };
-        let what_to_do = if self.farthest(robot, body, other).is_none() {
+        let agrees_with = |world_from_root: &DAffine3| self.farthest(robot, body, world_from_root).is_none();
+        let what_to_do = if agrees_with(&other.world_from_root()) {
             format!("with --up {other} they agree")
+        } else if agrees_with(&WORLD_FROM_OLD_ROOT) {
+            "an older version made the body, with the URDF's x to its left: author it anew, and it faces along x"
+                .to_owned()
         } else {
             "author the body from this URDF, or put its links where the URDF has them".to_owned()
         };
@@ -106,10 +111,10 @@ impl LinkMatches {
     }
 
     /// The first link that does not agree at rest, its distance (m) and angle (rad).
-    fn farthest(&self, robot: &Kinematics, body: &Body, up: Up) -> Option<(&str, f64, f64)> {
-        let rest = robot.rest_poses(&y_up_from(up));
+    fn farthest(&self, robot: &Kinematics, body: &Body, world_from_root: &DAffine3) -> Option<(&str, f64, f64)> {
+        let rest = robot.rest_poses(world_from_root);
         self.matched.iter().find_map(|(index, name)| {
-            let of_body = &body.links[body.link_index(name)?].world_from_link;
+            let of_body = &body.links[body.link_index(name)?].world_from_link();
             let distance_m = rest[*index].translation.distance(of_body.translation);
             let angle_rad = rotation(&rest[*index]).angle_between(rotation(of_body));
             let agrees = distance_m <= MAX_REST_DISTANCE_M && angle_rad <= MAX_REST_ANGLE_RAD;
@@ -164,4 +169,38 @@ fn carriers(body: &Body, name: &str, is_matched: impl Fn(&str) -> bool) -> Vec<(
 
 fn rotation(pose: &DAffine3) -> DQuat {
     DQuat::from_mat3(&pose.matrix3)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::body::Glb;
+
+    const ARM: &str = r#"<robot name="r"><link name="base"/><link name="arm"/><joint name="j" type="revolute"><parent link="base"/>
+        <child link="arm"/><origin xyz="0.3 0 0.1"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint></robot>"#;
+
+    /// The body of [`ARM`] with this root.
+    fn body(body_from_root: DAffine3) -> Body {
+        let mut glb = Glb::new();
+        let base = glb.placed_node("base", None, body_from_root);
+        glb.node("arm", Some(base), DVec3::new(0.3, 0.0, 0.1));
+        Body::from_bytes("arm.glb", &glb.to_bytes().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_body_with_the_turn_of_an_older_version_is_to_be_authored_anew() {
+        let robot = Kinematics::from_urdf("r", ARM).unwrap();
+        assert!(LinkMatches::new(&robot, &body(Up::Z.body_from_root()), Up::Z).is_ok());
+        let old = DAffine3::from_quat(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2));
+        let why = |body: &Body, up| LinkMatches::new(&robot, body, up).unwrap_err().to_string();
+        let said = why(&body(old), Up::Z);
+        assert!(said.contains("link `base` is 0.0 mm and 90.0°") && said.contains("author it anew"), "{said}");
+        // Any other turn is not an older version's.
+        let other = why(&body(DAffine3::from_quat(DQuat::from_rotation_x(0.5))), Up::Z);
+        assert!(!other.contains("older") && other.contains("author the body from this URDF"), "{other}");
+        assert!(why(&body(Up::Z.body_from_root()), Up::Y).contains("with --up z they agree"));
+        assert!(why(&body(Up::Y.body_from_root()), Up::Z).contains("with --up y they agree"));
+    }
 }

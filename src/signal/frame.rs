@@ -85,7 +85,7 @@ impl std::fmt::Debug for RawValue {
     }
 }
 
-/// A rigid pose in the world.
+/// A rigid pose in the world, which is z up, x forward, y left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Translation, m.

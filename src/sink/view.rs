@@ -74,19 +74,20 @@ impl ViewWriter {
         let links: Vec<Link> = body
             .links
             .iter()
-            .map(|link| Link {
+            .enumerate()
+            .map(|(index, link)| Link {
                 name: link.name.clone(),
                 parent: link.parent,
-                world_from_link: link.world_from_link,
-                parent_from_link: link.parent.map_or(link.world_from_link, |parent| {
-                    body.links[parent].world_from_link.inverse() * link.world_from_link
-                }),
+                world_from_link: link.world_from_link(),
+                parent_from_link: link
+                    .parent
+                    .map_or_else(|| link.world_from_link(), |parent| body.rest_transform(parent, index)),
             })
             .collect();
         let mut surface = vec![Vec::new(); links.len()];
         for (link, corners) in body.triangles_at_rest() {
-            let link_from_world = body.links[link].world_from_link.inverse();
-            surface[link].push(corners.map(|corner| link_from_world.transform_point3(corner)));
+            let link_from_body = body.links[link].body_from_link.inverse();
+            surface[link].push(corners.map(|corner| link_from_body.transform_point3(corner)));
         }
         let is_computed = |name: &str| names.iter().any(|names| names.field == name);
         let is_top = |name: &str| {

@@ -87,7 +87,7 @@ impl Run {
 
     pub(super) fn viewer(&self) -> Viewer {
         let mut socket = self.own_socket();
-        say(&mut socket, &json!({"type": "hello", "version": 1, "token": self.token, "after_event": null}));
+        say(&mut socket, &json!({"type": "hello", "version": 2, "token": self.token, "after_event": null}));
         Viewer { socket, texts: Vec::new() }
     }
 
@@ -284,7 +284,7 @@ fn messages_are_the_pages_or_the_connection_ends() {
         |token: &str, version: u32| json!({"type": "hello", "version": version, "token": token, "after_event": 0});
     let wrong = format!("{}0", &run.token[..31]);
     let wrong = if wrong == run.token { format!("{}1", &run.token[..31]) } else { wrong };
-    for first in [hello(&wrong, 1), hello("", 1), hello(&run.token, 2), json!({"type": "play"}), json!(7)] {
+    for first in [hello(&wrong, 2), hello("", 2), hello(&run.token, 1), json!({"type": "play"}), json!(7)] {
         let mut socket = run.own_socket();
         say(&mut socket, &first);
         assert_eq!(closed(socket), 1008, "{first}");
@@ -296,7 +296,7 @@ fn messages_are_the_pages_or_the_connection_ends() {
     for (message, code) in [
         (Message::text("{\"type\":\"quit\"}"), 1008),
         (Message::text("{\"type\":\"taxel\",\"taxel\":40}"), 1008),
-        (Message::text(hello(&run.token, 1).to_string()), 1008),
+        (Message::text(hello(&run.token, 2).to_string()), 1008),
         (Message::text(" ".repeat((64 << 10) + 1)), 1009),
         (Message::binary(vec![0; 4]), 1003),
     ] {

@@ -722,7 +722,7 @@ fn another_library_reads_the_same() {
     let first = &read[0]["values"];
     for (index, point) in clouds[0]["points"].as_array().unwrap().iter().enumerate() {
         let taxel = &body.taxels[index];
-        let place = body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link);
+        let place = body.links[taxel.link].world_from_link().transform_point3(taxel.position_in_link);
         for (name, wanted) in [("x", place.x), ("y", place.y), ("z", place.z)] {
             assert_eq!(point[name].as_f64().unwrap() as f32, wanted as f32);
         }
@@ -761,7 +761,7 @@ fn another_library_reads_the_same() {
     let triangles = body.triangles_at_rest();
     let (link, corners) = &triangles[0];
     let first = &surface[&body.links[*link].name][0];
-    let corner = body.links[*link].world_from_link.inverse().transform_point3(corners[0]);
+    let corner = body.links[*link].body_from_link.inverse().transform_point3(corners[0]);
     assert_eq!(first, &serde_json::json!(corner.to_array()));
     let points = surface.as_object().unwrap().values().map(|points| points.as_array().unwrap().len());
     assert_eq!(points.sum::<usize>(), 3 * triangles.len());

@@ -131,30 +131,100 @@ fn a_source_without_a_frame_is_told() {
     assert!(stderr(&output).contains("the source has ended without a frame"), "{}", stderr(&output));
 }
 
+/// What `tests/kinematics/compare.py` prints, or `None` where it cannot be run.
+fn compare(arguments: &[&str]) -> Option<String> {
+    let python = match python_with("kinematics", "import pinocchio, yourdfpy") {
+        Ok(python) => python,
+        Err(why) => {
+            skip("KINEMATICS", why);
+            return None;
+        }
+    };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/kinematics/compare.py");
+    let output = Command::new(python).arg(script).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+#[test]
+fn pressed_taxels_of_robots_are_in_the_world_where_pinocchio_and_yourdfpy_have_them() {
+    const TOUCHES: usize = 200;
+    let folder = tempfile::tempdir().unwrap();
+    let (names, numbers) = (folder.path().join("names.json"), folder.path().join("numbers"));
+    let (urdf, body) = (folder.path().join("robot.urdf"), folder.path().join("robot.glb"));
+    for robot in ["panda", "icub", "tiago"] {
+        let Some(original) = compare(&["where", robot]) else { return };
+        let original = original.trim();
+        let kinematics = Kinematics::load(original).unwrap();
+        let joints: Vec<&str> = kinematics.joint_names().collect();
+        let links: Vec<&str> = kinematics.link_names().collect();
+        std::fs::write(&names, serde_json::json!({"joints": joints, "links": links}).to_string()).unwrap();
+        // A sensor of one taxel on each link.
+        let mut random = Random::new(7);
+        let points: Vec<[f64; 3]> = links.iter().map(|_| [(); 3].map(|()| 0.2 * (random.unit() - 0.5))).collect();
+        let sensor = |(index, (link, [x, y, z])): (usize, (&&str, &[f64; 3]))| {
+            format!(
+                "<sensor name=\"s{index}\"><parent link=\"{link}\"/><origin xyz=\"{x} {y} {z}\"/>\
+                 <tactile channel=\"skin\"><taxel idx=\"{index}\" xyz=\"0 0 0\"/></tactile></sensor>"
+            )
+        };
+        let sensors: String = links.iter().zip(&points).enumerate().map(sensor).collect();
+        let text = std::fs::read_to_string(original).unwrap();
+        std::fs::write(&urdf, text.replace("</robot>", &format!("{sensors}</robot>"))).unwrap();
+        done(&["author", "--urdf-skin", text_of(&urdf), "--geometry", "none", "-o", text_of(&body)]);
+        let mut touches: Vec<(Vec<f64>, usize)> = Vec::new();
+        let line = |index: usize| {
+            let positions: Vec<f64> = joints.iter().map(|_| 6.0 * (random.unit() - 0.5)).collect();
+            let link = (random.unit() * links.len() as f64) as usize;
+            let told: serde_json::Map<String, Value> = joints
+                .iter()
+                .zip(&positions)
+                .map(|(joint, &position)| ((*joint).to_owned(), position.into()))
+                .collect();
+            touches.push((positions, link));
+            let line = serde_json::json!({"t": 0.01 * index as f64, "values": {link.to_string(): 5.0}, "joints": told});
+            format!("{line}\n")
+        };
+        let lines: String = (0..TOUCHES).map(line).collect();
+        let flags = ["--joints", text_of(&urdf), "--outputs", "total,position"];
+        let (found, _) = run_lines(&body, &lines, &flags);
+        assert_eq!(found.len(), TOUCHES);
+        let largest = |off_m: f64| -> Value {
+            let mut bytes = Vec::new();
+            for ((positions, link), frame) in touches.iter().zip(&found) {
+                let (place, of) = place(frame);
+                assert_eq!(of, "world", "{frame}");
+                let touch =
+                    [*link as f64].into_iter().chain(points[*link]).chain((place + off_m * DVec3::X).to_array());
+                bytes.extend(positions.iter().copied().chain(touch).flat_map(f64::to_le_bytes));
+            }
+            std::fs::write(&numbers, bytes).unwrap();
+            serde_json::from_str(&compare(&["places", original, text_of(&names), text_of(&numbers)]).unwrap()).unwrap()
+        };
+        let (right, wrong) = (largest(0.0), largest(2e-6));
+        for library in ["pinocchio", "yourdfpy"] {
+            let [right, wrong] = [&right, &wrong].map(|of| of[library]["largest"].as_f64().unwrap());
+            eprintln!("{robot}, {library}: {right:e} m");
+            assert!(right < 1e-6 && wrong > 1e-6, "{robot}, {library}: {right:e} and {wrong:e} m");
+        }
+    }
+}
+
 #[test]
 fn links_are_where_pinocchio_and_yourdfpy_have_them() {
     const CONFIGURATIONS: usize = 1000;
-    let python = match python_with("kinematics", "import pinocchio, yourdfpy") {
-        Ok(python) => python,
-        Err(why) => return skip("KINEMATICS", why),
-    };
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/kinematics/compare.py");
-    let run = |arguments: &[&str]| {
-        let output = Command::new(&python).arg(script).args(arguments).output().unwrap();
-        assert!(output.status.success(), "{}", stderr(&output));
-        String::from_utf8(output.stdout).unwrap()
-    };
     let folder = tempfile::tempdir().unwrap();
     let (names, numbers) = (folder.path().join("names.json"), folder.path().join("numbers"));
     for (robot, joints, links) in [("panda", 8, 13), ("icub", 32, 56), ("tiago", 48, 78)] {
-        let urdf = run(&["where", robot]).trim().to_owned();
-        let kinematics = Kinematics::load(&urdf).unwrap();
+        let Some(urdf) = compare(&["where", robot]) else { return };
+        let urdf = urdf.trim();
+        let kinematics = Kinematics::load(urdf).unwrap();
         assert_eq!((kinematics.joint_names().len(), kinematics.link_names().len()), (joints, links), "{robot}");
         let listed = serde_json::json!({
             "joints": kinematics.joint_names().collect::<Vec<_>>(), "links": kinematics.link_names().collect::<Vec<_>>()
         });
         std::fs::write(&names, listed.to_string()).unwrap();
-        let compare = |configurations: usize, off_rad: f64| -> Value {
+        let largest_off = |configurations: usize, off_rad: f64| -> Value {
             let mut random = Random::new(1);
             let mut bytes = Vec::new();
             for _ in 0..configurations {
@@ -172,9 +242,9 @@ fn links_are_where_pinocchio_and_yourdfpy_have_them() {
                 bytes.extend(told.into_iter().chain(rows).flat_map(f64::to_le_bytes));
             }
             std::fs::write(&numbers, bytes).unwrap();
-            serde_json::from_str(&run(&["compare", &urdf, text_of(&names), text_of(&numbers)])).unwrap()
+            serde_json::from_str(&compare(&["compare", urdf, text_of(&names), text_of(&numbers)]).unwrap()).unwrap()
         };
-        let (right, wrong) = (compare(CONFIGURATIONS, 0.0), compare(3, 1.0_f64.to_radians()));
+        let (right, wrong) = (largest_off(CONFIGURATIONS, 0.0), largest_off(3, 1.0_f64.to_radians()));
         for library in ["pinocchio", "yourdfpy"] {
             assert_eq!(right[library]["configurations"], CONFIGURATIONS);
             let largest = |of: &Value| of[library]["largest"].as_f64().unwrap();
@@ -202,16 +272,15 @@ fn joints_in_frames_put_percepts_into_the_world() {
     let (in_link, link) = place(&in_link[0]);
     assert_eq!(link, "fore_arm");
     assert!(in_link.distance(DVec3::new(0.07, 0.015, 0.02)) < 1e-6, "{in_link}");
-    // By hand, in the URDF's own axes; then turned to y up.
-    let y_up = |p: DVec3| DVec3::new(p.x, p.z, -p.y);
-    let when_straight = y_up(DVec3::new(0.3, 0.0, 0.12) + in_link);
+    // By hand, in the URDF's own axes, which are the world's.
+    let when_straight = DVec3::new(0.3, 0.0, 0.12) + in_link;
     let shoulder =
         DAffine3::from_rotation_translation(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2), DVec3::Z * 0.12);
     let elbow =
         DAffine3::from_rotation_translation(DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2), DVec3::X * 0.3);
     let in_base = (shoulder * elbow).transform_point3(in_link);
-    // A base that is posed is where that says, axes and all.
-    let expected = [when_straight, when_straight, y_up(in_base), in_base + DVec3::X * 10.0, in_link, when_straight];
+    // A base that is posed is where that says.
+    let expected = [when_straight, when_straight, in_base, in_base + DVec3::X * 10.0, in_link, when_straight];
     for ((frame, expected), at) in found.iter().zip(expected).zip(0..) {
         let (position, link) = place(frame);
         let is_late = at == 4;
@@ -230,6 +299,33 @@ fn joints_in_frames_put_percepts_into_the_world() {
     let flags = ["--joints", URDF, "--up", "z", "--coordinates", "anchor"];
     let anchored = run_lines(&body, &lines.concat(), &flags).0;
     assert!(anchored.iter().all(|frame| place(frame).1 == "fore_arm" && !has_flag(frame, "stale_pose")));
+}
+
+#[test]
+fn a_body_of_a_urdf_remembers_what_points_up_in_it() {
+    let (folder, body) = arm();
+    let frame = "{\"t\":0,\"values\":{\"11\":5},\"joints\":{\"shoulder\":0,\"elbow\":0,\"grip\":0}}\n";
+    let in_root = DVec3::new(0.3 + 0.07, 0.015, 0.12 + 0.02);
+    let assumed = "its z is taken as up, as REP 103 has it";
+    let (found, said) = run_lines(&body, frame, &["--joints", URDF]);
+    assert!(place(&found[0]).0.distance(in_root) < 1e-6 && !said.contains(assumed), "{said}");
+    // With y up the URDF has glTF's axes, and faces along its z.
+    let lying = folder.path().join("lying.glb");
+    done(&["author", "--urdf-skin", URDF, "--up", "y", "-o", text_of(&lying)]);
+    let (found, said) = run_lines(&lying, frame, &["--joints", URDF]);
+    let (position, link) = place(&found[0]);
+    assert!(position.distance(DVec3::new(in_root.z, in_root.x, in_root.y)) < 1e-6 && link == "world", "{position}");
+    assert!(!said.contains(assumed), "{said}");
+    // Another program may drop that: then z is assumed, and a line says so.
+    let (key, other) = (&b"somatic_urdf"[..], &b"another_name"[..]);
+    let mut bytes = std::fs::read(&body).unwrap();
+    let at: Vec<usize> = (0..bytes.len() - key.len()).filter(|&at| bytes[at..].starts_with(key)).collect();
+    assert_eq!(at.len(), 1);
+    bytes[at[0]..][..other.len()].copy_from_slice(other);
+    std::fs::write(&body, bytes).unwrap();
+    let (again, said) = run_lines(&body, frame, &["--joints", URDF]);
+    assert!(place(&again[0]).0.distance(in_root) < 1e-6 && said.matches(assumed).count() == 1, "{said}");
+    assert!(!run_lines(&body, frame, &["--joints", URDF, "--up", "z"]).1.contains(assumed));
 }
 
 #[test]
@@ -254,8 +350,8 @@ fn states_of_a_recording_are_interpolated_to_the_frames_time() {
     let turned = |angle: f64| {
         let [x, y, z] = [0.07, 0.015, 0.02];
         let (sin, cos) = angle.sin_cos();
-        // Turned around the elbow's z, then to y up.
-        DVec3::new(0.3 + cos * x - sin * y, 0.12 + z, -(sin * x + cos * y))
+        // Turned around the elbow's z.
+        DVec3::new(0.3 + cos * x - sin * y, sin * x + cos * y, 0.12 + z)
     };
     let states_text = "t,elbow,shoulder,grip\n-0.05,-1,0,0\n0.05,1,0,0\n0.1,1,0,0\n";
     let found = run(states_text, &[]);
@@ -289,11 +385,10 @@ fn what_does_not_go_together_is_refused_in_one_line() {
         assert_eq!(why.lines().count(), 1, "{why}");
         why
     };
-    assert!(run(2, &["--joints", URDF, "--joint-states", STATES]).contains("add --up z, or --up y"));
     assert!(run(2, &["--up", "z"]).contains("add --joints robot.urdf"));
     assert!(run(2, &["--joints", URDF, "--up", "z"]).contains("--joint-states FILE"));
     let wrong_up = run(1, &["--joints", URDF, "--joint-states", STATES, "--up", "y"]);
-    assert!(wrong_up.contains("arm.urdf: with all joints at 0, link `base` is 0.0 mm and 90.0°"), "{wrong_up}");
+    assert!(wrong_up.contains("arm.urdf: with all joints at 0, link `base` is 0.0 mm and 120.0°"), "{wrong_up}");
     assert!(wrong_up.contains("with --up z they agree"), "{wrong_up}");
     // A link that has been moved by 2 mm is seen, and one by 0.5 mm is not.
     let moved = |origin: &str| {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 use somatic::robot::messages::{
     Byte, DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Marker, MarkerArray, Message, PointCloud2,
@@ -212,7 +213,7 @@ fn a_bag_is_read_whole_and_our_percepts_come_back_from_it() {
     assert!(read["times_ns"].as_array().unwrap().is_sorted_by_key(|time| time.as_u64().unwrap()));
     assert_eq!((&read["start_ns"], &read["duration_ns"]), (&0.into(), &2_000_000_001_u64.into()));
 
-    // By time and name, the sphere of each touched field; its turn makes z of y.
+    // By time and name, the sphere of each touched field.
     let mut spheres = BTreeMap::new();
     let mut deleted = 0;
     let mut forces = BTreeMap::new();
@@ -240,7 +241,7 @@ fn a_bag_is_read_whole_and_our_percepts_come_back_from_it() {
             assert_eq!((&field["link"], &marker["header"]["frame_id"]), (&"world".into(), &"world".into()));
             let [x, y, z] = [0, 1, 2].map(|axis| number(&field["position"][axis]));
             let place = &marker["pose"]["position"];
-            for (theirs, ours) in [("x", x), ("y", -z), ("z", y)].map(|(axis, ours)| (number(&place[axis]), ours)) {
+            for (theirs, ours) in [("x", x), ("y", y), ("z", z)].map(|(axis, ours)| (number(&place[axis]), ours)) {
                 assert!((theirs - ours).abs() < 1e-12, "{name} at {time_ns}: {place}");
             }
             // The skin is flat and points to z: its pull is −z, the force's size that of the percept.
@@ -274,6 +275,16 @@ fn clouds_of_a_bag_come_back_with_the_taxels_that_are_missing() {
     assert_eq!(run(&sink, &[]), told);
 }
 
+/// world_from_link of `fore_arm` in a message of `/tf`.
+fn fore_arm_in(message: &Value) -> DAffine3 {
+    let transforms = message["transforms"].as_array().unwrap();
+    let found = &transforms.iter().find(|transform| transform["child_frame_id"] == "fore_arm").unwrap()["transform"];
+    let of = |part: &str, axis: &str| number(&found[part][axis]);
+    let [x, y, z, w] = ["x", "y", "z", "w"].map(|axis| of("rotation", axis));
+    let translation = DVec3::from_array(["x", "y", "z"].map(|axis| of("translation", axis)));
+    DAffine3::from_rotation_translation(DQuat::from_xyzw(x, y, z, w), translation)
+}
+
 #[test]
 fn links_in_a_bag_are_where_joints_put_them_with_z_up() {
     let (folder, flags) = arm_run();
@@ -300,6 +311,28 @@ fn links_in_a_bag_are_where_joints_put_them_with_z_up() {
         }
         assert!((number(&found["transform"]["rotation"]["w"]).abs() - 1.0).abs() < 1e-6, "{found}");
     }
+    // With any joints, what a line says of a place in the link and of it in the world is one point.
+    let [in_world, in_link] = ["world", "anchor"].map(|of| frames(&done(&with(&flags, &["--coordinates", of]))));
+    let transforms: Vec<(f64, DAffine3)> = read["messages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|message| message[0] == "/tf")
+        .map(|message| (message[1].as_u64().unwrap() as f64 * 1e-9, fore_arm_in(&message[2])))
+        .collect();
+    let mut compared = 0;
+    for (world, link) in in_world.iter().zip(&in_link) {
+        let (_, fore_arm) = transforms.iter().find(|(t_s, _)| (t_s - number(&world["t"])).abs() < 1e-6).unwrap();
+        for (of_world, of_link) in world["fields"].as_array().unwrap().iter().zip(link["fields"].as_array().unwrap()) {
+            assert_eq!((&of_world["link"], &of_link["link"]), (&"world".into(), &"fore_arm".into()));
+            let [told, place] = [of_world, of_link]
+                .map(|field| DVec3::from_array([0, 1, 2].map(|axis| number(&field["position"][axis]))));
+            let expected = fore_arm.transform_point3(place);
+            assert!(told.distance(expected) < 1e-9, "{told} is not {expected}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 50, "{compared}");
 }
 
 #[test]

@@ -99,7 +99,7 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
     let clouds = of("/left/somatic/taxels/fore_arm");
     assert!(clouds.len() * 1000 >= times.len() * 999, "{} of {} clouds", clouds.len(), times.len());
     assert!(clouds.iter().all(|cloud| cloud["header"]["frame_id"] == "fore_arm" && cloud["point_step"] == 20));
-    // The spheres are the percepts, z up.
+    // The spheres are the percepts.
     let mut spheres = BTreeMap::new();
     let mut deleted = 0;
     for message in of("/left/somatic/touches") {
@@ -122,7 +122,7 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
             let number = |value: &Value| value.as_f64().unwrap();
             let [x, y, z] = [0, 1, 2].map(|axis| number(&field["position"][axis]));
             let place = &marker["pose"]["position"];
-            for (axis, ours) in [("x", x), ("y", -z), ("z", y)] {
+            for (axis, ours) in [("x", x), ("y", y), ("z", z)] {
                 assert!((number(&place[axis]) - ours).abs() < 1e-12, "{place}");
             }
             if field["field"] == "fore_arm/patch_01" {

@@ -68,7 +68,7 @@ fn links_of_a_urdf_stand_where_those_of_the_body_do() {
         let parent = |body: &Body, link: &Link| link.parent.map(|parent| body.links[parent].name.clone());
         let parents = (parent(&before, link), parent(&after, same).filter(|name| name != "base"));
         assert_eq!(parents.0, parents.1, "{}", link.name);
-        assert!(link.world_from_link.abs_diff_eq(same.world_from_link, 1e-6), "{}", link.name);
+        assert!(link.body_from_link.abs_diff_eq(same.body_from_link, 1e-6), "{}", link.name);
     }
     assert!(before.links.len() > 10 && after.links.len() <= before.links.len() + 1);
 }

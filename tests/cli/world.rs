@@ -38,8 +38,7 @@ fn a_link_can_stand_for_the_world() {
             let [world, link] = [&in_world, &in_link].map(|frames| percept(&frames[index], field));
             assert_eq!((&world["link"], &link["link"]), (&"world".into(), &"upper".into()));
             let p = position(world);
-            // The world is y up, and the URDF, whose axes links keep, z up.
-            let expected = in_upper(truth, DVec3::new(p.x, -p.z, p.y));
+            let expected = in_upper(truth, p);
             assert!(position(link).distance(expected) < 1e-6, "frame {index}, {field}: {link}");
         }
         // A touch of the link itself is where it is without any pose.

@@ -194,7 +194,7 @@ fn cells_cover_a_body_all_over() {
     let places = evenly
         .taxels
         .iter()
-        .map(|taxel| evenly.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link));
+        .map(|taxel| evenly.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link));
     let (body, notes) = placed(&file, &table(places)).unwrap();
     let sum: f64 = body.taxels.iter().map(|taxel| taxel.area).sum();
     eprintln!("{sum} of {whole} m², {notes:?}");

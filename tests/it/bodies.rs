@@ -52,12 +52,12 @@ fn taxel(body: &Body, id: u32) -> &Taxel {
     &body.taxels[body.taxel_index(id).unwrap()]
 }
 
-fn in_world(body: &Body, taxel: &Taxel) -> DVec3 {
-    body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link)
+fn in_body(body: &Body, taxel: &Taxel) -> DVec3 {
+    body.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link)
 }
 
-fn normal_in_world(body: &Body, taxel: &Taxel) -> DVec3 {
-    body.links[taxel.link].world_from_link.transform_vector3(taxel.normal_in_link)
+fn normal_in_body(body: &Body, taxel: &Taxel) -> DVec3 {
+    body.links[taxel.link].body_from_link.transform_vector3(taxel.normal_in_link)
 }
 
 fn extent(points: impl IntoIterator<Item = DVec3>) -> (DVec3, DVec3) {
@@ -176,7 +176,7 @@ fn the_hand_has_the_measures_of_the_paper() {
         }
     }
     let points: Vec<(DVec3, DVec3)> =
-        body.taxels.iter().map(|t| (in_world(&body, t), normal_in_world(&body, t))).collect();
+        body.taxels.iter().map(|t| (in_body(&body, t), normal_in_body(&body, t))).collect();
     let least = spacings(&points).into_iter().fold(f64::INFINITY, f64::min);
     assert!(least >= 0.005, "sensors of 5 mm do not fit {least} m apart");
     assert!(body.taxels.iter().all(|t| (t.area - 1.963_495e-5).abs() < 1e-10));
@@ -186,7 +186,7 @@ fn the_hand_has_the_measures_of_the_paper() {
 fn a_fingers_sensors_look_much_the_same_way() {
     let body = load("hand.glb");
     let normals = |name: &str| -> Vec<DVec3> {
-        ids(&body, name).iter().map(|&id| normal_in_world(&body, taxel(&body, id))).collect()
+        ids(&body, name).iter().map(|&id| normal_in_body(&body, taxel(&body, id))).collect()
     };
     for finger in children(&body, "hand/midhand") {
         let widest = widest_angle(&normals(&finger.name));
@@ -257,10 +257,28 @@ fn the_humanoid_stands_75_centimetres_tall_on_the_ground() {
     assert!(low.y.abs() < 1e-3 && (high.y - 0.75).abs() < 2e-3, "from {} to {} m", low.y, high.y);
     assert!((low.x + high.x).abs() < 5e-3, "it leans to one side");
     for (left, right) in [("left_hand", "right_hand"), ("left_foot", "right_foot")] {
-        let origin = |name: &str| body.links[body.link_index(name).unwrap()].world_from_link.translation;
+        let origin = |name: &str| body.links[body.link_index(name).unwrap()].body_from_link.translation;
         assert!((origin(left) * DVec3::new(-1.0, 1.0, 1.0)).distance(origin(right)) < 1e-6);
         assert!(origin(left).x > 0.0);
     }
+}
+
+#[test]
+fn bundled_bodies_stand_upright_in_the_world_and_look_along_its_x() {
+    let humanoid = load("humanoid.glb");
+    let link = |name: &str| &humanoid.links[humanoid.link_index(name).unwrap()];
+    let place = |name: &str| link(name).world_from_link().translation;
+    assert!(place("head").z > 0.5 && place("left_hand").y > 0.05 && place("right_hand").y < -0.05);
+    // Its toes reach farther from the ankles than its heels.
+    for name in ["left_foot", "right_foot"] {
+        let foot = humanoid.taxels.iter().filter(|taxel| humanoid.links[taxel.link].name == name);
+        let (low, high) = extent(foot.map(|t| link(name).world_from_link().transform_point3(t.position_in_link)));
+        assert!(high.x - place(name).x > 2.0 * (place(name).x - low.x), "{name}: {low} {high}");
+    }
+    // The mat's taxels look up, its left half lies on the left.
+    let mat = load("mat.glb");
+    let way = mat.links[mat.taxels[0].link].world_from_link();
+    assert!(mat.taxels.iter().all(|taxel| way.transform_vector3(taxel.normal_in_link).distance(DVec3::Z) < 1e-6));
 }
 
 #[test]
@@ -310,7 +328,7 @@ fn the_humanoids_taxels_are_evenly_spread() {
         (variance.sqrt() / mean, least / (2.0 * widest_radius(area, count)))
     };
     let mut points: Vec<(DVec3, DVec3)> =
-        body.taxels.iter().map(|t| (in_world(&body, t), normal_in_world(&body, t))).collect();
+        body.taxels.iter().map(|t| (in_body(&body, t), normal_in_body(&body, t))).collect();
     let (variation, least) = evenness(&points);
     assert!(variation < 0.12, "coefficient of variation {variation}");
     assert!(least >= 0.65, "least spacing {least} of the widest there could be");
@@ -340,7 +358,7 @@ fn the_humanoids_fields_nest_and_their_patches_have_true_charts() {
         }
     }
     assert_eq!(seen.len(), body.taxels.len());
-    let limb = |name: &str| ids(&body, name).iter().map(|&id| in_world(&body, taxel(&body, id))).sum::<DVec3>();
+    let limb = |name: &str| ids(&body, name).iter().map(|&id| in_body(&body, taxel(&body, id))).sum::<DVec3>();
     assert!(limb("left_arm").x > 0.0 && limb("right_leg").x < 0.0, "left is at +x");
     let torso: Vec<DVec3> = ids(&body, "torso").iter().map(|&id| taxel(&body, id).normal_in_link).collect();
     assert!(widest_angle(&torso) > 150.0, "a limb wraps round, a patch does not");

@@ -197,15 +197,23 @@ fn links_of_a_robot_are_links_where_its_joints_put_them() {
     let path = robot(folder.path());
     let mut with = options();
     with.packages = BTreeMap::from([("arm".to_owned(), folder.path().to_owned())]);
+    let said = open(&path, &with).unwrap().notes;
+    assert!(said.len() == 1 && said[0].contains("give --up y"), "{said:?}");
+    assert_eq!(body(&path, &with).urdf_up(), Some(Up::Z));
+    with.up = Some(Up::Y);
+    let as_gltf = body(&path, &with);
+    is_box(measured(&as_gltf, "base"), [-0.1, -0.2, 0.0], [0.1, 0.2, 1.0]);
+    assert_eq!(as_gltf.urdf_up(), Some(Up::Y));
+    with.up = Some(Up::Z);
     let whole = body(&path, &with);
     let links: Vec<(&str, Option<usize>)> = whole.links.iter().map(|l| (l.name.as_str(), l.parent)).collect();
     assert_eq!(links, [("base", None), ("hand", Some(0)), ("tool", Some(1))]);
-    // URDF (x, y, z) is glTF (x, z, −y).
-    is_box(measured(&whole, "base"), [-0.1, 0.0, -0.2], [0.1, 1.0, 0.2]);
+    // URDF (x, y, z) is glTF (y, z, x).
+    is_box(measured(&whole, "base"), [-0.2, 0.0, -0.1], [0.2, 1.0, 0.1]);
     // A quarter turn around z takes x to y and y to −x; the mirror takes z to −z.
-    is_box(measured(&whole, "hand"), [1.0 - 0.04, 2.0 - 0.06, -0.02], [1.0, 2.0, 0.0]);
-    let tool = whole.links[2].world_from_link.translation;
-    assert!(tool.distance(DVec3::new(1.0, 2.25, 0.0)) < 1e-6, "{tool}");
+    is_box(measured(&whole, "hand"), [0.0, 2.0 - 0.06, 1.0 - 0.04], [0.02, 2.0, 1.0]);
+    let tool = whole.links[2].body_from_link.translation;
+    assert!(tool.distance(DVec3::new(0.0, 2.25, 1.0)) < 1e-6, "{tool}");
     // What was outside before the mirror is outside.
     let made =
         author(open(&path, &with).unwrap(), &Recipe::simple(Some(80), None, &["hand".to_owned()]).unwrap(), |_| {})
@@ -220,7 +228,7 @@ fn links_of_a_robot_are_links_where_its_joints_put_them() {
         (measured(&body(&path, &with), "hand"), notes)
     };
     let ((low, high, _), notes) = hand_of(&text.replace("package://", "package:///"));
-    assert!(low.distance(DVec3::new(0.96, 1.94, -0.02)) < 1e-6 && notes.is_empty(), "{low} {high} {notes:?}");
+    assert!(low.distance(DVec3::new(0.0, 1.94, 0.96)) < 1e-6 && notes.is_empty(), "{low} {high} {notes:?}");
     // A glTF and a COLLADA file are in the axes of the URDF, whatever points up in them.
     let stl = folder.path().join("meshes/box.stl");
     std::fs::write(folder.path().join("meshes/box.glb"), open(&stl, &unit(1.0)).unwrap().to_glb().unwrap()).unwrap();
@@ -228,7 +236,7 @@ fn links_of_a_robot_are_links_where_its_joints_put_them() {
     for other in ["box.glb", "box.dae"] {
         let ((low, high, _), _) = hand_of(&text.replace("box.stl", other));
         assert!(
-            low.distance(DVec3::new(0.96, 1.94, -0.02)) < 1e-6 && high.distance(DVec3::new(1.0, 2.0, 0.0)) < 1e-6,
+            low.distance(DVec3::new(0.0, 1.94, 0.96)) < 1e-6 && high.distance(DVec3::new(0.02, 2.0, 1.0)) < 1e-6,
             "{other}"
         );
     }

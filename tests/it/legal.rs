@@ -123,8 +123,8 @@ fn millimetres_come_out_in_metres() {
     let body = draft.load().unwrap();
     let hand = body.link_index("hand").unwrap();
     let link = &body.links[hand];
-    assert!((link.world_from_link.translation - DVec3::new(0.0, 0.5, 0.0)).length() < 1e-7);
-    assert!((link.world_from_link.matrix3.determinant() - 1.0).abs() < 1e-12, "a link's frame is rigid");
+    assert!((link.body_from_link.translation - DVec3::new(0.0, 0.5, 0.0)).length() < 1e-7);
+    assert!((link.body_from_link.matrix3.determinant() - 1.0).abs() < 1e-12, "a link's frame is rigid");
     let taxel = &body.taxels[0];
     assert_eq!(taxel.link, hand);
     assert!((taxel.position_in_link - DVec3::new(0.02, 0.03, 0.0)).length() < 1e-7);
@@ -147,11 +147,11 @@ fn a_mirrored_node_keeps_its_outside_outside() {
     ]);
     let body = draft.load().unwrap();
     let link = &body.links[0];
-    assert!((link.world_from_link.matrix3.determinant() - 1.0).abs() < 1e-12);
-    let in_world = |p: DVec3| link.world_from_link.transform_point3(p);
+    assert!((link.body_from_link.matrix3.determinant() - 1.0).abs() < 1e-12);
+    let in_body = |p: DVec3| link.body_from_link.transform_point3(p);
     let taxel = &body.taxels[0];
-    assert!((in_world(taxel.position_in_link) - DVec3::new(-0.25, 0.5, 0.0)).length() < 1e-12);
-    let normal = link.world_from_link.transform_vector3(taxel.normal_in_link);
+    assert!((in_body(taxel.position_in_link) - DVec3::new(-0.25, 0.5, 0.0)).length() < 1e-12);
+    let normal = link.body_from_link.transform_vector3(taxel.normal_in_link);
     assert!((normal - DVec3::Z).length() < 1e-12, "{normal}");
     let hit = body.surface_in_link(0).nearest(taxel.position_in_link).unwrap();
     assert!((hit.normal - taxel.normal_in_link).length() < 1e-12, "surface and taxel face the same way");

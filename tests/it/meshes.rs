@@ -55,7 +55,7 @@ fn a_cylinder_whose_pose_is_not_its_bind_pose() {
     let bend = (bind(1) - bind(0)).angle_between(bind(3) - bind(2));
     assert!(bend < 1e-5, "straight at bind: {bend}");
     // As the file poses them, they are bent.
-    let rest = |joint: usize| body.links[joints[joint].0].world_from_link.translation;
+    let rest = |joint: usize| body.links[joints[joint].0].body_from_link.translation;
     let bend = (rest(1) - rest(0)).angle_between(rest(3) - rest(2));
     assert!((bend.to_degrees() - 30.0).abs() < 0.01, "bent by 30° in the file's pose: {bend}");
 }
@@ -73,8 +73,8 @@ fn a_head_and_ten_cubes() {
     // A child of a parent scaled to a half: its frame stays rigid, its cube is half as large.
     let child = body.link_index("ChildScale").unwrap();
     let link = &body.links[child];
-    assert!((link.world_from_link.translation - DVec3::new(-4.0, 4.0, 0.0)).length() < 1e-6);
-    assert!((link.world_from_link.matrix3.determinant() - 1.0).abs() < 1e-9);
+    assert!((link.body_from_link.translation - DVec3::new(-4.0, 4.0, 0.0)).length() < 1e-6);
+    assert!((link.body_from_link.matrix3.determinant() - 1.0).abs() < 1e-9);
     let cube = body.surfaces.iter().find(|s| s.name == "ChildScale").unwrap();
     let hit = body.surface_in_link(child).nearest(DVec3::new(0.0, 3.0, 0.0)).unwrap();
     assert!((hit.position.y - extent(cube).y / 4.0).abs() < 1e-6, "{}", hit.position);

@@ -2,10 +2,12 @@
 
     compare.py where ROBOT
     compare.py compare ROBOT.urdf NAMES.json NUMBERS
+    compare.py places ROBOT.urdf NAMES.json NUMBERS
 
 `where` prints the path of a robot's URDF among example-robot-data. NAMES.json has the lists "joints" and "links". NUMBERS are
 doubles: for each configuration the joints' positions, then each link's root_from_link as the 12 numbers of a 3 × 4 matrix,
-row by row. Prints, for each of the two libraries, the largest distance of any of those numbers, as JSON.
+row by row. Prints, for each of the two libraries, the largest distance of any of those numbers, as JSON. For `places` they are for
+each touch the joints' positions, the index of a link, a point in that link, and where it was said to be in the world.
 """
 
 import json
@@ -77,10 +79,30 @@ def compare(path, names, numbers):
     json.dump(largest, sys.stdout)
 
 
+def places(path, names, numbers):
+    import yourdfpy
+
+    names = json.loads(Path(names).read_text())
+    joints, links = names["joints"], names["links"]
+    rows = np.fromfile(numbers).reshape(-1, len(joints) + 7)
+    positions, link, point, told = np.split(rows, [len(joints), len(joints) + 1, len(joints) + 4], axis=1)
+    robot = yourdfpy.URDF.load(path, load_meshes=False, build_scene_graph=True)
+    largest = {}
+    for name, library in (("pinocchio", by_pinocchio), ("yourdfpy", by_yourdfpy)):
+        apart = []
+        for poses, of, p, place in zip(library(path, robot, joints, links, positions), link[:, 0], point, told):
+            pose = np.reshape(poses[int(of)], (3, 4))
+            apart.append(np.linalg.norm(pose[:, :3] @ p + pose[:, 3] - place))
+        largest[name] = {"touches": len(apart), "largest": float(np.max(apart))}
+    json.dump(largest, sys.stdout)
+
+
 match sys.argv[1:]:
     case ["where", robot]:
         print(folder() / URDF[robot])
     case ["compare", path, names, numbers]:
         compare(path, names, numbers)
+    case ["places", path, names, numbers]:
+        places(path, names, numbers)
     case _:
         raise SystemExit(__doc__)

@@ -1,7 +1,7 @@
 // Parts of the page that need no browser.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera } from "../../src/page/web/camera.js";
+import { Camera, PRESETS } from "../../src/page/web/camera.js";
 import { addRect, changedRects } from "../../src/page/web/dirty.js";
 import {
   scaleFor,
@@ -82,7 +82,7 @@ test("the camera frames all points and projects them inside", () => {
   const camera = new Camera();
   camera.resize(900, 600);
   const points = [];
-  for (let i = 0; i < 8; i++) points.push([i & 1 ? 0.3 : -0.1, i & 2 ? 0.8 : 0, i & 4 ? 0.2 : -0.2]);
+  for (let i = 0; i < 8; i++) points.push([i & 1 ? 0.2 : -0.2, i & 2 ? 0.3 : -0.1, i & 4 ? 0.8 : 0]);
   camera.frame(points, 0.08);
   const seen = points.map((p) => camera.project(p));
   for (const { x, y } of seen) assert.ok(x >= 0 && x <= 900 && y >= 0 && y <= 600);
@@ -94,6 +94,27 @@ test("the camera frames all points and projects them inside", () => {
   const way = points[3].map((v, k) => v - camera.eye[k]);
   const size = Math.hypot(...way);
   ray.forEach((v, k) => near(v, way[k] / size, 1e-5));
+});
+
+test("what is up, forward and left in the world is so in the picture", () => {
+  const camera = new Camera();
+  camera.resize(900, 600);
+  const from = (/** @type {import("../../src/page/web/camera.js").Preset} */ side) => {
+    [camera.yaw, camera.pitch] = PRESETS[side];
+    camera.update();
+    const [forward, left, up] = [
+      [0.1, 0, 0],
+      [0, 0.1, 0],
+      [0, 0, 0.1],
+    ].map((p) => camera.project(p));
+    return { forward, left, up };
+  };
+  const front = from("front");
+  assert.ok(camera.eye[0] > 0 && front.up.y < 300 && front.left.x > 450);
+  const side = from("left");
+  assert.ok(camera.eye[1] > 0 && side.up.y < 300 && side.forward.x < 450);
+  const top = from("top");
+  assert.ok(camera.eye[2] > 0 && top.forward.y > 300 && top.left.x > 450);
 });
 
 test("no peak is lost where many samples share a pixel", () => {

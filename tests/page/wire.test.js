@@ -25,7 +25,7 @@ function writer(bytes) {
 
 function head(w, { sections, fields = 0, touches = 0, samples = 0, columns = 0, answers = 0 }) {
   w.u8(2);
-  w.u8(1);
+  w.u8(2);
   w.u16(sections);
   w.u32(7);
   w.u64(123456789012);
@@ -118,7 +118,7 @@ test("another version is an error", () => {
 test("a mesh", () => {
   const w = writer(20 + 3 * 28 + 12 + 40 + 28);
   w.u8(1);
-  w.u8(1);
+  w.u8(2);
   w.u16(0);
   for (const count of [3, 1, 1, 1]) w.u32(count);
   for (let i = 0; i < 18; i++) w.f32(i);
@@ -142,7 +142,7 @@ test("a mesh", () => {
 test("a history", () => {
   const w = writer(32 + 16);
   w.u8(3);
-  w.u8(1);
+  w.u8(2);
   w.u16(0);
   for (const value of [5, 2, 1]) w.u32(value);
   w.f64(1);
@@ -159,7 +159,7 @@ test("a history", () => {
 test("outgoing messages", () => {
   assert.deepEqual(JSON.parse(say.hello("ab", null)), {
     type: "hello",
-    version: 1,
+    version: 2,
     token: "ab",
     after_event: null,
   });

@@ -19,7 +19,7 @@ type Children = Vec<(String, Vec<usize>)>;
 
 enum Seed {
     Taxel(usize),
-    /// In the world at rest, m.
+    /// In the body at rest, m.
     Point(DVec3),
 }
 
@@ -201,7 +201,7 @@ impl Grouper<'_> {
     fn locate_seed(&self, seed: &Seed, links: &[LinkDistances]) -> (usize, usize, Option<(usize, DVec3)>) {
         let body = self.body;
         let on = |p: DVec3, distances: &LinkDistances| {
-            body.links[body.taxels[distances.taxels[0]].link].world_from_link.inverse().transform_point3(p)
+            body.links[body.taxels[distances.taxels[0]].link].body_from_link.inverse().transform_point3(p)
         };
         match *seed {
             Seed::Taxel(taxel) => {
@@ -261,10 +261,10 @@ impl Grouper<'_> {
     fn middle(&self, taxels: &[usize]) -> Option<usize> {
         let at = |taxel: usize| {
             let taxel = &self.body.taxels[taxel];
-            let world_from_link = self.body.links[taxel.link].world_from_link;
+            let body_from_link = self.body.links[taxel.link].body_from_link;
             (
-                world_from_link.transform_point3(taxel.position_in_link),
-                world_from_link.transform_vector3(taxel.normal_in_link),
+                body_from_link.transform_point3(taxel.position_in_link),
+                body_from_link.transform_vector3(taxel.normal_in_link),
             )
         };
         let points: Vec<(DVec3, DVec3)> = taxels.iter().map(|&taxel| at(taxel)).collect();

@@ -145,7 +145,7 @@ pub enum Patches {
 pub enum Seeds {
     /// At these taxels.
     Ids(Vec<Ids>),
-    /// At the surface points nearest to these, m, in the world at rest.
+    /// At the surface points nearest to these, m, in the body at rest.
     Points(Vec<[f64; 3]>),
     /// At the middles of fields.
     Fields(Globs),

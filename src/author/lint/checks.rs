@@ -123,7 +123,7 @@ fn crowding(body: &Body) -> Vec<Finding> {
     let places: Vec<DVec3> = body
         .taxels
         .iter()
-        .map(|taxel| body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link))
+        .map(|taxel| body.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link))
         .collect();
     let tree = point_tree(places.iter().copied());
     let mut coincident: BTreeMap<u32, u32> = BTreeMap::new();
@@ -181,15 +181,15 @@ pub(in super::super) struct SurfaceFit {
 
 impl SurfaceFit {
     pub(in super::super) fn of(body: &Body, surface_search: &SurfaceSearch<'_>, taxel: &Taxel) -> Option<Self> {
-        let world_from_link = body.links[taxel.link].world_from_link;
-        let p = world_from_link.transform_point3(taxel.position_in_link);
-        let normal = world_from_link.transform_vector3(taxel.normal_in_link);
+        let body_from_link = body.links[taxel.link].body_from_link;
+        let p = body_from_link.transform_point3(taxel.position_in_link);
+        let normal = body_from_link.transform_vector3(taxel.normal_in_link);
         let hit = surface_search.nearest(taxel.link, p)?;
         // On an edge the normals of both triangles count.
         let around =
             surface_search.normals_at(taxel.link, hit.position).map(|normal_there| angle(normal, normal_there));
         let tilt_rad = around.fold(angle(normal, hit.normal), f64::min);
-        let normal_in_link = world_from_link.inverse().transform_vector3(hit.normal);
+        let normal_in_link = body_from_link.inverse().transform_vector3(hit.normal);
         Some(Self { off_m: hit.position.distance(p), tilt_rad, normal_in_link })
     }
 

@@ -16,8 +16,8 @@ const SEED: u64 = 0x5e1f;
 /// Where each link of a body is, in several poses.
 #[derive(Clone, Debug)]
 pub struct DrawnPoses {
-    /// By pose, world_from_link of every link; the first is the body at rest.
-    pub(super) world_from_link: Vec<Vec<DAffine3>>,
+    /// By pose, body_from_link of every link; the first is the body at rest.
+    pub(super) body_from_link: Vec<Vec<DAffine3>>,
 }
 
 impl DrawnPoses {
@@ -34,8 +34,8 @@ impl DrawnPoses {
             for (link, position) in body.links.iter().zip(positions) {
                 let moved = link.joint.as_ref().map_or(DAffine3::IDENTITY, |joint| joint.motion.at(position));
                 let at_rest = match link.parent {
-                    Some(parent) => poses[parent] * body.links[parent].world_from_link.inverse() * link.world_from_link,
-                    None => link.world_from_link,
+                    Some(parent) => poses[parent] * body.links[parent].body_from_link.inverse() * link.body_from_link,
+                    None => link.body_from_link,
                 };
                 poses.push(at_rest * moved);
             }
@@ -43,22 +43,22 @@ impl DrawnPoses {
         }))
     }
 
-    /// By pose, world_from_link of link `link`.
+    /// By pose, body_from_link of link `link`.
     pub fn of_link(&self, link: usize) -> impl Iterator<Item = DAffine3> + '_ {
-        self.world_from_link.iter().map(move |pose| pose[link])
+        self.body_from_link.iter().map(move |pose| pose[link])
     }
 
     /// Rest alone.
     pub(super) fn at_rest(body: &Body) -> Self {
-        Self { world_from_link: vec![body.links.iter().map(|link| link.world_from_link).collect()] }
+        Self { body_from_link: vec![body.links.iter().map(|link| link.body_from_link).collect()] }
     }
 
-    /// Those of `body` that `draw` gives: world_from_link of every link.
+    /// Those of `body` that `draw` gives: body_from_link of every link.
     pub(crate) fn draw(body: &Body, mut draw: impl FnMut(&mut Random) -> Vec<DAffine3>) -> Self {
         let mut random = Random::new(SEED);
-        let at_rest = body.links.iter().map(|link| link.world_from_link).collect();
+        let at_rest = body.links.iter().map(|link| link.body_from_link).collect();
         let drawn = (0..DRAWN).map(|_| draw(&mut random));
-        Self { world_from_link: std::iter::once(at_rest).chain(drawn).collect() }
+        Self { body_from_link: std::iter::once(at_rest).chain(drawn).collect() }
     }
 }
 
@@ -114,9 +114,10 @@ mod tests {
         let links = joints.into_iter().enumerate().map(|(index, joint)| Link {
             name: format!("l{index}"),
             parent: index.checked_sub(1),
-            world_from_link: DAffine3::from_translation(DVec3::X * index as f64),
+            body_from_link: DAffine3::from_translation(DVec3::X * index as f64),
             link_from_node: DAffine3::IDENTITY,
             joint,
+            urdf_up: None,
         });
         Body {
             name: "b".into(),
@@ -144,9 +145,9 @@ mod tests {
             slide("free", None, None),
         ]);
         let poses = DrawnPoses::of_own_joints(&body).unwrap();
-        assert_eq!(poses.world_from_link.len(), 5);
+        assert_eq!(poses.body_from_link.len(), 5);
         let mut seen = Vec::new();
-        for (index, pose) in poses.world_from_link.iter().enumerate() {
+        for (index, pose) in poses.body_from_link.iter().enumerate() {
             let y: Vec<f64> = pose.iter().map(|link| link.translation.y).collect();
             if index == 0 {
                 assert!(y.iter().all(|y| *y == 0.0));
@@ -163,7 +164,7 @@ mod tests {
         seen.dedup();
         assert_eq!(seen.len(), 4);
         let again = DrawnPoses::of_own_joints(&body).unwrap();
-        assert_eq!(poses.world_from_link, again.world_from_link);
+        assert_eq!(poses.body_from_link, again.body_from_link);
         assert!(DrawnPoses::of_own_joints(&self::body(vec![None, None])).is_none());
     }
 }

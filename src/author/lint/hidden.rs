@@ -107,7 +107,7 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn F
         let Some(mut seen) = seen else { continue };
         let taxel = &body.taxels[index];
         if seen.reach == Reach::CoveredAtRest {
-            let at = surface.world_from_link(0, taxel.link).transform_point3(taxel.position_in_link);
+            let at = surface.body_from_link(0, taxel.link).transform_point3(taxel.position_in_link);
             if !shells.of(taxel.link).is_open_at(at, &surface, &search.directions) {
                 seen.reach = Reach::Hidden;
             }
@@ -155,9 +155,9 @@ impl Search<'_> {
         Seen { reach, is_inward, inside: self.inside(taxel, start) }
     }
 
-    /// Where rays start from `taxel`, and its normal, in the world.
+    /// Where rays start from `taxel`, and its normal, in the body.
     fn start(&self, pose: usize, taxel: &Taxel) -> (DVec3, DVec3) {
-        let way = self.surface.world_from_link(pose, taxel.link);
+        let way = self.surface.body_from_link(pose, taxel.link);
         let normal = way.transform_vector3(taxel.normal_in_link);
         (way.transform_point3(taxel.position_in_link) + normal * START_M, normal)
     }

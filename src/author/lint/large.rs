@@ -19,7 +19,7 @@ pub(super) fn large(body: &Body) -> Option<Finding> {
         corners.into_iter().for_each(|corner| hold(link, corner));
     }
     for taxel in &body.taxels {
-        hold(taxel.link, body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link));
+        hold(taxel.link, body.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link));
     }
     let sizes = boxes.iter().map(|(low, high)| if low.x <= high.x { low.distance(*high) } else { 0.0 });
     let large: Vec<(f64, &str)> = sizes

@@ -27,20 +27,20 @@ pub(super) fn directions() -> Vec<DVec3> {
 /// Triangles that move together, or those of a skinned mesh, one pose after the other.
 enum Part {
     Rigid { link: usize, in_link: RayTree },
-    Skinned { links: Vec<usize>, in_world: Vec<RayTree> },
+    Skinned { links: Vec<usize>, in_body: Vec<RayTree> },
 }
 
 /// A body's surface in several poses.
 pub(super) struct PosedSurface<'a> {
     poses: &'a [Vec<DAffine3>],
     /// By pose and link.
-    link_from_world: Vec<Vec<DAffine3>>,
+    link_from_body: Vec<Vec<DAffine3>>,
     parts: Vec<Part>,
 }
 
 impl<'a> PosedSurface<'a> {
     pub(super) fn new(body: &Body, poses: &'a DrawnPoses) -> Self {
-        let poses = &poses.world_from_link[..];
+        let poses = &poses.body_from_link[..];
         let mut rigid: Vec<Vec<[DVec3; 3]>> = vec![Vec::new(); body.links.len()];
         let mut parts = Vec::new();
         for surface in &body.surfaces {
@@ -48,8 +48,8 @@ impl<'a> PosedSurface<'a> {
                 Home::Rigid { link, link_from_mesh } => rigid[*link].extend(surface.corners_through(*link_from_mesh)),
                 Home::Skinned { joints, .. } => {
                     let links = joints.iter().map(|(link, _)| *link).collect();
-                    let in_world = poses.iter().map(|pose| RayTree::new(skinned(surface, pose))).collect();
-                    parts.push(Part::Skinned { links, in_world });
+                    let in_body = poses.iter().map(|pose| RayTree::new(skinned(surface, pose))).collect();
+                    parts.push(Part::Skinned { links, in_body });
                 }
             }
         }
@@ -57,7 +57,7 @@ impl<'a> PosedSurface<'a> {
             parts.push(Part::Rigid { link, in_link: RayTree::new(triangles) });
         }
         let inverse = |pose: &Vec<DAffine3>| pose.iter().map(|link| link.inverse()).collect();
-        Self { poses, link_from_world: poses.iter().map(inverse).collect(), parts }
+        Self { poses, link_from_body: poses.iter().map(inverse).collect(), parts }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -72,7 +72,7 @@ impl<'a> PosedSurface<'a> {
         self.parts.len()
     }
 
-    pub(super) fn world_from_link(&self, pose: usize, link: usize) -> DAffine3 {
+    pub(super) fn body_from_link(&self, pose: usize, link: usize) -> DAffine3 {
         self.poses[pose][link]
     }
 
@@ -94,15 +94,15 @@ impl<'a> PosedSurface<'a> {
 
     fn seen_by(&self, pose: usize, part: usize, origin: DVec3, direction: DVec3) -> (&RayTree, Ray) {
         match &self.parts[part] {
-            Part::Skinned { in_world, .. } => (&in_world[pose], Ray::new(origin, direction)),
+            Part::Skinned { in_body, .. } => (&in_body[pose], Ray::new(origin, direction)),
             Part::Rigid { link, in_link } => {
-                let way = &self.link_from_world[pose][*link];
+                let way = &self.link_from_body[pose][*link];
                 (in_link, Ray::new(way.transform_point3(origin), way.transform_vector3(direction)))
             }
         }
     }
 
-    /// Whether the ray from `origin` along `direction`, both in the world, meets part `part`.
+    /// Whether the ray from `origin` along `direction`, both in the body, meets part `part`.
     pub(super) fn is_hit(&self, pose: usize, part: usize, origin: DVec3, direction: DVec3) -> bool {
         let (tree, ray) = self.seen_by(pose, part, origin, direction);
         tree.is_hit(&ray)
@@ -133,7 +133,7 @@ impl<'a> PosedSurface<'a> {
     }
 }
 
-/// The triangles of a skinned mesh in the world; each corner follows its heaviest joint.
+/// The triangles of a skinned mesh in the body; each corner follows its heaviest joint.
 fn skinned<'a>(surface: &'a Surface, pose: &[DAffine3]) -> impl Iterator<Item = [DVec3; 3]> + use<'a> {
     let mut points = surface.positions.clone();
     let mut is_mirrored = false;

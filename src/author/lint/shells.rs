@@ -16,7 +16,7 @@ const AREA_PER_SAMPLE_M2: f64 = 1e-4;
 /// A shell is open if a ray escapes from this share of its samples.
 const OPEN_SHARE: f64 = 0.01;
 
-/// Connected parts of the surfaces that are a link's own, in the world at rest.
+/// Connected parts of the surfaces that are a link's own, in the body at rest.
 pub(super) struct Shells {
     index: SurfaceIndex,
     topology: Topology,
@@ -45,12 +45,12 @@ impl Shells {
         for surface in &body.surfaces {
             match &surface.home {
                 Home::Rigid { link: own, link_from_mesh } if *own == link => {
-                    let way = body.links[link].world_from_link * *link_from_mesh;
+                    let way = body.links[link].body_from_link * *link_from_mesh;
                     corners.extend(surface.corners_through(way).flatten());
                 }
                 Home::Skinned { joints, heaviest } if joints.iter().any(|(joint, _)| *joint == link) => {
                     let ways: Vec<DAffine3> =
-                        joints.iter().map(|(joint, way)| body.links[*joint].world_from_link * *way).collect();
+                        joints.iter().map(|(joint, way)| body.links[*joint].body_from_link * *way).collect();
                     let at = |v: u32| ways[heaviest[v as usize]].transform_point3(surface.positions[v as usize]);
                     let mirrored = ways.first().is_some_and(|way| way.matrix3.determinant() < 0.0);
                     let order = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
@@ -66,7 +66,7 @@ impl Shells {
         Self { index, topology, open }
     }
 
-    /// Whether a ray escapes from the shell at `p`, in the world at rest.
+    /// Whether a ray escapes from the shell at `p`, in the body at rest.
     pub(super) fn is_open_at(&self, p: DVec3, surface: &PosedSurface<'_>, directions: &[DVec3]) -> bool {
         let Some(hit) = self.index.nearest(p) else { return true };
         let part = self.topology.part[hit.triangle];

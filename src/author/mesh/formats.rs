@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::options::{Up, check_unit, ending};
+use super::options::{check_unit, ending};
 use super::triangles::Triangles;
 use super::{collada, obj, ply, stl};
-use crate::body::Original;
+use crate::body::{Original, Up};
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_MESH_BYTES, MAX_XML_BYTES};
 

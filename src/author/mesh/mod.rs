@@ -20,20 +20,20 @@ mod urdf_tree;
 mod xml;
 
 pub use mjcf::author_mjcf_skin;
-pub use options::{Geometry, MeshOptions, Up};
+pub use options::{Geometry, MeshOptions};
 pub use urdf_skin::author_urdf_skin;
 pub use urdf_text::urdf_of_skin;
 
-pub(crate) use options::y_up_from;
 pub(crate) use urdf_file::{JointMotion, Robot, RobotJoint};
 pub(crate) use urdf_tree::{Driver, followed, order};
 
 use std::path::{Path, PathBuf};
 
 use self::formats::is_gltf;
-use self::options::{doubt, ending};
+use self::options::{doubt, ending, y_up_from};
 
 use super::lint::MAX_LIKELY_LINK_M;
+pub use crate::body::Up;
 use crate::body::{Body, Glb, Original};
 use crate::error::{Error, Result};
 

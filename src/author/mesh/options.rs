@@ -6,17 +6,8 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DQuat};
 
 use super::ros_packages::PackageRoots;
+use crate::body::Up;
 use crate::error::{Result, failed};
-
-words! {"axis that points up",
-    /// The axis that points up in a mesh's file.
-    Up {
-        /// y, as in glTF.
-        Y = "y",
-        /// z, as in URDF and most CAD programs.
-        Z = "z",
-    }
-}
 
 /// The geometry of a URDF that taxels are put on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +26,7 @@ pub enum Geometry {
 pub struct MeshOptions {
     /// The unit of its numbers, m; by default that of the file if it has one, else m.
     pub unit_m: Option<f64>,
-    /// The axis that points up; by default that of the file if it has one, else y.
+    /// The axis that points up; by default z in a URDF or MJCF, else that of the file if it has one, else y.
     pub up: Option<Up>,
     /// Folders by name of a package, for `package://NAME/…` in a URDF.
     pub packages: BTreeMap<String, PathBuf>,
@@ -53,6 +44,13 @@ impl MeshOptions {
         self.package_roots = PackageRoots::of_environment();
         self
     }
+
+    /// The axis that points up in the file of a robot, and what is said where it is not given.
+    pub(super) fn robot_up(&self) -> (Up, Option<String>) {
+        let assumed =
+            || "the file's z is taken as up, its x as forward, as REP 103 has it; where its y is up, give --up y";
+        (self.up.unwrap_or(Up::Z), self.up.is_none().then(assumed).map(str::to_owned))
+    }
 }
 
 /// Asks whether `what`, which has `size_m`, is in millimetres if it is over `most_m`.
@@ -69,8 +67,8 @@ pub(super) fn check_unit(metres: f64) -> Result<f64> {
     if metres.is_finite() && metres > 0.0 { Ok(metres) } else { Err(failed!("a unit of {metres} m; give one over 0")) }
 }
 
-/// Turns what points up in a file to y.
-pub(crate) fn y_up_from(up: Up) -> DAffine3 {
+/// Turns what points up in a file of a single mesh to y, about x.
+pub(super) fn y_up_from(up: Up) -> DAffine3 {
     match up {
         Up::Y => DAffine3::IDENTITY,
         Up::Z => DAffine3::from_quat(DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),

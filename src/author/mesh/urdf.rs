@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
 
-use super::options::{MeshOptions, Up, doubt, y_up_from};
+use super::options::{MeshOptions, doubt};
 use super::triangles::Triangles;
 use super::urdf_file::{JointMotion, Robot, RobotJoint, RobotLink, ShapeKind};
 use super::urdf_tree::order;
@@ -22,7 +22,7 @@ pub(super) struct Linked {
     pub(super) glb: Glb,
     /// By name.
     pub(super) nodes: BTreeMap<String, usize>,
-    /// What is doubtful.
+    /// What is doubtful, and what is assumed.
     pub(super) notes: Vec<String>,
     has_triangles: bool,
 }
@@ -35,8 +35,7 @@ pub(super) fn robot(path: &Path, options: &MeshOptions) -> Result<(Glb, Vec<Stri
         );
     }
     let robot = Robot::load(path, options)?;
-    let Linked { glb, notes, has_triangles, .. } =
-        links(&robot, options.up.unwrap_or(Up::Z)).map_err(|e| e.at(path.display()))?;
+    let Linked { glb, notes, has_triangles, .. } = links(&robot, options).map_err(|e| e.at(path.display()))?;
     if has_triangles {
         return Ok((glb, notes));
     }
@@ -45,7 +44,8 @@ pub(super) fn robot(path: &Path, options: &MeshOptions) -> Result<(Glb, Vec<Stri
 }
 
 /// The links of `robot` as nodes, with what they look like.
-pub(super) fn links(robot: &Robot, up: Up) -> Result<Linked> {
+pub(super) fn links(robot: &Robot, options: &MeshOptions) -> Result<Linked> {
+    let (up, said) = options.robot_up();
     let order = order(robot)?;
     let mut glb = Glb::new();
     let material = glb.material("robot", [0.6, 0.62, 0.66], 0.8);
@@ -55,18 +55,21 @@ pub(super) fn links(robot: &Robot, up: Up) -> Result<Linked> {
     let mut doubts = Vec::new();
     for (link, joint) in order {
         let above = joint.and_then(|joint| Some((nodes.get(joint.parent.as_str())?, joint)));
-        // URDF is z up, glTF y up: the roots are turned, and with them all below.
-        let (parent, parent_from_link, world_from_link) = match above {
-            Some((&(parent, world_from_parent), joint)) => {
-                (Some(parent), joint.parent_from_child, world_from_parent * joint.parent_from_child)
+        // A URDF's root stands in the world, a glTF's in glTF's axes: the roots are turned, and with them all below.
+        let (parent, parent_from_link, body_from_link) = match above {
+            Some((&(parent, body_from_parent), joint)) => {
+                (Some(parent), joint.parent_from_child, body_from_parent * joint.parent_from_child)
             }
-            None => (None, y_up_from(up), y_up_from(up)),
+            None => (None, up.body_from_root(), up.body_from_root()),
         };
         let node = glb.placed_node(&link.name, parent, parent_from_link);
+        if parent.is_none() {
+            glb.urdf_root(node, up);
+        }
         if let Some(joint) = joint.and_then(kept) {
             glb.joint(node, &joint);
         }
-        nodes.insert(&link.name, (node, world_from_link));
+        nodes.insert(&link.name, (node, body_from_link));
         let mesh = geometry(link, &mut known)?;
         if mesh.triangles.is_empty() {
             continue;
@@ -74,14 +77,15 @@ pub(super) fn links(robot: &Robot, up: Up) -> Result<Linked> {
         glb.mesh(node, &link.name, &mesh.clone().into_mesh_data(), Some(material), None);
         doubts.extend(doubt(&format!("link `{}`", link.name), mesh.size_m(), MAX_LIKELY_LINK_M));
         whole.check_room_for(&mesh)?;
-        whole.extend_placed(&mesh, &world_from_link);
+        whole.extend_placed(&mesh, &body_from_link);
     }
     let nodes = nodes.into_iter().map(|(name, (node, _))| (name.to_owned(), node)).collect();
     if doubts.is_empty() {
         doubts.extend(doubt("it", whole.size_m(), MAX_LIKELY_ROBOT_M));
     }
     let what_to_do = "write metres into the URDF, or a `scale` of its meshes";
-    let notes = doubts.into_iter().map(|doubt| format!("{doubt}, {what_to_do}")).collect();
+    let doubts = doubts.into_iter().map(|doubt| format!("{doubt}, {what_to_do}"));
+    let notes = said.into_iter().chain(doubts).collect();
     Ok(Linked { glb, nodes, notes, has_triangles: !whole.triangles.is_empty() })
 }
 

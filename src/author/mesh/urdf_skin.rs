@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::options::{MeshOptions, Up};
+use super::options::MeshOptions;
 use super::urdf::{self, Linked};
 use super::urdf_file::Robot;
 use crate::author::recipe::Recipe;
@@ -20,17 +20,17 @@ use crate::error::{Error, Result, failed};
 /// The file cannot be read or is invalid, has no tactile sensor, or gives two taxels one index; with the line.
 pub fn author_urdf_skin(path: &Path, options: &MeshOptions) -> Result<Authored> {
     let robot = Robot::load(path, options)?;
-    place(&robot, path, options.up.unwrap_or(Up::Z)).map_err(|e| e.at(path.display()))
+    place(&robot, path, options).map_err(|e| e.at(path.display()))
 }
 
-fn place(robot: &Robot, path: &Path, up: Up) -> Result<Authored> {
+fn place(robot: &Robot, path: &Path, options: &MeshOptions) -> Result<Authored> {
     if robot.sensors.is_empty() {
         return Err(Error::failed(
             "it has no <sensor> with a <tactile>; place taxels on its meshes instead: --taxels 500",
         ));
     }
     let first_of = first_ids(robot)?;
-    let Linked { mut glb, nodes, notes, .. } = urdf::links(robot, up)?;
+    let Linked { mut glb, nodes, notes, .. } = urdf::links(robot, options)?;
     let mut used = BTreeSet::new();
     let (mut places, mut by_link) = (Vec::new(), BTreeMap::<&str, Vec<Taxel>>::new());
     for sensor in &robot.sensors {

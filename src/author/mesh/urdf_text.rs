@@ -5,7 +5,6 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
-use super::options::{Up, y_up_from};
 use crate::body::{Body, Modality, Taxel};
 use crate::plain;
 
@@ -20,8 +19,7 @@ const CHANNEL: &str = "skin";
 pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
     let name = Path::new(&body.name).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let mut text = format!("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", escaped(&name));
-    let z_up_from_y_up = y_up_from(Up::Z).inverse();
-    let base = base(body, &z_up_from_y_up);
+    let base = base(body);
     for link in base.iter().chain(body.links.iter().map(|link| &link.name)) {
         let _ = writeln!(text, "  <link name=\"{}\"/>", escaped(link));
     }
@@ -29,9 +27,9 @@ pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
         let (parent, parent_from_link) = match (link.parent, &base) {
             (Some(parent), _) => {
                 let parent = &body.links[parent];
-                (&parent.name, parent.world_from_link.inverse() * link.world_from_link)
+                (&parent.name, parent.body_from_link.inverse() * link.body_from_link)
             }
-            (None, Some(base)) => (base, z_up_from_y_up * link.world_from_link),
+            (None, Some(base)) => (base, link.world_from_link()),
             (None, None) => continue,
         };
         let (child, parent) = (escaped(&link.name), escaped(parent));
@@ -75,10 +73,9 @@ pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
 }
 
 /// A link above all, if the roots are several, or one that does not stand at the origin.
-fn base(body: &Body, z_up_from_y_up: &DAffine3) -> Option<String> {
+fn base(body: &Body) -> Option<String> {
     let roots: Vec<_> = body.links.iter().filter(|link| link.parent.is_none()).collect();
-    let is_at_origin = |root: DAffine3| (z_up_from_y_up * root).abs_diff_eq(DAffine3::IDENTITY, 1e-12);
-    if roots.len() == 1 && is_at_origin(roots[0].world_from_link) {
+    if roots.len() == 1 && roots[0].world_from_link().abs_diff_eq(DAffine3::IDENTITY, 1e-12) {
         return None;
     }
     let is_free = |name: &String| body.link_index(name).is_none();

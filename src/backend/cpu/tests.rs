@@ -154,9 +154,10 @@ fn sheet(taxels: u32) -> Body {
     let link = Link {
         name: "sheet".to_owned(),
         parent: None,
-        world_from_link: DAffine3::IDENTITY,
+        body_from_link: DAffine3::IDENTITY,
         link_from_node: DAffine3::IDENTITY,
         joint: None,
+        urdf_up: None,
     };
     Body {
         name: "sheet".to_owned(),

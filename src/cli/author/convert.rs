@@ -17,7 +17,8 @@ const HEADING: &str = "Meshes and robots of other formats";
 
 #[derive(Args)]
 pub(super) struct MeshArguments {
-    /// The axis that points up in the mesh file: y, or z as most CAD programs have it [default: z in .urdf, what a .dae says, else y].
+    /// The axis that points up in the file: y, or z as most CAD programs have it. A robot whose z is up faces along its x
+    /// [default: z in .urdf and MJCF, what a .dae says, else y].
     #[arg(long, value_name = "AXIS", help_heading = HEADING)]
     up: Option<UpWord>,
 

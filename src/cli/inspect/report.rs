@@ -52,7 +52,7 @@ fn taxels(body: &Body) -> String {
     let places: Vec<[f64; 3]> = body
         .taxels
         .iter()
-        .map(|taxel| body.links[taxel.link].world_from_link.transform_point3(taxel.position_in_link).to_array())
+        .map(|taxel| body.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link).to_array())
         .collect();
     let tree = RTree::bulk_load(places.clone());
     let nearest = |place: &[f64; 3]| tree.nearest_neighbor_iter_with_distance_2(*place).nth(1).map(|(_, d2)| d2.sqrt());

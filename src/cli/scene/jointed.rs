@@ -1,5 +1,6 @@
 //! Joints that move the body's links.
 
+use somatic::body::Up;
 use somatic::robot::{DelayEstimate, JointOptions, JointedSource, Kinematics};
 use somatic::source::{BagName, JointStates, Source, SourceSpec};
 use somatic::{Body, Error, Result};
@@ -8,6 +9,9 @@ use super::RunOptions;
 use super::joints_delay::JointsDelay;
 use crate::cli::states_from::StatesFrom;
 use crate::cli::stdio::say;
+
+/// What is added where nothing says which axis points up in the URDF.
+const Z_IS_ASSUMED: &str = "; its z is taken as up, as REP 103 has it: where its y is up, give --up y";
 
 impl RunOptions {
     pub(super) fn check_joints(&self) -> Result<()> {
@@ -25,9 +29,6 @@ impl RunOptions {
                 }
                 None => Ok(()),
             };
-        }
-        if self.up.is_none() {
-            return refuse("--joints needs to know which axis points up in the URDF; add --up z, or --up y");
         }
         let states = self.states_from()?;
         if states.is_none() && self.sources != ["-"] && !self.sources.iter().any(|s| is_mcap(s)) {
@@ -110,9 +111,10 @@ impl RunOptions {
         source: Box<dyn Source + Send>,
         body: &Body,
     ) -> Result<Box<dyn Source + Send>> {
-        let (Some(urdf), Some(up)) = (&self.joints, self.up) else { return Ok(source) };
+        let Some(urdf) = &self.joints else { return Ok(source) };
+        let known_up = self.up.or_else(|| body.urdf_up());
         let robot = Kinematics::load(urdf)?;
-        let mut options = JointOptions::new(up);
+        let mut options = JointOptions::new(known_up.unwrap_or(Up::Z));
         let states = self.states_from()?;
         options.delay_s = self.delay_s(states.as_ref())?;
         let source = match states {
@@ -137,7 +139,8 @@ impl RunOptions {
         options.max_age_s = self.joints_max_age.unwrap_or(options.max_age_s);
         let jointed = JointedSource::new(source, robot, body, options).map_err(|e| e.at(urdf.display()))?;
         if !self.quiet {
-            say(&format!("{}: {}", urdf.display(), jointed.summary()));
+            let assumed = if known_up.is_none() { Z_IS_ASSUMED } else { "" };
+            say(&format!("{}: {}{assumed}", urdf.display(), jointed.summary()));
         }
         Ok(Box::new(jointed))
     }

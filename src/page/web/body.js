@@ -44,7 +44,7 @@ void main() {
   vec3 normal = normalize(v_normal);
   if (dot(normal, toEye) < 0.0) normal = -normal;
   // The sky lights what looks up, the floor a little what looks down, a lamp stands left above the eye.
-  float sky = 0.5 + 0.5 * normal.y;
+  float sky = 0.5 + 0.5 * normal.z;
   vec3 lamp = normalize(toEye + 0.7 * u_up - 0.6 * u_right);
   float wrapped = max(0.0, (dot(normal, lamp) + 0.35) / 1.35);
   float facing = clamp(dot(normal, toEye), 0.0, 1.0);

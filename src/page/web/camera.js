@@ -1,4 +1,4 @@
-/** Where the picture is taken from: an orbit around a target. y is up. */
+/** Where the picture is taken from: an orbit around a target. The world is z up, x forward, y left. */
 
 import { add, cross, dot, multiply, perspective, scale, subtract, unit } from "./math.js";
 
@@ -19,12 +19,22 @@ export const PRESETS = {
 
 /** @typedef {keyof typeof PRESETS} Preset */
 
+/**
+ * The unit vector from the target to the eye.
+ * @param {number} yaw
+ * @param {number} pitch
+ * @returns {Vec3}
+ */
+function towards(yaw, pitch) {
+  return [Math.cos(yaw) * Math.cos(pitch), Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch)];
+}
+
 export class Camera {
   constructor() {
     /** @type {Vec3} */
     this.target = [0, 0, 0];
     this.distance = 1;
-    /** From +z towards +x, rad. */
+    /** From the front, +x, towards the left, +y, rad. */
     this.yaw = 0.6;
     /** Up from the horizon, rad. */
     this.pitch = 0.35;
@@ -35,10 +45,10 @@ export class Camera {
     /** Counts changes. */
     this.version = 0;
     /** Unit vectors of the view in the world; `back` points at the eye. */
-    this.back = /** @type {Vec3} */ ([0, 0, 1]);
-    this.right = /** @type {Vec3} */ ([1, 0, 0]);
-    this.up = /** @type {Vec3} */ ([0, 1, 0]);
-    this.eye = /** @type {Vec3} */ ([0, 0, 1]);
+    this.back = /** @type {Vec3} */ ([1, 0, 0]);
+    this.right = /** @type {Vec3} */ ([0, 1, 0]);
+    this.up = /** @type {Vec3} */ ([0, 0, 1]);
+    this.eye = /** @type {Vec3} */ ([1, 0, 0]);
     this.clipFromWorld = new Float32Array(16);
     /** Planes of depth, m from the eye. */
     this.near = 0.1;
@@ -48,10 +58,8 @@ export class Camera {
 
   /** Recomputes matrices from the fields above. */
   update() {
-    const [cp, sp] = [Math.cos(this.pitch), Math.sin(this.pitch)];
-    const [cy, sy] = [Math.cos(this.yaw), Math.sin(this.yaw)];
-    this.back = /** @type {Vec3} */ ([sy * cp, sp, cy * cp]);
-    this.right = /** @type {Vec3} */ ([cy, 0, -sy]);
+    this.back = towards(this.yaw, this.pitch);
+    this.right = /** @type {Vec3} */ ([-Math.sin(this.yaw), Math.cos(this.yaw), 0]);
     this.up = cross(this.back, this.right);
     this.eye = add(this.target, scale(this.back, this.distance));
     this.near = Math.max(this.distance - 2.5 * this.radius, this.distance * 0.02, this.radius * 1e-3);
@@ -201,7 +209,7 @@ export function chooseDirection(camera, normals, areas) {
     [0.45, -0.95, 0.95],
     [Math.PI - 0.5, 0.2, 0.9],
   ]) {
-    const back = [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
+    const back = towards(yaw, pitch);
     let seen = 0;
     normals.forEach((normal, i) => (seen += areas[i] * Math.max(0, dot(normal, back))));
     if (seen * liking > best) [best, choice] = [seen * liking, [yaw, pitch]];

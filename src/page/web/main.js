@@ -68,8 +68,8 @@ function lookAt(field) {
   const mean = [0, 1, 2].map((k) => normals.reduce((sum, normal) => sum + normal[k], 0) / normals.length);
   // A field whose taxels look one way is seen from that side; one that goes around the body from where we are.
   if (Math.hypot(...mean) > 0.6) {
-    camera.yaw = Math.atan2(mean[0], mean[2]) + 0.25;
-    camera.pitch = Math.max(-1.3, Math.min(1.3, Math.asin(mean[1] / Math.hypot(...mean)) + 0.2));
+    camera.yaw = Math.atan2(mean[1], mean[0]) + 0.25;
+    camera.pitch = Math.max(-1.3, Math.min(1.3, Math.asin(mean[2] / Math.hypot(...mean)) + 0.2));
     camera.update();
   }
   camera.frame(pointsOf(field), 0.24);

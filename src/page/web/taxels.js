@@ -56,7 +56,7 @@ void main() {
   v_metres = radius;
   float grown = 1.0 + (ring.a > 0.0 ? 4.5 : 1.0) / v_radius;
   v_corner = (vec2(corner & 1, corner >> 1) * 2.0 - 1.0) * grown;
-  vec3 one = normalize(cross(normal, abs(normal.y) < 0.9 ? vec3(0, 1, 0) : vec3(1, 0, 0)));
+  vec3 one = normalize(cross(normal, abs(normal.z) < 0.9 ? vec3(0, 0, 1) : vec3(0, 1, 0)));
   vec3 two = cross(normal, one);
   vec3 p = place + (v_corner.x * one + v_corner.y * two) * radius;
   gl_Position = u_clipFromWorld * vec4(p, 1.0);

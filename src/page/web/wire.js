@@ -3,7 +3,7 @@
  * Nothing here touches the document, so it runs under node too.
  */
 
-export const VERSION = 1;
+export const VERSION = 2;
 /** Index of "no link": the world. */
 export const NO_LINK = 0xffffffff;
 /** Bit of a percept's `present`: its position is in the world, not in the frame of a link. */

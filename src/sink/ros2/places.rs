@@ -1,7 +1,5 @@
 //! Taxels as clouds of points, and links as transforms.
 
-use std::f64::consts::FRAC_PI_2;
-
 use glam::{DQuat, DVec3};
 
 use super::readings::Readings;
@@ -11,7 +9,7 @@ use crate::robot::messages::{
 };
 use crate::signal::Pose;
 
-/// The frame of coordinates that links are in: z up, as REP 103 has it.
+/// The frame of coordinates that links are in.
 pub(super) const WORLD: &str = "world";
 /// `UINT32` and `FLOAT32` of `sensor_msgs/PointField`.
 const UINT32: u8 = 6;
@@ -20,11 +18,6 @@ const FLOAT32: u8 = 7;
 const POINT_BYTES: usize = 20;
 const PRESSURE_AT: usize = 12;
 const TAXEL_AT: usize = 16;
-
-/// Turns the body's world, whose y is up, to ROS's, whose z is up.
-pub(super) fn z_up_from_y_up() -> DQuat {
-    DQuat::from_rotation_x(FRAC_PI_2)
-}
 
 pub(super) fn vector(v: DVec3) -> Vector3 {
     Vector3 { x: v.x, y: v.y, z: v.z }
@@ -119,14 +112,10 @@ impl Clouds {
 /// Where the links of `posed` are, or all of `at_rest` where it has none.
 pub(super) fn transforms(time_ns: u64, at_rest: &[(String, Pose)], posed: &[(String, Pose)]) -> TfMessage {
     let poses = if posed.is_empty() { at_rest } else { posed };
-    let turn = z_up_from_y_up();
     let transform = |(link, pose): &(String, Pose)| TransformStamped {
         header: header(time_ns, WORLD),
         child_frame_id: link.clone(),
-        transform: Transform {
-            translation: vector(turn * pose.translation),
-            rotation: quaternion((turn * pose.rotation).normalize()),
-        },
+        transform: Transform { translation: vector(pose.translation), rotation: quaternion(pose.rotation.normalize()) },
     };
     TfMessage { transforms: poses.iter().map(transform).collect() }
 }
@@ -134,7 +123,7 @@ pub(super) fn transforms(time_ns: u64, at_rest: &[(String, Pose)], posed: &[(Str
 /// The links of `body` at rest, in the world.
 pub(super) fn rest_poses(body: &Body) -> Vec<(String, Pose)> {
     let pose = |link: &crate::body::Link| {
-        let (_, rotation, translation) = link.world_from_link.to_scale_rotation_translation();
+        let (_, rotation, translation) = link.world_from_link().to_scale_rotation_translation();
         (link.name.clone(), Pose { translation, rotation })
     };
     body.links.iter().map(pose).collect()
@@ -152,8 +141,13 @@ mod tests {
     }
 
     #[test]
-    fn what_points_up_in_the_body_points_up_in_ros() {
-        let up = z_up_from_y_up() * DVec3::Y;
-        assert!(up.distance(DVec3::Z) < 1e-15 && (z_up_from_y_up() * DVec3::X).distance(DVec3::X) < 1e-15);
+    fn a_body_stands_upright_in_ros_and_looks_along_x() {
+        let body = Body::from_bytes("humanoid", crate::bundled::HUMANOID).unwrap();
+        let at_rest = rest_poses(&body);
+        let place = |name: &str| at_rest.iter().find(|(link, _)| link == name).unwrap().1.translation;
+        let TfMessage { transforms } = transforms(0, &at_rest, &[]);
+        let root = &transforms[0].transform.rotation;
+        assert_eq!([root.x, root.y, root.z, root.w], [0.5; 4]);
+        assert!(place("head").z > 0.5 && place("left_hand").y > 0.05 && place("right_hand").y < -0.05);
     }
 }

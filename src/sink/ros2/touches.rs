@@ -5,7 +5,7 @@ use std::mem::take;
 use glam::{DQuat, DVec3};
 
 use super::moment::TouchedField;
-use super::places::{WORLD, quaternion, vector, z_up_from_y_up};
+use super::places::{quaternion, vector};
 use crate::robot::messages::{Color, Header, Marker, MarkerArray, Point, Time};
 use crate::sink::FieldNames;
 
@@ -110,9 +110,6 @@ impl Made<'_> {
         turn: DQuat,
     ) -> &mut Marker {
         let frame = if touch.in_world { &names.world } else { &names.link };
-        // A link stays as the body has it, the world itself is z up.
-        let up = if touch.in_world && frame == WORLD { z_up_from_y_up() } else { DQuat::IDENTITY };
-        let (position, turn) = (up * position, up * turn);
         let marker = self.next(names, frame, id(touch.field, part));
         marker.pose.position = Point { x: position.x, y: position.y, z: position.z };
         marker.pose.orientation = quaternion(turn.normalize());

@@ -12,9 +12,10 @@ use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 
 use self::file::File;
-use super::options::{Up, check_unit};
+use super::options::check_unit;
 use super::triangles::Triangles;
 use super::xml;
+use crate::body::Up;
 use crate::error::{Result, failed};
 use crate::limits::{MAX_NODES, MAX_XML_DEPTH};
 

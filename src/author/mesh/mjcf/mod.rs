@@ -21,7 +21,7 @@ use glam::{DAffine3, DVec3};
 use self::model::{Geom, GeomShape, MjSensor, Model, SensorKind, TouchGrid};
 use self::places::{Places, Shape};
 use self::ray::{Exit, last_exit};
-use super::options::{Geometry, MeshOptions, Up, y_up_from};
+use super::options::{Geometry, MeshOptions};
 use super::shapes;
 use super::triangles::{Room, Triangles};
 use crate::author::recipe::Recipe;
@@ -76,7 +76,9 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
     }
     let mut glb = Glb::new();
     let material = glb.material("robot", [0.6, 0.62, 0.66], 0.8);
-    let y_up = y_up_from(options.up.unwrap_or(Up::Z));
+    let (up, note) = options.robot_up();
+    skin.notes.extend(note);
+    let gltf_from_world = up.body_from_root();
     let mut nodes: BTreeMap<usize, usize> = BTreeMap::new();
     let mut room = Room::default();
     for (index, body) in model.bodies.iter().enumerate() {
@@ -85,7 +87,7 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
             continue;
         }
         let parent = body.parent.and_then(|parent| nodes.get(&parent).copied());
-        let way = if parent.is_some() { body.parent_from_body } else { y_up * body.world_from_body };
+        let way = if parent.is_some() { body.parent_from_body } else { gltf_from_world * body.world_from_body };
         let node = glb.placed_node(&body.name, parent, way);
         nodes.insert(index, node);
         let mesh = looks(model, &body.geoms, options.geometry, skin.shaped.contains(&index))?;
