@@ -83,7 +83,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 attached: reader.attached().to_vec(),
                 has_end: reader.has_end(),
                 losses,
-                notes: Vec::new(),
+                notes: reader.notices(),
                 layout: None,
                 contacts,
                 survey,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::records::{Parts, Record};
-use super::{FRAMES, FRAMES_CHANNEL, TAXEL_IDS, ids_of};
+use super::{FRAMES, FRAMES_CHANNEL, TAXEL_IDS, WORLD, ids_of};
 
 /// A file that lies beside the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,12 +26,14 @@ pub(super) struct Channel {
     pub(super) encoding: String,
     /// The ids of a frame's values, in their order, if this is the channel of frames.
     pub(super) taxels: Option<Vec<u32>>,
+    /// The world that poses of the frames are in, as [`Preface::world`] has it.
+    pub(super) world: Option<String>,
 }
 
 impl Channel {
     /// That of frames.
     pub(super) fn of_frames() -> Self {
-        Self { schema: 0, topic: FRAMES.to_owned(), encoding: "protobuf".to_owned(), taxels: None }
+        Self { schema: 0, topic: FRAMES.to_owned(), encoding: "protobuf".to_owned(), taxels: None, world: None }
     }
 }
 
@@ -41,6 +43,8 @@ pub(super) struct Preface {
     pub(super) taxels: Vec<u32>,
     /// The channel of frames, which older recordings do not tell.
     pub(super) frames: Option<u16>,
+    /// The world that poses are in, which older recordings do not tell.
+    pub(super) world: Option<String>,
 }
 
 /// What the metadata in `body` tell, if they are a recording's own.
@@ -55,7 +59,11 @@ pub(super) fn preface(body: &[u8]) -> Option<Preface> {
         metadata.insert(pairs.text()?, pairs.text()?);
     }
     let taxels = ids_of(metadata.get(TAXEL_IDS).filter(|_| name == super::METADATA)?)?;
-    Some(Preface { taxels, frames: metadata.get(FRAMES_CHANNEL).and_then(|id| id.parse().ok()) })
+    Some(Preface {
+        taxels,
+        frames: metadata.get(FRAMES_CHANNEL).and_then(|id| id.parse().ok()),
+        world: metadata.get(WORLD).map(|&world| world.to_owned()),
+    })
 }
 
 /// The attachment whose record begins with `head`.
@@ -82,12 +90,15 @@ pub(super) fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
     let (id, schema) = (parts.u16()?, parts.u16()?);
     let (topic, encoding) = (parts.text()?.to_owned(), parts.text()?.to_owned());
     let mut metadata = parts.map()?;
-    let mut taxels = None;
+    let (mut taxels, mut world) = (None, None);
     while topic == FRAMES && !metadata.0.is_empty() {
-        let (key, value) = (metadata.text()?, metadata.text()?);
-        taxels = taxels.or(ids_of(value).filter(|_| key == TAXEL_IDS));
+        match (metadata.text()?, metadata.text()?) {
+            (TAXEL_IDS, ids) => taxels = ids_of(ids),
+            (WORLD, name) => world = Some(name.to_owned()),
+            _ => {}
+        }
     }
-    Some((id, Channel { schema, topic, encoding, taxels }))
+    Some((id, Channel { schema, topic, encoding, taxels, world }))
 }
 
 /// The id of a schema, and its name.

@@ -13,6 +13,8 @@ pub(super) struct Head {
     pub(super) taxels: Option<Vec<u32>>,
     /// The channel of frames, which older recordings do not tell.
     pub(super) frames_channel: Option<u16>,
+    /// The world that poses are in, which older recordings do not tell.
+    pub(super) world: Option<String>,
     pub(super) attached: Vec<Attached>,
     /// Whether something there is not what it says.
     pub(super) is_damaged: bool,
@@ -40,6 +42,7 @@ impl Head {
                     records.body(record, u64::MAX, &mut body)?;
                     if let Some(preface) = preface(&body).filter(|_| head.taxels.is_none()) {
                         (head.taxels, head.frames_channel) = (Some(preface.taxels), preface.frames);
+                        head.world = preface.world;
                     }
                 }
                 // What the summary lists is checked when it is read.

@@ -62,6 +62,9 @@ pub const SCENE: &str = "scene.toml";
 const METADATA: &str = "somatic";
 const TAXEL_IDS: &str = "taxels";
 const FRAMES_CHANNEL: &str = "frames_channel";
+/// The world that poses are in; without it, that of older versions, which had glTF's axes.
+const WORLD: &str = "world";
+const Z_UP: &str = "z up, x forward, y left";
 
 /// A time as MCAP has it, ns from 0; what is before 0 is at 0, and frames have theirs to the last bit.
 pub(crate) fn nanoseconds(t_s: f64) -> u64 {

@@ -12,9 +12,10 @@ use super::frames::FrameMessage;
 use super::head::Head;
 use super::records::{Parts, Record, Records, op};
 use super::summary::{Summary, Trust};
-use super::{FRAMES, nanoseconds};
+use super::{FRAMES, Z_UP, nanoseconds};
+use crate::body::{WORLD_FROM_BODY, WORLD_FROM_BODY_ROTATION};
 use crate::error::{Error, Result, failed};
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Frame, Pose, RawValue};
 
 /// A message as it lies in its chunk.
 pub(super) struct Message {
@@ -47,6 +48,10 @@ pub struct Reader {
     /// What is given for values that are stale, and whether any was so far.
     stale: RawValue,
     seen_stale: bool,
+    /// Whether its poses are in the world of older versions, whether there were any, and whether that was said.
+    is_y_up: bool,
+    seen_y_up: bool,
+    said_y_up: bool,
     account: Account,
 }
 
@@ -73,7 +78,15 @@ impl Reader {
             reader.channels.insert(id, Channel::of_frames());
         }
         let frames = reader.channels.values().find(|known| known.topic == FRAMES);
-        let taxels = frames.and_then(|frames| frames.taxels.clone()).or(head.taxels);
+        let (taxels, world) = match frames {
+            Some(Channel { taxels: Some(taxels), world, .. }) => (Some(taxels.clone()), world.clone()),
+            _ => (head.taxels, head.world),
+        };
+        if let Some(world) = world.as_ref().filter(|world| *world != Z_UP) {
+            let what = format!("its poses are in a world that this version does not know, `{world}`; update somatic");
+            return Err(Refusal::Wrong(what));
+        }
+        reader.is_y_up = world.is_none();
         reader.taxels = taxels.ok_or_else(|| {
             Refusal::Wrong(
                 "it holds no frames of touch, which `somatic run --sink mcap:FILE` and `somatic convert` write; a ROS 2 bag is \
@@ -125,6 +138,9 @@ impl Reader {
             ended: false,
             stale: RawValue::MISSING,
             seen_stale: false,
+            is_y_up: false,
+            seen_y_up: false,
+            said_y_up: false,
         };
         Ok((reader, head))
     }
@@ -208,6 +224,24 @@ impl Reader {
         self.seen_stale
     }
 
+    /// Whether it is of an older version, whose world had the axes of a body: y up. Its frames' poses are turned to z up; its
+    /// percepts are as they were.
+    #[must_use]
+    pub fn is_y_up(&self) -> bool {
+        self.is_y_up
+    }
+
+    /// What is to be said of the frames since the last call, a line each.
+    pub fn notices(&mut self) -> Vec<String> {
+        if self.said_y_up || !self.seen_y_up {
+            return Vec::new();
+        }
+        self.said_y_up = true;
+        let what =
+            "its poses are of an older version, whose world was y up: they are turned to z up, (x, y, z) to (z, x, y)";
+        vec![format!("{}: {what}", self.name)]
+    }
+
     /// How much of the file has been read, in 0..=1.
     #[must_use]
     pub fn progress(&self) -> f64 {
@@ -244,6 +278,10 @@ impl Reader {
         match &read {
             Some(read) => {
                 self.seen_stale |= read.has_stale();
+                if self.is_y_up && !frame.pose.is_empty() {
+                    frame.pose.iter_mut().for_each(|(_, pose)| *pose = turned_up(*pose));
+                    self.seen_y_up = true;
+                }
                 self.saw(frame.t_s);
             }
             None => self.damaged(message.data.len() as u64),
@@ -344,11 +382,76 @@ impl Reader {
     }
 }
 
+/// `pose`, which is in the axes of a body, in the world.
+fn turned_up(Pose { translation, rotation }: Pose) -> Pose {
+    Pose { translation: WORLD_FROM_BODY.transform_point3(translation), rotation: WORLD_FROM_BODY_ROTATION * rotation }
+}
+
 impl Refusal {
     fn at(self, path: &Path) -> Error {
         match self {
             Self::Io(e) => Error::io(path, &e),
             Self::Wrong(what) => Error::failed(what).at(path.display()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use glam::{DQuat, DVec3};
+    use mcap::records::MessageHeader;
+
+    use super::super::{METADATA, TAXEL_IDS, WORLD, frames, schemas};
+    use super::*;
+
+    /// A recording of two frames in which a link is posed, whose metadata say this world.
+    fn recording(world: Option<&str>) -> Vec<u8> {
+        let mut metadata = BTreeMap::from([(TAXEL_IDS.to_owned(), "4".to_owned())]);
+        metadata.extend(world.map(|world| (WORLD.to_owned(), world.to_owned())));
+        let options = mcap::WriteOptions::new().compression(None);
+        let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
+        writer
+            .write_metadata(&mcap::records::Metadata { name: METADATA.to_owned(), metadata: metadata.clone() })
+            .unwrap();
+        let schema = writer.add_schema("somatic.Frame", "protobuf", &schemas::somatic()).unwrap();
+        let channel_id = writer.add_channel(schema, FRAMES, "protobuf", &metadata).unwrap();
+        for index in 0..2 {
+            let pose = Pose { translation: DVec3::new(0.1, 0.2, 0.3), rotation: DQuat::IDENTITY };
+            let mut frame = Frame::missing(f64::from(index), 1);
+            frame.pose.push(("hand".to_owned(), pose));
+            let mut message = Vec::new();
+            frames::encode(&frame, &mut message);
+            let header = MessageHeader { channel_id, sequence: index, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, &message).unwrap();
+        }
+        writer.finish().unwrap();
+        writer.into_inner().into_inner()
+    }
+
+    #[test]
+    fn poses_of_an_older_recording_are_turned_and_that_is_said_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("old.mcap");
+        let read = |world: Option<&str>| {
+            std::fs::write(&path, recording(world)).unwrap();
+            let mut reader = Reader::open(&path)?;
+            let (mut frame, mut said, mut poses) = (Frame::default(), Vec::new(), Vec::new());
+            while reader.next_frame(&mut frame)? {
+                said.extend(reader.notices());
+                poses.push(frame.pose[0].1);
+            }
+            assert_eq!((poses.len(), poses[0]), (2, poses[1]));
+            Ok::<_, Error>((poses[0], said))
+        };
+        let (old, said) = read(None).unwrap();
+        assert_eq!(old.translation, DVec3::new(0.3, 0.1, 0.2));
+        assert_eq!(old.rotation * DVec3::Y, DVec3::Z);
+        assert!(said.len() == 1 && said[0].ends_with("they are turned to z up, (x, y, z) to (z, x, y)"), "{said:?}");
+        let (new, said) = read(Some(Z_UP)).unwrap();
+        assert_eq!((new.translation, said.len()), (DVec3::new(0.1, 0.2, 0.3), 0));
+        let why = read(Some("z down")).unwrap_err().to_string();
+        assert!(why.contains("old.mcap: its poses are in a world that this version does not know, `z down`"), "{why}");
     }
 }

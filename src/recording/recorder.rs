@@ -9,8 +9,8 @@ use mcap::records::MessageHeader;
 use mcap::write::{Metadata, NoSeek};
 
 use super::{
-    FIELDS, FRAMES, FRAMES_CHANNEL, LINKS, METADATA, PERCEPTS, SURFACE, TAXEL_IDS, TAXELS, TOUCHES, frames,
-    nanoseconds, schemas, words_of,
+    FIELDS, FRAMES, FRAMES_CHANNEL, LINKS, METADATA, PERCEPTS, SURFACE, TAXEL_IDS, TAXELS, TOUCHES, WORLD, Z_UP,
+    frames, nanoseconds, schemas, words_of,
 };
 use crate::error::{Error, Result, failed};
 use crate::output::{GrowingFile, OutputFile, OutputPath};
@@ -93,7 +93,11 @@ impl Recorder {
             worth_keeping: false,
         };
         // Outside of any chunk and before all else: what every frame's meaning hangs on.
-        let preface = [(TAXEL_IDS, recorder.taxels.clone()), (FRAMES_CHANNEL, FIRST_CHANNEL.to_string())];
+        let preface = [
+            (TAXEL_IDS, recorder.taxels.clone()),
+            (FRAMES_CHANNEL, FIRST_CHANNEL.to_string()),
+            (WORLD, Z_UP.to_owned()),
+        ];
         let metadata = preface.map(|(key, value)| (key.to_owned(), value)).into();
         recorder.with(|writer| writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata }))?;
         Ok(recorder)
@@ -164,7 +168,9 @@ impl Recorder {
             _ => unreachable!("a recording has no topic {topic}"),
         };
         let metadata = match topic {
-            FRAMES => BTreeMap::from([(TAXEL_IDS.to_owned(), self.taxels.clone())]),
+            FRAMES => {
+                BTreeMap::from([(TAXEL_IDS.to_owned(), self.taxels.clone()), (WORLD.to_owned(), Z_UP.to_owned())])
+            }
             PERCEPTS => self.units.clone(),
             _ => BTreeMap::new(),
         };

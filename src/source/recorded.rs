@@ -30,6 +30,10 @@ impl Source for Reader {
         Self::has_stale(self)
     }
 
+    fn notices(&mut self) -> Vec<String> {
+        Self::notices(self)
+    }
+
     fn losses(&self) -> Vec<String> {
         Self::losses(self)
     }

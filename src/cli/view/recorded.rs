@@ -5,11 +5,13 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Map, Value};
+use somatic::body::WORLD_FROM_BODY;
+use somatic::field::WORLD;
 use somatic::percept::Measure;
 use somatic::recording::Reader;
 use somatic::renamed::old_name;
 use somatic::sink::FieldNames;
-use somatic::{COLUMNS, Column, Percept, Percepts, Plan, Result};
+use somatic::{COLUMNS, Column, Outputs, Percept, Percepts, Plan, Result};
 
 use super::recording::Recording;
 
@@ -131,6 +133,7 @@ impl Recorded {
                 self.columns.extend(new);
             }
         }
+        let is_y_up = self.reader.is_y_up();
         let is_touched = |values: &&Map<String, Value>| values.get("contact") == Some(&Value::Bool(true));
         let mut found = Vec::new();
         for field in 0..percepts.fields() {
@@ -140,7 +143,7 @@ impl Recorded {
                 continue;
             }
             let columns = self.columns.iter().filter(|column| percepts.outputs().contains(column.output));
-            let different = columns.filter_map(|column| different(column, &percept, values));
+            let different = columns.filter_map(|column| different(column, &percept, values, is_y_up));
             let different: Vec<Different> = different.collect();
             if !different.is_empty() {
                 found.push((field, different));
@@ -155,12 +158,27 @@ fn recorded_of<'v>(column: &Column, values: &'v Map<String, Value>) -> Option<&'
     values.get(column.name).or_else(|| values.get(&old_name(column.name)?))
 }
 
-/// The recorded value of `column`, if it differs from that of `percept`.
-fn different(column: &Column, percept: &Percept, values: Option<&Map<String, Value>>) -> Option<Different> {
-    let recorded = values.and_then(|values| recorded_of(column, values)).and_then(|value| match value {
-        Value::Array(parts) => parts.iter().map(Value::as_f64).collect(),
-        one => one.as_f64().map(|one| vec![one]),
-    });
+/// The recorded value of `column`, if it differs from that of `percept`; `is_y_up` says that its world was.
+fn different(
+    column: &Column,
+    percept: &Percept,
+    values: Option<&Map<String, Value>>,
+    is_y_up: bool,
+) -> Option<Different> {
+    let mut recorded: Option<Vec<f64>> =
+        values.and_then(|values| recorded_of(column, values)).and_then(|value| match value {
+            Value::Array(parts) => parts.iter().map(Value::as_f64).collect(),
+            one => one.as_f64().map(|one| vec![one]),
+        });
+    let is_place = (Outputs::POSITION | Outputs::NORMAL).contains(column.output);
+    let is_of_world = values.is_some_and(|values| values.get("link").and_then(Value::as_str) == Some(WORLD));
+    if is_y_up
+        && is_place
+        && is_of_world
+        && let Some([x, y, z]) = recorded.as_deref()
+    {
+        recorded = Some(WORLD_FROM_BODY.transform_vector3([*x, *y, *z].into()).to_array().to_vec());
+    }
     let computed = percept.value(column).filter(|_| percept.contact);
     let same = match (&recorded, computed) {
         (None, None) => true,
