@@ -148,7 +148,7 @@ impl Viewer {
     /// The next frame, said to be drawn.
     pub(super) fn frame(&mut self) -> Vec<u8> {
         let frame = self.binary();
-        assert_eq!((frame[0], frame[1]), (2, 1));
+        assert_eq!((frame[0], frame[1]), (2, 2));
         say(&mut self.socket, &json!({"type": "drawn", "seq": u32_at(&frame, 4)}));
         frame
     }
@@ -171,7 +171,7 @@ fn a_page_gets_the_scene_and_then_every_frame_that_it_draws() {
     let mut run = Run::start(&["--outputs", "total,centroid,position,touches"]);
     let mut viewer = run.viewer();
     let mesh = viewer.binary();
-    assert_eq!((mesh[0], mesh[1]), (1, 1));
+    assert_eq!((mesh[0], mesh[1]), (1, 2));
     let [vertices, triangles, taxels, links] = [4, 8, 12, 16].map(|at| u32_at(&mesh, at) as usize);
     assert_eq!(mesh.len(), 20 + 28 * vertices + 12 * triangles + 40 * taxels + 28 * links);
     let welcome = viewer.text("welcome").unwrap().clone();

@@ -171,7 +171,7 @@ fn pressed_taxels_of_robots_are_in_the_world_where_pinocchio_and_yourdfpy_have_t
         let sensors: String = links.iter().zip(&points).enumerate().map(sensor).collect();
         let text = std::fs::read_to_string(original).unwrap();
         std::fs::write(&urdf, text.replace("</robot>", &format!("{sensors}</robot>"))).unwrap();
-        done(&["author", "--urdf-skin", text_of(&urdf), "--geometry", "none", "-o", text_of(&body)]);
+        done(&["author", "--urdf-skin", text_of(&urdf), "--geometry", "none", "--force", "-o", text_of(&body)]);
         let mut touches: Vec<(Vec<f64>, usize)> = Vec::new();
         let line = |index: usize| {
             let positions: Vec<f64> = joints.iter().map(|_| 6.0 * (random.unit() - 0.5)).collect();
