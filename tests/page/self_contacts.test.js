@@ -50,7 +50,7 @@ outputs = ["total", "position", "self_contacts"]
   assert.equal(closed.list.length, 1);
   assert.match(closed.panel, /left[^]*right[^]*1\.0 mm apart · 180°/);
   // In the world, as every other sink has it.
-  await page.waitForFunction(() => /67\.50,/.test(document.querySelector("#percept-values").innerText));
+  await page.waitForFunction(() => /, 67\.50/.test(document.querySelector("#percept-values").innerText));
   const moved = closed.rows.filter((value, i) => Math.abs(value - apart.rows[i]) > 1e-3).length;
   assert.ok(moved >= 2, `both fingers move, and ${moved} numbers of their poses do`);
   const [colour] = await coloursAt(page, [closed.corner]);
