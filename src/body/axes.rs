@@ -11,8 +11,6 @@ pub const WORLD_FROM_BODY: DAffine3 = DAffine3::from_cols(DVec3::Y, DVec3::Z, DV
 pub const WORLD_FROM_BODY_ROTATION: DQuat = DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5);
 /// The way back: (x, y, z) becomes (y, z, x).
 pub const BODY_FROM_WORLD: DAffine3 = DAffine3::from_cols(DVec3::Z, DVec3::X, DVec3::Y, DVec3::ZERO);
-/// Where bodies that older versions made from a URDF have its root: its x is their left.
-pub(crate) const WORLD_FROM_OLD_ROOT: DAffine3 = DAffine3::from_cols(DVec3::Y, DVec3::NEG_X, DVec3::Z, DVec3::ZERO);
 
 words! {"axis that points up",
     /// The axis that points up in the file of a mesh or robot.

@@ -32,7 +32,6 @@ mod taxel_table;
 mod topology;
 mod urdf_root;
 
-pub(crate) use axes::WORLD_FROM_OLD_ROOT;
 pub use axes::{BODY_FROM_WORLD, Up, WORLD_FROM_BODY, WORLD_FROM_BODY_ROTATION};
 pub use details::{Details, Mark, Paint, Part};
 pub use glb::{Glb, MeshData, Skinning};

@@ -1,9 +1,9 @@
 //! Which links of a body a URDF moves, and whether the two agree at rest.
 
-use glam::{DAffine3, DQuat};
+use glam::{DAffine3, DQuat, DVec3};
 
 use super::kinematics::Kinematics;
-use crate::body::{Body, Taxel, Up, WORLD_FROM_OLD_ROOT};
+use crate::body::{Body, Taxel, Up};
 use crate::error::{Error, Result, failed};
 use crate::signal::Pose;
 
@@ -11,6 +11,9 @@ use crate::signal::Pose;
 pub const MAX_REST_DISTANCE_M: f64 = 1e-3;
 /// How far they may have it turned against each other, rad.
 pub const MAX_REST_ANGLE_RAD: f64 = 0.01;
+
+/// Where bodies that older versions made from a URDF have its root: its x is their left.
+const WORLD_FROM_OLD_ROOT: DAffine3 = DAffine3::from_cols(DVec3::Y, DVec3::NEG_X, DVec3::Z, DVec3::ZERO);
 
 /// The links that a URDF and a body have in common, by name.
 #[derive(Clone, Debug)]
