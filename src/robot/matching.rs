@@ -176,8 +176,6 @@ fn rotation(pose: &DAffine3) -> DQuat {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
     use crate::body::Glb;
 
