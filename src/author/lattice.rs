@@ -18,9 +18,6 @@ const MAX_GRID_POINTS: f64 = 4e6;
 /// A walk longer than the shortest distance by this share is not the shortest path, and is dropped.
 const DETOUR_TOLERANCE: f64 = 1e-6;
 
-/// Minimum barycentric weight of the start, away from its triangle's edges, where directions are ambiguous.
-const EDGE_MARGIN: f64 = 1e-6;
-
 /// A grid as requested.
 pub(super) struct Lattice {
     pub(super) hexagonal: bool,
@@ -95,7 +92,7 @@ impl Lattice {
         let (area, sum) = sound.iter().map(weighted).fold((0.0, DVec3::ZERO), |(a, s), (b, t)| (a + b, s + t));
         let wanted = self.origin.unwrap_or(sum / area);
         let hit = index.nearest(wanted).ok_or_else(|| Error::failed("the surface has no area to lay a grid on"))?;
-        Ok(inward(SurfacePlace::in_triangle(topology, sound[hit.triangle], hit.position)))
+        Ok(SurfacePlace::in_triangle(topology, sound[hit.triangle], hit.position).inward())
     }
 
     /// The distances to all of the triangles `near`.
@@ -164,14 +161,6 @@ fn extent(map: &LogMap<'_>, near: &[u32]) -> f64 {
     let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let places = near.iter().flat_map(|&triangle| corners.map(|barycentric| SurfacePlace { triangle, barycentric }));
     places.map(|place| map.reach(&place).map_or(f64::INFINITY, |way| way.distance_m)).fold(0.0, f64::max)
-}
-
-/// `place` moved slightly off the edges of its triangle.
-pub(super) fn inward(place: SurfacePlace) -> SurfacePlace {
-    SurfacePlace {
-        barycentric: place.barycentric.map(|weight| weight * (1.0 - 3.0 * EDGE_MARGIN) + EDGE_MARGIN),
-        ..place
-    }
 }
 
 /// The end of a straight walk of `length` from `from` in `triangle`; at the surface's edge, an error with the length left.

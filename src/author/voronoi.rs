@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::lattice::{inward, walk};
+use super::lattice::walk;
 use super::placed::{COINCIDENT_M, Placed, points_on_same_side};
 use super::rest_surface::RestSurface;
 use crate::body::{NONE, PointTree, SurfaceIndex, Topology, area_vector, point_tree};
@@ -109,7 +109,7 @@ impl<'a> Sites<'a> {
         let near: Vec<f64> = distances.take(6).collect();
         let (&second, &sixth) = (near.get(1).or(near.first())?, near.last()?);
         let mut limit_m = (REACH_OF_SIXTH * sixth).min(REACH_OF_SECOND * second);
-        let start = Some(self.places[site]).filter(|place| place.triangle != NONE).map(inward)?;
+        let start = Some(self.places[site]).filter(|place| place.triangle != NONE)?.inward();
         for doubling in 0..=MAX_DOUBLINGS {
             let normal = area_vector(self.topology.corners(start.triangle)).normalize_or_zero();
             let u = normal.any_orthonormal_vector();

@@ -57,32 +57,39 @@ impl Topology {
     /// The topology of `triangles` over `positions`, in m.
     #[must_use]
     pub fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Self {
+        Self::of_groups(positions, triangles, &|_| 0)
+    }
+
+    /// The same, where only vertices of the same group are welded.
+    #[must_use]
+    pub(crate) fn of_groups(positions: &[DVec3], triangles: &[[u32; 3]], group_of: &dyn Fn(u32) -> u32) -> Self {
         let mut topology = Self::default();
-        topology.weld(positions);
+        topology.weld(positions, group_of);
         topology.take(triangles);
         topology.join();
         topology.divide();
         topology
     }
 
-    fn weld(&mut self, positions: &[DVec3]) {
+    fn weld(&mut self, positions: &[DVec3], group_of: &dyn Fn(u32) -> u32) {
         let largest = positions.iter().filter(|p| p.is_finite()).map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let within = (largest * WELD_TOLERANCE).max(f64::MIN_POSITIVE);
         // Cubes much larger than the tolerance, so that most points need only one.
         let side = 8.0 * within;
         let cube = |p: DVec3| (p / side).floor().to_array().map(|steps| steps as i64);
-        let mut known: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(positions.len());
-        for &p in positions {
+        let mut known: HashMap<(u32, [i64; 3]), Vec<u32>> = HashMap::with_capacity(positions.len());
+        for (&p, given) in positions.iter().zip(0..) {
             if !p.is_finite() {
                 self.welded.push(NONE);
                 continue;
             }
+            let group = group_of(given);
             let (low, high) = (cube(p - within), cube(p + within));
             let mut same: Option<u32> = None;
             for x in low[0]..=high[0] {
                 for y in low[1]..=high[1] {
                     for z in low[2]..=high[2] {
-                        let near = known.get(&[x, y, z]).into_iter().flatten().copied();
+                        let near = known.get(&(group, [x, y, z])).into_iter().flatten().copied();
                         let here = near.filter(|&v| (self.positions[v as usize] - p).abs().max_element() <= within);
                         same = same.into_iter().chain(here).min();
                     }
@@ -91,7 +98,7 @@ impl Topology {
             self.welded.push(same.unwrap_or_else(|| {
                 let vertex = self.positions.len() as u32;
                 self.positions.push(p);
-                known.entry(cube(p)).or_default().push(vertex);
+                known.entry((group, cube(p))).or_default().push(vertex);
                 vertex
             }));
         }

@@ -3,6 +3,7 @@
 //! [`FieldSet::new`] builds the fields that a body's file specifies: a parent gets the union of its descendants' taxels,
 //! every field an anchor, and a chart if it has one.
 
+mod cells;
 mod chart;
 mod distortion;
 pub mod geodesic;
@@ -13,8 +14,10 @@ mod rechart;
 mod rest_overlaps;
 mod set;
 mod surface_grid;
+mod surface_groups;
 mod unroll;
 
+pub(crate) use cells::{COINCIDENT_M, CellPoint, cell_areas};
 pub(crate) use chart::default_u;
 pub use chart::{Chart, NoChart};
 pub use distortion::Distortion;
@@ -24,4 +27,5 @@ pub(crate) use rechart::Recharted;
 pub use rest_overlaps::{ContactTolerance, RestOverlap, rest_overlaps};
 pub use set::{Field, FieldSet, Member, WORLD, unions};
 pub use surface_grid::Lift;
+pub(crate) use surface_groups::surface_groups;
 pub use unroll::Unroller;

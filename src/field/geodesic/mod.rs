@@ -5,15 +5,19 @@
 //! lines reach through one sequence of triangles. Paths bend only at vertices with more than a full turn of surface around
 //! them, and at the surface's edge; new windows start there.
 
+mod along_edges;
 mod log_map;
 mod place;
 mod queue;
 mod source;
+mod waves;
 
 pub(crate) use log_map::{FIRST_LIMIT, MAX_WINDOWS};
 pub use log_map::{LogMap, Reached, Rival};
 pub use place::SurfacePlace;
 pub(crate) use place::barycentric;
+pub(in crate::field) use source::Start;
+pub(in crate::field) use waves::Waves;
 
 #[cfg(test)]
 mod tests;

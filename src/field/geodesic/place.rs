@@ -4,6 +4,9 @@ use glam::DVec3;
 
 use crate::body::Topology;
 
+/// Barycentric weight that keeps a start away from its triangle's edges, where directions are ambiguous.
+const EDGE_MARGIN: f64 = 1e-6;
+
 /// A point of a [`Topology`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePlace {
@@ -18,6 +21,13 @@ impl SurfacePlace {
     #[must_use]
     pub fn in_triangle(topology: &Topology, triangle: u32, p: DVec3) -> Self {
         Self { triangle, barycentric: barycentric(topology.corners(triangle), p) }
+    }
+
+    /// It moved slightly off the edges of its triangle.
+    #[must_use]
+    pub(crate) fn inward(self) -> Self {
+        let barycentric = self.barycentric.map(|weight| weight * (1.0 - 3.0 * EDGE_MARGIN) + EDGE_MARGIN);
+        Self { barycentric, ..self }
     }
 
     /// Its position, m.

@@ -15,6 +15,8 @@ const CORNER_WEIGHT: f64 = 1.0 - 1e-9;
 pub(super) struct Source {
     /// Length of the path to here, m; 0 at the start.
     pub(super) distance_m: f64,
+    /// The start that the path comes from.
+    pub(super) start: u32,
     /// Initial direction of the path to here, before scaling to a full turn, rad.
     pub(super) angle_rad: f64,
     /// The largest bend of the path before here, rad.
@@ -38,9 +40,9 @@ impl Source {
 
 /// A triangle at a source, unfolded with the source at the origin.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wedge {
-    pub(super) triangle: u32,
-    pub(super) corners: [DVec2; 3],
+pub(in crate::field) struct Wedge {
+    pub(in crate::field) triangle: u32,
+    pub(in crate::field) corners: [DVec2; 3],
     /// The angle of the x-axis, rad.
     pub(super) base_rad: f64,
     /// The source's corner, if the source is a vertex.
@@ -48,11 +50,11 @@ pub(super) struct Wedge {
 }
 
 /// The start point: its tangent frame, and the map from angles on the surface to the tangent plane.
-pub(super) struct Start {
+pub(in crate::field) struct Start {
     pub(super) position: DVec3,
     pub(super) u: DVec3,
     pub(super) normal: DVec3,
-    pub(super) wedges: Vec<Wedge>,
+    pub(in crate::field) wedges: Vec<Wedge>,
     /// The angle on the surface of +u.
     pub(super) zero_rad: f64,
     /// Factor that scales angles on the surface to a full turn.
@@ -63,7 +65,7 @@ pub(super) struct Start {
 
 impl Start {
     /// The start at `place`, with +u along the tangential part of `u`.
-    pub(super) fn new(topology: &Topology, place: SurfacePlace, u: DVec3) -> Self {
+    pub(in crate::field) fn new(topology: &Topology, place: SurfacePlace, u: DVec3) -> Self {
         match (0..3).find(|&corner| place.barycentric[corner] >= CORNER_WEIGHT) {
             Some(corner) => Self::at_vertex(topology, 3 * place.triangle + corner as u32, u),
             None => Self::inside(topology, place, u),

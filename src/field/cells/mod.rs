@@ -1,0 +1,369 @@
+//! Cells: the part of a surface that is nearer to a point than to other points, by shortest paths along the surface.
+//!
+//! Windows run from all points at once, so that each ends soon beyond its own cell. In each triangle that several points
+//! reach, their distances to its corners give the borders (`polygon.rs`). Long edges are cut beforehand (`refine.rs`).
+
+mod polygon;
+mod refine;
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use self::polygon::{Candidate, Side, nearest_part, share, squared_at};
+use self::refine::refine;
+use super::geodesic::{Start, SurfacePlace, Waves};
+use crate::body::{NONE, PointTree, SurfaceIndex, Topology, area_vector, point_tree};
+
+/// Points nearer to each other than this share a cell, m.
+pub(crate) const COINCIDENT_M: f64 = 1e-6;
+
+/// Edges are cut that are longer than this share of the distance from the nearest point to its own nearest.
+const EDGE_SHARE: f64 = 0.7;
+
+/// The largest number of triangles after cutting: per triangle before, and per point.
+const CUTS_PER_TRIANGLE: usize = 4;
+const CUTS_PER_POINT: usize = 60;
+
+/// Number of windows at which a surface counts as too rough: in all, per triangle, and where there are few of these.
+const MAX_WINDOWS: usize = 40_000_000;
+const WINDOWS_PER_TRIANGLE: usize = 200;
+const MIN_WINDOWS: usize = 500_000;
+
+/// Polygons with less of a triangle than this are rounding errors.
+const MIN_SHARE: f64 = 1e-12;
+
+/// cos 90° with a tolerance for rounding: the two faces at a box's edge are on one side, those of a sharper edge are not.
+const MIN_NORMAL_COSINE: f64 = -1e-9;
+
+/// A point on a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CellPoint {
+    /// Its position, m.
+    pub(crate) position: DVec3,
+    /// Outward unit normal.
+    pub(crate) normal: DVec3,
+    /// Index of its triangle.
+    pub(crate) triangle: usize,
+}
+
+/// Per point the area of its cell on `triangles` over `positions`, m²; points at one place share theirs. Together they have the
+/// surface's area: pieces without a point belong to the nearest on their side, in a straight line. Vertices of different
+/// groups are never connected.
+pub(crate) fn cell_areas(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    group_of: &dyn Fn(u32) -> u32,
+    points: &[CellPoint],
+) -> Vec<f64> {
+    let topology = Topology::of_groups(positions, triangles, group_of);
+    let mut sound = vec![NONE; triangles.len()];
+    (0..).zip(&topology.given).for_each(|(index, &given)| sound[given as usize] = index);
+    let mut index = None;
+    let mut place = |point: &CellPoint| {
+        let triangle = match sound[point.triangle] {
+            // It is degenerate, or a duplicate.
+            NONE => {
+                let all = || (0..topology.triangles.len() as u32).map(|triangle| topology.corners(triangle));
+                let index = index.get_or_insert_with(|| SurfaceIndex::of_triangles(all()));
+                index.nearest(point.position)?.triangle as u32
+            }
+            triangle => triangle,
+        };
+        Some(SurfacePlace::in_triangle(&topology, triangle, point.position))
+    };
+    let places: Option<Vec<SurfacePlace>> = points.iter().map(&mut place).collect();
+    let Some(Cells { mut areas, first, mut pieces, .. }) = places.map(|places| Cells::new(&topology, &places)) else {
+        return vec![0.0; points.len()];
+    };
+    let left_out = (0..triangles.len()).filter(|&triangle| sound[triangle] == NONE);
+    let corners = |triangle: usize| triangles[triangle].map(|v| positions.get(v as usize).copied());
+    let corners = left_out.filter_map(|triangle| match corners(triangle) {
+        [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+        _ => None,
+    });
+    pieces.extend(corners.map(Piece::of).filter(|piece| piece.area > 0.0));
+    give_away(&pieces, points, |owner, area| areas[first[owner] as usize] += area);
+    let mut sharing = vec![0_u32; points.len()];
+    first.iter().for_each(|&first| sharing[first as usize] += 1);
+    first.iter().map(|&first| areas[first as usize] / f64::from(sharing[first as usize])).collect()
+}
+
+/// Gives each piece to the nearest of `points` that is on its side, else to the nearest.
+fn give_away(pieces: &[Piece], points: &[CellPoint], mut give: impl FnMut(usize, f64)) {
+    if pieces.is_empty() {
+        return;
+    }
+    let tree = point_tree(points.iter().map(|point| point.position));
+    for piece in pieces {
+        let nearest = || tree.nearest_neighbor_iter(piece.middle.to_array()).map(|spot| spot.data);
+        let facing = nearest().find(|&point| points[point].normal.dot(piece.normal) > MIN_NORMAL_COSINE);
+        if let Some(owner) = facing.or_else(|| nearest().next()) {
+            give(owner, piece.area);
+        }
+    }
+}
+
+/// A triangle in nobody's cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    middle: DVec3,
+    normal: DVec3,
+    area: f64,
+}
+
+impl Piece {
+    fn of(corners: [DVec3; 3]) -> Self {
+        let spanned = area_vector(corners);
+        let [a, b, c] = corners;
+        Self { middle: (a + b + c) / 3.0, normal: spanned.normalize_or_zero(), area: spanned.length() / 2.0 }
+    }
+}
+
+/// What two cells share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Border {
+    /// Its length, m.
+    pub(crate) length_m: f64,
+    /// The length of the shortest path from point to point over it, m.
+    pub(crate) path_m: f64,
+}
+
+/// The cells of points.
+pub(crate) struct Cells {
+    /// Per point, m²; points at one place have the same cell.
+    pub(crate) areas: Vec<f64>,
+    /// Per point the first one at its place, which its borders are listed for.
+    pub(crate) first: Vec<u32>,
+    /// By the two points, the lower first.
+    pub(crate) borders: BTreeMap<(u32, u32), Border>,
+    /// The parts of the surface that no path leads to from any point.
+    pub(crate) pieces: Vec<Piece>,
+}
+
+impl Cells {
+    /// The cells of `places` on `topology`. On a surface that is too rough nothing is in a cell.
+    pub(crate) fn new(topology: &Topology, places: &[SurfacePlace]) -> Self {
+        let positions: Vec<DVec3> = places.iter().map(|place| place.position(topology)).collect();
+        let first = first_of_place(topology, places, &positions);
+        let is_first = |&point: &usize| first[point] as usize == point;
+        let starts: Vec<usize> = (0..places.len()).filter(is_first).collect();
+        let mut cells = Self { areas: vec![0.0; places.len()], first, borders: BTreeMap::new(), pieces: Vec::new() };
+        let spacing = Spacing::of(starts.iter().map(|&start| positions[start]).collect());
+        let most = CUTS_PER_TRIANGLE * topology.triangles.len() + CUTS_PER_POINT * starts.len();
+        let refined = refine(topology, EDGE_SHARE * spacing.least_m, |p| spacing.edge_at(p), most);
+        match refined {
+            None => cells.divide(topology, starts.iter().map(|&start| (start, places[start])).collect()),
+            Some(refined) => {
+                let cut = Topology::new(&refined.positions, &refined.triangles);
+                let mut parts: Vec<Vec<u32>> = vec![Vec::new(); topology.triangles.len()];
+                for (part, &given) in (0..).zip(&cut.given) {
+                    parts[refined.parent[given as usize] as usize].push(part);
+                }
+                let within = |start: usize| {
+                    let (place, at) = (places[start], positions[start]);
+                    let depth = |&&part: &&u32| depth(cut.corners(part), at);
+                    let parts = parts[place.triangle as usize].iter();
+                    let part = parts.max_by(|a, b| depth(a).total_cmp(&depth(b)));
+                    part.map(|&part| (start, SurfacePlace::in_triangle(&cut, part, at)))
+                };
+                cells.divide(&cut, starts.iter().filter_map(|&start| within(start)).collect());
+            }
+        }
+        for point in 0..places.len() {
+            cells.areas[point] = cells.areas[cells.first[point] as usize];
+        }
+        cells
+    }
+
+    /// Divides `topology` among `starts`: points, each with its place.
+    fn divide(&mut self, topology: &Topology, starts: Vec<(usize, SurfacePlace)>) {
+        let most = (WINDOWS_PER_TRIANGLE * topology.triangles.len()).clamp(MIN_WINDOWS, MAX_WINDOWS);
+        let mut waves = Waves::extending(topology, f64::INFINITY, most);
+        let mut is_reached = vec![false; topology.parts()];
+        // By triangle: the points in it, with the distances to its corners.
+        let mut within: Vec<(u32, Candidate)> = Vec::new();
+        for (point, place) in starts {
+            let start = Start::new(topology, place.inward(), DVec3::X);
+            for wedge in &start.wedges {
+                let squared = wedge.corners.map(|corner| corner.length_squared());
+                within.push((wedge.triangle, Candidate { site: point as u32, squared }));
+            }
+            is_reached[topology.part[place.triangle as usize] as usize] = true;
+            waves.add(&start, point as u32);
+        }
+        within.sort_by_key(|(triangle, candidate)| (*triangle, candidate.site));
+        if !waves.run() {
+            is_reached.fill(false);
+        }
+        // Per edge the point that all of it belongs to on this side, if it is no border yet.
+        let mut owner = vec![NONE; topology.across.len()];
+        let (mut candidates, mut polygon, mut spare) = (Vec::new(), Vec::new(), Vec::new());
+        let mut from = 0;
+        for triangle in 0..topology.triangles.len() as u32 {
+            if !is_reached[topology.part[triangle as usize] as usize] {
+                self.pieces.push(Piece::of(topology.corners(triangle)));
+                continue;
+            }
+            from += within[from..].iter().take_while(|(other, _)| *other < triangle).count();
+            let own = within[from..].iter().take_while(|(other, _)| *other == triangle);
+            candidates.clear();
+            candidates.extend(own.map(|(_, candidate)| *candidate));
+            reaching(&waves, triangle, &mut candidates);
+            let corners = topology.corners(triangle);
+            let area = area_vector(corners).length() / 2.0;
+            if candidates.is_empty() {
+                // Rounding hides it, as between needles.
+                self.pieces.push(Piece::of(corners));
+                continue;
+            }
+            if let [candidate] = candidates[..] {
+                self.areas[candidate.site as usize] += area;
+                (0..3).for_each(|side| owner[3 * triangle as usize + side] = candidate.site);
+                continue;
+            }
+            for own in &candidates {
+                nearest_part(own, &candidates, &mut polygon, &mut spare);
+                let share = share(&polygon);
+                if share > MIN_SHARE {
+                    self.areas[own.site as usize] += share * area;
+                    self.take_borders(own, corners, &polygon);
+                    for (index, side) in polygon.iter().enumerate().filter(|(_, side)| side.beyond.is_none()) {
+                        if let Some(edge) = whole_side(side.from, polygon[(index + 1) % polygon.len()].from) {
+                            owner[3 * triangle as usize + edge] = own.site;
+                        }
+                    }
+                }
+            }
+        }
+        self.take_borders_along_edges(&waves, &owner);
+    }
+
+    /// Takes the borders that are edges of the surface.
+    fn take_borders_along_edges(&mut self, waves: &Waves<'_>, owner: &[u32]) {
+        let topology = waves.topology;
+        for (edge, &beyond) in (0..).zip(&topology.across) {
+            if beyond == NONE || edge > beyond {
+                continue;
+            }
+            let [a, b] = [edge, beyond].map(|edge| owner[edge as usize]);
+            if a == b || a == NONE || b == NONE {
+                continue;
+            }
+            let (from, to) = topology.ends(edge);
+            let [p, q] = [from, to].map(|vertex| topology.positions[vertex as usize]);
+            let nearest_m = [from, to].map(|vertex| waves.arrivals[vertex as usize].distance_m);
+            self.add_border((a.min(b), a.max(b)), p.distance(q), 2.0 * nearest_m[0].min(nearest_m[1]));
+        }
+    }
+
+    fn add_border(&mut self, pair: (u32, u32), length_m: f64, path_m: f64) {
+        let border = self.borders.entry(pair).or_insert(Border { length_m: 0.0, path_m: f64::INFINITY });
+        border.length_m += length_m;
+        border.path_m = border.path_m.min(path_m);
+    }
+
+    /// Takes the borders of the cell of `own` in a triangle, of which it has `polygon`.
+    fn take_borders(&mut self, own: &Candidate, corners: [DVec3; 3], polygon: &[Side]) {
+        let [a, b, c] = corners;
+        let sides = DVec3::new(b.distance_squared(c), c.distance_squared(a), a.distance_squared(b));
+        let at = |weights: DVec3| a * weights.x + b * weights.y + c * weights.z;
+        for (index, side) in polygon.iter().enumerate() {
+            let Some(beyond) = side.beyond.filter(|&beyond| beyond > own.site) else { continue };
+            let end = polygon[(index + 1) % polygon.len()].from;
+            let length_m = at(side.from).distance(at(end));
+            let ends = [0.0, 0.5, 1.0].map(|t| squared_at(own, sides, side.from.lerp(end, t)));
+            let path_m = 2.0 * least_of_parabola(ends).max(0.0).sqrt();
+            self.add_border((own.site, beyond), length_m, path_m);
+        }
+    }
+}
+
+/// The side of the triangle that runs from corner to corner between these places, if it is one.
+fn whole_side(from: DVec3, to: DVec3) -> Option<usize> {
+    (0..3).find(|&side| from == DVec3::AXES[side] && to == DVec3::AXES[(side + 1) % 3])
+}
+
+/// The least value between the ends of a parabola that is `start` at 0, `middle` at 0.5 and `end` at 1.
+fn least_of_parabola([start, middle, end]: [f64; 3]) -> f64 {
+    let square = 2.0 * (start + end) - 4.0 * middle;
+    let slope = end - start - square;
+    let lowest = -slope / (2.0 * square);
+    let inside = if square > 0.0 && lowest > 0.0 && lowest < 1.0 { start + slope * lowest / 2.0 } else { start };
+    inside.min(start).min(end)
+}
+
+/// Adds to `candidates` the points that paths into `triangle` come from; each point once, with its least distances.
+fn reaching(waves: &Waves<'_>, triangle: u32, candidates: &mut Vec<Candidate>) {
+    let mut add = |site: u32, squared: [f64; 3]| match candidates.iter_mut().find(|known| known.site == site) {
+        Some(known) => (0..3).for_each(|corner| known.squared[corner] = known.squared[corner].min(squared[corner])),
+        None => candidates.push(Candidate { site, squared }),
+    };
+    for window in waves.entering(triangle) {
+        let first = window.edge as usize % 3;
+        let unfolded = waves.unfolded(window);
+        let length = |corner: usize| waves.extended_length(window, unfolded[(corner + 3 - first) % 3]);
+        add(waves.start_of(window), [0, 1, 2].map(|corner| length(corner).powi(2)));
+    }
+    let topology = waves.topology;
+    let corners = topology.corners(triangle);
+    for (vertex, here) in topology.triangles[triangle as usize].into_iter().zip(corners) {
+        let arrival = &waves.arrivals[vertex as usize];
+        if arrival.start != NONE {
+            add(arrival.start, corners.map(|corner| (arrival.distance_m + corner.distance(here)).powi(2)));
+        }
+    }
+}
+
+/// Per place the first one at the same point of the same part of the surface.
+fn first_of_place(topology: &Topology, places: &[SurfacePlace], positions: &[DVec3]) -> Vec<u32> {
+    let tree = point_tree(positions.iter().copied());
+    let part = |place: usize| topology.part[places[place].triangle as usize];
+    let mut first: Vec<u32> = Vec::with_capacity(places.len());
+    for (index, at) in positions.iter().enumerate() {
+        let here = tree.locate_within_distance(at.to_array(), COINCIDENT_M * COINCIDENT_M).map(|spot| spot.data);
+        let other = here.filter(|&other| other < index && part(other) == part(index)).min();
+        first.push(other.map_or(index as u32, |other| first[other]));
+    }
+    first
+}
+
+/// How deep `p`, in the plane of the triangle, is within it: the least of its barycentric coordinates.
+fn depth([a, b, c]: [DVec3; 3], p: DVec3) -> f64 {
+    let normal = (b - a).cross(c - a);
+    let part = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from));
+    part(b, c).min(part(c, a)).min(part(a, b)) / normal.length_squared()
+}
+
+/// How far points are from each other.
+struct Spacing {
+    tree: PointTree,
+    positions: Vec<DVec3>,
+    /// Per point the distance to the nearest other, m.
+    nearest_m: Vec<f64>,
+    /// The least of them, m.
+    least_m: f64,
+}
+
+impl Spacing {
+    fn of(positions: Vec<DVec3>) -> Self {
+        let tree = point_tree(positions.iter().copied());
+        let nearest = |(index, at): (usize, &DVec3)| {
+            let mut others = tree.nearest_neighbor_iter_with_distance_2(at.to_array());
+            let other = others.find(|&(spot, squared)| spot.data != index && squared > COINCIDENT_M * COINCIDENT_M);
+            other.map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
+        };
+        let nearest_m: Vec<f64> = positions.iter().enumerate().map(nearest).collect();
+        let least_m = nearest_m.iter().copied().fold(f64::INFINITY, f64::min);
+        Self { tree, positions, nearest_m, least_m }
+    }
+
+    /// Maximum length of an edge around `p`, m.
+    fn edge_at(&self, p: DVec3) -> f64 {
+        let Some(nearest) = self.tree.nearest_neighbor(p.to_array()) else { return f64::INFINITY };
+        EDGE_SHARE * self.nearest_m[nearest.data].max(self.positions[nearest.data].distance(p))
+    }
+}
+
+#[cfg(test)]
+mod tests;
