@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::icub::{IcubFile, IcubTaxel};
-use super::skin::{Authored, PlaceReport};
+use super::skin::{Authored, PlaceReport, store_edges};
 use crate::body::{Glb, Original, Taxel};
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_TABLE_BYTES};
@@ -69,8 +69,9 @@ pub fn author_icub(files: &[impl AsRef<Path>]) -> Result<Authored> {
         notes.push("position files do not say how links stand to each other: they lie side by side".to_owned());
     }
     notes.push("areas are unknown without a surface: put them on a mesh by `icub` in a recipe to have them".to_owned());
-    let file = Original::from_bytes("icub.glb", &glb.to_bytes()?, None)?;
-    let (body, _) = file.read()?;
+    let mut file = Original::from_bytes("icub.glb", &glb.to_bytes()?, None)?;
+    let (mut body, _) = file.read()?;
+    store_edges(&mut file, &mut body, &mut notes);
     Ok(Authored { file, body, places, notes })
 }
 

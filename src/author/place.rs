@@ -5,11 +5,12 @@
 
 use glam::DVec3;
 
-use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side, report_progress, same_side};
+use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side, report_progress};
 use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack};
 use super::scatter::Pieces;
 use crate::body::point_tree;
 use crate::error::{Error, Result, failed};
+use crate::field::{CellPoint, cell_areas};
 
 /// Samples per point.
 const OVERSAMPLING: usize = 5;
@@ -42,6 +43,17 @@ pub fn place_evenly(
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<Vec<Placed>> {
+    Ok(with_cells(positions, triangles, evenly(positions, triangles, count, seed, progress)?))
+}
+
+/// As [`place_evenly`], without areas.
+pub(super) fn evenly(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    count: usize,
+    seed: u64,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
     check_count(count)?;
     let pieces = Pieces::whole(positions, triangles)?;
     let samples = pieces.scatter(OVERSAMPLING * count, seed);
@@ -49,7 +61,7 @@ pub fn place_evenly(
     eliminate(&samples, &reaches, count, progress)
 }
 
-/// As [`place_evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
+/// As [`evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
 pub(super) fn evenly_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -58,16 +70,16 @@ pub(super) fn evenly_apart(
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<std::result::Result<Vec<Placed>, usize>> {
-    let placed = place_evenly(positions, triangles, count, seed, progress)?;
+    let placed = evenly(positions, triangles, count, seed, progress)?;
     let points: Vec<SurfacePoint> = placed.iter().map(|placed| placed.point).collect();
     if nearest_on_its_side(&points).into_iter().flatten().all(|distance| distance >= spacing_m) {
         return Ok(Ok(placed));
     }
-    let packed = place_apart(positions, triangles, spacing_m, seed, progress)?;
+    let packed = apart(positions, triangles, spacing_m, seed, progress)?;
     if packed.len() < count {
         return Ok(Err(packed.len()));
     }
-    let area: f64 = packed.iter().map(|placed| placed.point.area).sum();
+    let area = Pieces::whole(positions, triangles)?.weight();
     let reaches = vec![(2.0 * widest_radius(area, count)).max(2.0 * spacing_m); packed.len()];
     eliminate(&packed, &reaches, count, progress).map(Ok)
 }
@@ -80,6 +92,18 @@ pub(super) fn evenly_apart(
 /// # Errors
 /// As [`place_evenly`]; or `density` is negative or not finite somewhere, or 0 everywhere.
 pub fn place_by_density(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    count: usize,
+    seed: u64,
+    density: impl Fn(&Placed) -> f64,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
+    Ok(with_cells(positions, triangles, by_density(positions, triangles, count, seed, density, progress)?))
+}
+
+/// As [`place_by_density`], without areas.
+pub(super) fn by_density(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     count: usize,
@@ -116,6 +140,17 @@ pub fn place_apart(
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<Vec<Placed>> {
+    Ok(with_cells(positions, triangles, apart(positions, triangles, spacing_m, seed, progress)?))
+}
+
+/// As [`place_apart`], without areas.
+pub(super) fn apart(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    spacing_m: f64,
+    seed: u64,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
     if !(spacing_m.is_finite() && spacing_m > 0.0) {
         return Err(failed!("taxels cannot lie {spacing_m} m apart; give a spacing over 0"));
     }
@@ -132,7 +167,7 @@ pub fn place_apart(
     let crowd = SampleNeighbours::new(&samples, &reaches, |_, _| ());
     report_progress(progress, 0.5)?;
     let kept = pack(&crowd, samples.len(), &mut |share| progress(0.5 + 0.5 * share))?;
-    Ok(share_area(&samples, &kept, &crowd))
+    Ok(those(&samples, &kept))
 }
 
 fn check_count(count: usize) -> Result<()> {
@@ -145,7 +180,7 @@ fn check_count(count: usize) -> Result<()> {
     Ok(())
 }
 
-/// Eliminates all but `count` samples; each gets its share of the area.
+/// Eliminates all but `count` samples.
 fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Progress<'_>) -> Result<Vec<Placed>> {
     let ratio = count as f64 / samples.len() as f64;
     // Distances far below the final spacing all get the same weight.
@@ -158,39 +193,21 @@ fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Prog
     });
     report_progress(progress, 0.5)?;
     let kept = eliminate_crowded(&crowd, samples.len(), count, &mut |share| progress(0.5 + 0.5 * share))?;
-    Ok(share_area(samples, &kept, &crowd))
+    Ok(those(samples, &kept))
 }
 
-/// The kept samples, each with the area of the samples nearest to it on its side.
-fn share_area<T: Copy + Send>(samples: &[Placed], kept: &[usize], crowd: &SampleNeighbours<T>) -> Vec<Placed> {
-    const GONE: u32 = u32::MAX;
-    let mut place_of = vec![GONE; samples.len()];
-    for (place, &sample) in kept.iter().enumerate() {
-        place_of[sample] = place as u32;
-    }
-    let mut placed: Vec<Placed> = kept.iter().map(|&sample| samples[sample]).collect();
-    placed.iter_mut().for_each(|placed| placed.point.area = 0.0);
-    let mut tree = None;
-    for (index, sample) in samples.iter().enumerate() {
-        let here = sample.point.position;
-        let beside = || crowd.of(index).iter().map(|&(j, _)| j as usize).filter(|&j| place_of[j] != GONE);
-        let distance = |j: &usize| here.distance_squared(samples[*j].point.position);
-        let own = match place_of[index] {
-            GONE => beside().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|j| place_of[j] as usize),
-            own => Some(own as usize),
-        };
-        let owner = own.or_else(|| {
-            // No kept sample is within reach.
-            let tree = tree.get_or_insert_with(|| point_tree(kept.iter().map(|&j| samples[j].point.position)));
-            let mut nearest = tree.nearest_neighbor_iter(here.to_array()).map(|spot| spot.data);
-            let own = nearest.find(|&k| same_side(sample, &samples[kept[k]]));
-            // If no kept sample is on the same side, the nearest one gets the area.
-            own.or_else(|| tree.nearest_neighbor(here.to_array()).map(|spot| spot.data))
-        });
-        if let Some(owner) = owner {
-            placed[owner].point.area += sample.point.area;
-        }
-    }
+/// The samples `kept`, without areas.
+fn those(samples: &[Placed], kept: &[usize]) -> Vec<Placed> {
+    let bare =
+        |&sample: &usize| Placed { point: SurfacePoint { area: 0.0, ..samples[sample].point }, ..samples[sample] };
+    kept.iter().map(bare).collect()
+}
+
+/// `placed`, each with the area of its cell, if it is one surface.
+fn with_cells(positions: &[DVec3], triangles: &[[u32; 3]], mut placed: Vec<Placed>) -> Vec<Placed> {
+    let points: Vec<CellPoint> = placed.iter().map(Placed::cell_point).collect();
+    let areas = cell_areas(positions, triangles, &|_| 0, &points);
+    placed.iter_mut().zip(areas).for_each(|(placed, area)| placed.point.area = area);
     placed
 }
 
@@ -208,6 +225,7 @@ pub(super) fn nearest_on_its_side(points: &[SurfacePoint]) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::author::placed::same_side;
 
     /// A sheet of 1 m × 1 m in the xy plane, of 2·n² triangles; with `back`, a second sheet 1 mm behind, facing away.
     fn sheet(n: u32, back: bool) -> (Vec<DVec3>, Vec<[u32; 3]>) {

@@ -3,12 +3,13 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::field::CellPoint;
 
 /// cos 90° with a tolerance for rounding: the two faces at a box's edge are neighbours, those of a sharper edge are not.
 const MIN_NORMAL_COSINE: f64 = -1e-9;
 
 /// Taxels nearer to each other than this are coincident, m.
-pub(super) const COINCIDENT_M: f64 = 1e-6;
+pub(super) const COINCIDENT_M: f64 = crate::field::COINCIDENT_M;
 
 /// A point on a surface, in the coordinates of its mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +18,7 @@ pub struct SurfacePoint {
     pub position: DVec3,
     /// Outward unit normal.
     pub normal: DVec3,
-    /// The surface nearer to it than to other points, m².
+    /// The area of its cell: the surface nearer to it than to other points, by paths along the surface, m².
     pub area: f64,
 }
 
@@ -30,6 +31,13 @@ pub struct Placed {
     pub triangle: usize,
     /// Weights of the triangle's three corners, summing to 1.
     pub barycentric: [f64; 3],
+}
+
+impl Placed {
+    pub(super) fn cell_point(&self) -> CellPoint {
+        let SurfacePoint { position, normal, .. } = self.point;
+        CellPoint { position, normal, triangle: self.triangle }
+    }
 }
 
 /// Whether two samples are on the same side of a part: normals over 90° apart belong to two sides of a thin part.

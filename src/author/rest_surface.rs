@@ -9,6 +9,7 @@ use super::placed::Placed;
 use super::skin_weights::{blend_skinning, heaviest_four};
 use crate::body::{Body, Details, Home, Modality, Paint, Skinning, Taxel, Topology, area_vector};
 use crate::error::{Result, failed, suggestion};
+use crate::field::surface_groups;
 
 /// All surfaces of a body as one mesh.
 pub(super) struct RestSurface<'a> {
@@ -24,6 +25,8 @@ pub(super) struct RestSurface<'a> {
     pub(super) link: Vec<u32>,
     /// Per part its first vertex.
     first_vertex: Vec<u32>,
+    /// Per part the group of surfaces that it is in.
+    group: Vec<u32>,
     /// Per part the four joints with the largest weights for each vertex.
     skinning: Vec<Option<Skinning>>,
     topology: OnceCell<Topology>,
@@ -48,6 +51,7 @@ impl<'a> RestSurface<'a> {
             origin: Vec::new(),
             link: Vec::new(),
             first_vertex: Vec::new(),
+            group: surface_groups(body),
             skinning: Vec::new(),
             topology: OnceCell::new(),
         };
@@ -95,6 +99,12 @@ impl<'a> RestSurface<'a> {
             self.link.push(link as u32);
         }
         self.skinning.push(skinning);
+    }
+
+    /// The group of surfaces that `vertex` is in; only those of one group are connected where they touch.
+    pub(super) fn group_of(&self, vertex: u32) -> u32 {
+        let part = self.first_vertex.partition_point(|&first| first <= vertex) - 1;
+        self.group[part]
     }
 
     pub(super) fn topology(&self) -> &Topology {

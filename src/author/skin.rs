@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::group::{FilePaint, Grouper, Grouping, group_while};
 use super::lattice::Lattice;
 use super::origin::Origin;
-use super::place::{evenly_apart, nearest_on_its_side, place_apart, place_by_density, place_evenly};
+use super::place::{apart, by_density, evenly, evenly_apart, nearest_on_its_side};
 use super::placed::{Placed, Progress, SurfacePoint, report_progress};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{PlaceSpec, Placement, Recipe, shown};
@@ -16,7 +16,7 @@ use super::region::Regions;
 use super::rest_surface::{MeshTaxel, RestSurface};
 use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel, listed};
 use crate::error::{Error, Result, failed};
-use crate::field::unions;
+use crate::field::{CellPoint, TaxelGraph, cell_areas, unions};
 
 /// Progress before and after placing taxels, and when they are in fields.
 const PROGRESS_OPENED: f64 = 0.05;
@@ -103,6 +103,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     }
     let keeps_fields = asks_nothing && !body.fields.is_empty();
     if keeps_fields {
+        store_edges(&mut file, &mut body, &mut notes);
         return Ok(Authored { file, body, places: Vec::new(), notes });
     }
     let rest_surface = RestSurface::new(&body, &details);
@@ -157,8 +158,21 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     notes.extend(without_field(&body, &fields));
     add_fields(&mut file, &body, &details, &fields);
     report_progress(&mut go_on, PROGRESS_GROUPED)?;
-    let (body, _) = file.read()?;
+    let (mut body, _) = file.read()?;
+    store_edges(&mut file, &mut body, &mut notes);
     Ok(Authored { file, body, places: reports, notes })
+}
+
+/// Writes the edges between the taxels of `body`, which is in `file`, unless the file has current ones.
+pub(super) fn store_edges(file: &mut Original, body: &mut Body, notes: &mut Vec<String>) {
+    if body.taxels.is_empty() {
+        return;
+    }
+    let (graph, note) = TaxelGraph::of(body);
+    notes.extend(note);
+    let edges = graph.to_stored(body);
+    file.set_edges(&edges);
+    body.edges = Some(edges);
 }
 
 fn place_taxels(
@@ -172,14 +186,15 @@ fn place_taxels(
     let chosen: Vec<usize> = (0..region.len()).filter(|&triangle| region[triangle]).collect();
     let triangles: Vec<[u32; 3]> = chosen.iter().map(|&triangle| rest_surface.triangles[triangle]).collect();
     let positions = &rest_surface.positions;
-    let sampled = |placed: Vec<Placed>| {
+    let sampled = |mut placed: Vec<Placed>| {
+        let points: Vec<CellPoint> = placed.iter().map(Placed::cell_point).collect();
+        let areas = cell_areas(positions, &triangles, &|vertex| rest_surface.group_of(vertex), &points);
+        placed.iter_mut().zip(areas).for_each(|(placed, area)| placed.point.area = area);
         let onto_canvas = |p: Placed| Placed { triangle: chosen[p.triangle], ..p };
         placed.into_iter().map(|p| Snapped { placed: onto_canvas(p), id: None, moved_m: 0.0 }).collect()
     };
     Ok(match &place.how {
-        Placement::Evenly { count, apart_m: None } => {
-            sampled(place_evenly(positions, &triangles, *count, seed, progress)?)
-        }
+        Placement::Evenly { count, apart_m: None } => sampled(evenly(positions, &triangles, *count, seed, progress)?),
         Placement::Evenly { count, apart_m: Some(apart_m) } => {
             let area: f64 = chosen.iter().map(|&triangle| rest_surface.area(triangle)).sum();
             let wrong = |most: String| {
@@ -201,7 +216,7 @@ fn place_taxels(
         }
         Placement::Apart { spacing_m } => {
             check_fits(rest_surface, &chosen, "spacing", *spacing_m)?;
-            sampled(place_apart(positions, &triangles, *spacing_m, seed, progress)?)
+            sampled(apart(positions, &triangles, *spacing_m, seed, progress)?)
         }
         Placement::Density { count, attribute } => {
             let painted = rest_surface.painted(attribute)?;
@@ -209,7 +224,7 @@ fn place_taxels(
                 let corners = triangles[p.triangle].map(|v| painted[v as usize].unwrap_or(0.0));
                 corners.iter().zip(p.barycentric).map(|(value, weight)| value * weight).sum()
             };
-            sampled(place_by_density(positions, &triangles, *count, seed, density, progress)?)
+            sampled(by_density(positions, &triangles, *count, seed, density, progress)?)
         }
         Placement::Grid { hexagonal, pitch_m, origin, u } => {
             check_fits(rest_surface, &chosen, "pitch", *pitch_m)?;

@@ -11,6 +11,7 @@ use super::layout::{FIELD_KEY, FieldSpec, NORMAL, TAXEL_ID};
 use super::model::Body;
 use super::original::Original;
 use super::primitives::custom;
+use super::stored_edges::{EDGES_KEY, StoredEdges};
 use crate::error::Result;
 
 /// New columns of taxel attributes: by mesh and primitive, the name (without underscore) and one number per point.
@@ -61,6 +62,28 @@ impl Original {
         }
         self.text = edit.apply();
         Ok(notes)
+    }
+
+    /// Writes `edges` between taxels in place of those that it has, if these differ.
+    pub fn set_edges(&mut self, edges: &StoredEdges) {
+        let mut edit = JsonEdit::new(&self.text);
+        let text = edges.to_json();
+        let mut is_there = false;
+        for node in edit.list("nodes") {
+            let Some(extras) = edit.member(&node, "extras") else { continue };
+            let Some(span) = edit.member(&extras, EDGES_KEY) else { continue };
+            is_there = true;
+            // Copies, which editors make, stay copies.
+            if serde_json::from_str::<String>(edit.get(&span)).ok().as_ref() != Some(&text) {
+                edit.replace(span, serde_json::Value::from(text.as_str()).to_string());
+            }
+        }
+        self.text = edit.apply();
+        if !is_there {
+            let mut addition = self.addition();
+            addition.edges(edges);
+            self.add(&addition);
+        }
     }
 
     /// The columns that differ in `now`.

@@ -8,11 +8,15 @@ use std::collections::BTreeSet;
 use super::json_edit::{JsonEdit, Span};
 use super::layout::{FIELD_KEY, TAXEL_ID};
 use super::original::{Original, set_length};
+use super::stored_edges::EDGES_KEY;
 use crate::error::{Result, failed};
 
 /// Prefixes of extensions that do not refer to nodes by number.
 const EXTENSIONS_WITHOUT_NODES: [&str; 6] =
     ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization", "MSFT_texture_"];
+
+/// Keys of extras that are of the layout.
+const LAYOUT_KEYS: [&str; 2] = [FIELD_KEY, EDGES_KEY];
 
 #[derive(Default)]
 struct OldLayout {
@@ -26,7 +30,7 @@ struct OldLayout {
 }
 
 impl Original {
-    /// Removes its fields, and unless `keep_taxels` its taxels.
+    /// Removes its fields and the edges between its taxels, and unless `keep_taxels` its taxels.
     ///
     /// # Errors
     /// They cannot be removed, because an extension may refer to later nodes by number.
@@ -92,7 +96,8 @@ fn find(edit: &JsonEdit<'_>, keep_taxels: bool) -> OldLayout {
     let mut layout = Vec::new();
     for (index, node) in nodes.iter().enumerate() {
         let mesh = edit.number_in(node, "mesh");
-        let is_field = edit.member(node, "extras").is_some_and(|extras| edit.member(&extras, FIELD_KEY).is_some());
+        let has = |extras: &Span| LAYOUT_KEYS.iter().any(|key| edit.member(extras, key).is_some());
+        let is_field = edit.member(node, "extras").is_some_and(|extras| has(&extras));
         let shows_taxels = mesh.is_some_and(all_taxels);
         if is_field || shows_taxels {
             let free = (mesh.is_none() || shows_taxels) && !needed.contains(&index);
@@ -139,7 +144,7 @@ fn emptied(mut edit: JsonEdit<'_>, old: &OldLayout) -> String {
             edit.remove_members(&nodes[index], |key| key == "mesh" || key == "skin");
         }
         if let Some(extras) = edit.member(&nodes[index], "extras") {
-            edit.remove_members(&extras, |key| key == FIELD_KEY);
+            edit.remove_members(&extras, |key| LAYOUT_KEYS.contains(&key));
         }
     }
     for &index in &old.mixed {

@@ -96,7 +96,8 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<(Body, Details)> {
     }
     let mut marks: Vec<Mark> =
         sources.points.into_iter().map(|(name, positions_in_body)| Mark { name, positions_in_body }).collect();
-    for &node in nodes.in_order.iter().filter(|&&node| nodes.raw[node].mesh.is_none() && nodes.field[node].is_none()) {
+    let is_mark = |&&node: &&usize| nodes.raw[node].mesh.is_none() && nodes.link[node].is_some();
+    for &node in nodes.in_order.iter().filter(is_mark) {
         if let Some(name) = nodes.raw[node].name.clone() {
             marks.push(Mark { name, positions_in_body: vec![nodes.body_from_node[node].translation] });
         }

@@ -11,6 +11,7 @@ use super::axes::Up;
 use super::joint::{JOINT_KEY, LinkJoint};
 use super::layout::{AREA, FIELD_KEY, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
 use super::model::Taxel;
+use super::stored_edges::{EDGES_KEY, StoredEdges};
 use super::urdf_root::{self, URDF_KEY};
 use crate::error::{Error, Result};
 use crate::output::OutputPath;
@@ -273,6 +274,14 @@ impl Glb {
         let node = self.node(&field.name, parent, origin);
         let own = self.element("nodes", node).expect("it was just added");
         own["extras"] = json!({FIELD_KEY: field.to_json()});
+        node
+    }
+
+    /// Adds `edges` between taxels as an empty node of the scene.
+    pub fn edges(&mut self, edges: &StoredEdges) -> usize {
+        let node = self.node("taxel edges", None, DVec3::ZERO);
+        let own = self.element("nodes", node).expect("it was just added");
+        own["extras"] = json!({EDGES_KEY: edges.to_json()});
         node
     }
 

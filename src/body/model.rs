@@ -5,6 +5,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::axes::{Up, WORLD_FROM_BODY};
 use super::joint::LinkJoint;
 use super::layout::FieldSpec;
+use super::stored_edges::StoredEdges;
 
 /// Largest taxel id: integers up to this one are exact as f32.
 pub const MAX_TAXEL_ID: u32 = 1 << 24;
@@ -183,6 +184,8 @@ pub struct Body {
     pub taxels: Vec<Taxel>,
     /// Field specifications, a parent before its children.
     pub fields: Vec<FieldSpec>,
+    /// The edges between taxels that the file holds, current or not.
+    pub edges: Option<StoredEdges>,
     /// Problems of the file that do not prevent its use.
     pub findings: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! The node tree of a glTF: transforms, and the role of each node: a link, taxels, or a field.
+//! The node tree of a glTF: transforms, and the role of each node: a link, taxels, a field, or edges.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,6 +11,7 @@ use super::joint::{JOINT_KEY, LinkJoint};
 use super::layout::FIELD_KEY;
 use super::model::{Link, rigid_part};
 use super::primitives::is_taxels;
+use super::stored_edges::EDGES_KEY;
 use super::urdf_root::{self, URDF_KEY};
 use crate::error::{Error, Result, failed};
 use crate::limits::{MAX_NODE_DEPTH, MAX_NODES};
@@ -24,9 +25,11 @@ pub(super) struct Nodes<'a> {
     /// Every node, a parent before its children.
     pub(super) in_order: Vec<usize>,
     pub(super) body_from_node: Vec<DAffine3>,
-    /// The link that a node is; `None` for nodes that hold taxels or a field.
+    /// The link that a node is; `None` for nodes that hold taxels, a field or edges.
     pub(super) link: Vec<Option<usize>>,
     pub(super) field: Vec<Option<String>>,
+    /// The JSON of edges between taxels, or what stands in its place.
+    pub(super) edges: Vec<Option<String>>,
     joint: Vec<Option<LinkJoint>>,
     urdf_up: Vec<Option<Up>>,
 }
@@ -79,6 +82,7 @@ impl<'a> Nodes<'a> {
         }
         let all = || raw.iter().enumerate();
         let field = all().map(|(index, node)| text_under(FIELD_KEY, index, node)).collect::<Result<Vec<_>>>()?;
+        let edges: Vec<Option<String>> = raw.iter().map(edges_of).collect();
         let joint = all().map(|(index, node)| joint_of(index, node)).collect::<Result<Vec<_>>>()?;
         let urdf_up = all().map(|(index, node)| urdf_up_of(index, node)).collect::<Result<Vec<_>>>()?;
         let mut link = vec![None; raw.len()];
@@ -86,12 +90,12 @@ impl<'a> Nodes<'a> {
         for &node in &in_order {
             // Taxels need a link above them, or joints.
             let carried = parent[node].is_some() || raw[node].skin.is_some();
-            if field[node].is_none() && !(holds_taxels(document, &raw[node]) && carried) {
+            if field[node].is_none() && edges[node].is_none() && !(holds_taxels(document, &raw[node]) && carried) {
                 link[node] = Some(links);
                 links += 1;
             }
         }
-        Ok(Self { raw, parent, in_order, body_from_node, link, field, joint, urdf_up })
+        Ok(Self { raw, parent, in_order, body_from_node, link, field, edges, joint, urdf_up })
     }
 
     pub(super) fn links(&self) -> Vec<Link> {
@@ -159,6 +163,13 @@ fn text_under(key: &str, index: usize, node: &json::Node) -> Result<Option<Strin
             Err(failed!("`{key}` should be one string, {example}").at(place(key, index, node)))
         }
     }
+}
+
+/// The JSON of edges in a node's extras, if it has some. They are derived, so that damaged ones do no harm.
+fn edges_of(node: &json::Node) -> Option<String> {
+    let extras: serde_json::Value = serde_json::from_str(node.extras.as_ref()?.get()).ok()?;
+    let edges = extras.get(EDGES_KEY)?;
+    Some(edges.as_str().map_or_else(|| edges.to_string(), str::to_owned))
 }
 
 /// The joint in a node's extras, if it has one.

@@ -14,6 +14,7 @@ use super::model::{Body, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel};
 use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
 use super::primitives::{attribute, custom, has_mode, is_taxels};
 use super::repair;
+use super::stored_edges::StoredEdges;
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_BODY_BYTES, MAX_FIELD_DEPTH, MAX_TRIANGLES, MAX_VERTICES};
 
@@ -82,6 +83,7 @@ pub(super) fn from_document(name: &str, document: &Document, nodes: &Nodes<'_>) 
         surfaces: Vec::new(),
         taxels: Vec::new(),
         fields: Vec::new(),
+        edges: None,
         findings: Vec::new(),
     };
     for &node in &nodes.in_order {
@@ -92,6 +94,10 @@ pub(super) fn from_document(name: &str, document: &Document, nodes: &Nodes<'_>) 
         sources.taxels = order.into_iter().map(|index| sources.taxels[index]).collect();
     }
     body.fields = read_fields(document, nodes, &mut body)?;
+    body.edges = StoredEdges::of_nodes(nodes.edges.iter().flatten()).unwrap_or_else(|why| {
+        body.findings.push(format!("the edges between taxels in the file are not used: {why}; author it again"));
+        None
+    });
     repair::suggest_export_options(document, &mut body);
     Ok((body, sources))
 }

@@ -368,7 +368,13 @@ impl SurfaceIndex {
 
     /// The outward unit normals of the triangles within `within_m` of `p`: on an edge, of both sides.
     pub fn normals_within(&self, p: DVec3, within_m: f64) -> impl Iterator<Item = DVec3> + '_ {
-        self.tree.locate_within_distance(p.to_array(), within_m * within_m).map(|triangle| triangle.data.0)
+        self.triangles_within(p, within_m).map(|(_, normal)| normal)
+    }
+
+    /// The triangles within `within_m` of `p`, with their outward unit normals.
+    pub(crate) fn triangles_within(&self, p: DVec3, within_m: f64) -> impl Iterator<Item = (u32, DVec3)> + '_ {
+        let near = self.tree.locate_within_distance(p.to_array(), within_m * within_m);
+        near.map(|triangle| (triangle.data.1, triangle.data.0))
     }
 
     /// The intersection nearest to `p` of the surface and the line through `p` along the unit vector `direction`, within

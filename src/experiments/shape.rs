@@ -155,6 +155,7 @@ impl Shape {
             }],
             surfaces: Vec::new(),
             taxels,
+            edges: None,
             findings: Vec::new(),
         }
     }

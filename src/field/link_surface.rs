@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use super::geodesic::SurfacePlace;
-use crate::body::{Body, Surface, SurfaceIndex, Topology};
+use crate::body::{Body, Home, Surface, SurfaceIndex, Topology};
 
 /// A taxel nearer to a surface than this is on it, m.
 const ON_SURFACE_M: f64 = 1e-4;
@@ -45,22 +45,52 @@ pub(crate) struct LinkSurface {
 }
 
 impl LinkSurface {
+    /// The surfaces `chosen` of `body` at rest, in the frame of `link`: each vertex of a skinned one as its heaviest joint has it.
+    pub(crate) fn at_rest(body: &Body, link: usize, chosen: &[usize]) -> Self {
+        let (mut corners, mut parts) = (Vec::new(), Vec::new());
+        for &index in chosen {
+            let surface = &body.surfaces[index];
+            let ways: Vec<DAffine3> = match &surface.home {
+                Home::Rigid { link: carrier, link_from_mesh } => {
+                    vec![body.rest_transform(link, *carrier) * *link_from_mesh]
+                }
+                Home::Skinned { joints, .. } => {
+                    joints.iter().map(|&(joint, way)| body.rest_transform(link, joint) * way).collect()
+                }
+            };
+            let way_of = |vertex: u32| match &surface.home {
+                Home::Rigid { .. } => ways[0],
+                Home::Skinned { heaviest, .. } => ways[heaviest[vertex as usize]],
+            };
+            let mirrored = ways[0].matrix3.determinant() < 0.0;
+            parts.push((index, corners.len() / 3, mirrored));
+            for &[a, b, c] in &surface.triangles {
+                let turned = if mirrored { [a, c, b] } else { [a, b, c] };
+                corners.extend(turned.map(|v| way_of(v).transform_point3(surface.positions[v as usize])));
+            }
+        }
+        Self::of_corners(&corners, parts)
+    }
+
     /// The surfaces of `body` that are `chosen`, in the frame of `link`.
     fn new(body: &Body, link: usize, chosen: &dyn Fn(&Surface) -> bool) -> Self {
         let seen = body.surfaces.iter().enumerate().filter(|(_, surface)| chosen(surface));
         let seen = seen.filter_map(|(i, surface)| Some((i, surface, surface.link_from_mesh(body, link)?)));
         let corners = seen.clone().flat_map(|(_, surface, link_from_mesh)| surface.corners_through(link_from_mesh));
         let corners: Vec<DVec3> = corners.flatten().collect();
-        let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-        let topology = Topology::new(&corners, &triangles);
-        let index = SurfaceIndex::of_triangles((0..topology.triangles.len() as u32).map(|t| topology.corners(t)));
         let mut before = 0;
         let parts = seen.map(|(i, surface, link_from_mesh)| {
             let first = before;
             before += surface.triangles.len();
             (i, first, link_from_mesh.matrix3.determinant() < 0.0)
         });
-        let parts = parts.collect();
+        Self::of_corners(&corners, parts.collect())
+    }
+
+    fn of_corners(corners: &[DVec3], parts: Vec<(usize, usize, bool)>) -> Self {
+        let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let topology = Topology::new(corners, &triangles);
+        let index = SurfaceIndex::of_triangles((0..topology.triangles.len() as u32).map(|t| topology.corners(t)));
         Self { topology, index, parts }
     }
 
@@ -82,6 +112,11 @@ impl LinkSurface {
             }
         };
         Some(SurfacePlace::in_triangle(&self.topology, hit.triangle as u32, hit.position))
+    }
+
+    /// The triangles within `reach_m` of `p`, with their outward unit normals.
+    pub(crate) fn within(&self, p: DVec3, reach_m: f64) -> impl Iterator<Item = (u32, DVec3)> + '_ {
+        self.index.triangles_within(p, reach_m)
     }
 
     pub(crate) fn nearest(&self, p: DVec3) -> Option<SurfacePlace> {

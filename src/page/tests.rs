@@ -76,6 +76,7 @@ fn body() -> Body {
             field("all/arm", Some("all"), &[2, 3, 4], ChartKind::Plane),
             field("all/hand", Some("all"), &[7, 9], ChartKind::None),
         ],
+        edges: None,
         findings: Vec::new(),
     }
 }

@@ -4,11 +4,12 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use glam::DVec3;
 use serde_json::Value;
 use somatic::Body;
 use somatic::author::{FindingKind, lint, refresh};
-use somatic::body::{FieldSpec, MemberSpec};
-use somatic::field::FieldSet;
+use somatic::body::{EdgeRow, FieldSpec, Glb, MemberSpec, StoredEdges};
+use somatic::field::{FieldSet, TaxelGraph};
 use tempfile::TempDir;
 
 use crate::lint::{Plate, kinds};
@@ -271,6 +272,28 @@ fn a_field_added_and_a_density_painted_in_blender_come_back() {
             let accessor = &json["accessors"][accessor.as_u64().unwrap() as usize];
             assert_eq!((&accessor["type"], &accessor["componentType"]), (&"SCALAR".into(), &5126.into()));
         }
+    }
+}
+
+#[test]
+fn edges_come_back_also_at_four_megabytes() {
+    let row = |id: u32| (id, EdgeRow { lengths_m: f64::from(id) * 1e-6, to: vec![id + 1, id + 2, id + 400] });
+    let edges = StoredEdges { rows: (1_000_000..1_080_000).map(row).collect() };
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("large.glb");
+    let mut glb = Glb::new();
+    glb.node("arm", None, DVec3::ZERO);
+    glb.edges(&edges);
+    let bytes = glb.to_bytes().unwrap();
+    assert!(bytes.len() > 4_000_000, "{} bytes", bytes.len());
+    std::fs::write(&source, bytes).unwrap();
+    for python in blenders() {
+        let after = edited(&python, &source, &[]);
+        assert_eq!(after.edges.as_ref(), Some(&edges));
+        // A bundled body's are current, and are not made anew.
+        let after = edited(&python, &bundled("humanoid.glb"), &[]);
+        assert!(after.edges.is_some());
+        assert_eq!(TaxelGraph::of(&after).1, None);
     }
 }
 

@@ -5,7 +5,7 @@ use serde_json::json;
 use somatic::Body;
 use somatic::author::{FindingKind, lint, refresh};
 use somatic::body::MAX_TAXEL_ID;
-use somatic::field::FieldSet;
+use somatic::field::{FieldSet, TaxelGraph};
 
 use crate::draft::Draft;
 use crate::lint::{Plate, kinds};
@@ -55,6 +55,42 @@ fn members_whose_taxels_are_gone_are_left_out_and_said() {
     // A field that loses all of them cannot be run, and says that.
     let body = row(&[1.0], &[r#"{"version":1,"name":"a","members":{"8":[1]}}"#]).load().unwrap();
     assert!(FieldSet::new(&body).unwrap_err().to_string().contains("field `a` has no taxels"));
+}
+
+#[test]
+fn edges_of_a_file_are_used_while_they_are_current_and_no_damage_of_them_is_an_error() {
+    let load = |edges: &[serde_json::Value]| {
+        let mut draft = row(&[1.0, 2.0, 3.0], &[r#"{"version":1,"name":"a","members":{"1":[1]}}"#]);
+        for edges in edges {
+            draft.node(json!({"name": "edges", "extras": {"somatic_edges": edges}}));
+        }
+        draft.load().unwrap()
+    };
+    let pairs = |body: &Body| TaxelGraph::of(body).0.edges().collect::<Vec<_>>();
+    let current = r#"{"version":1,"edges":{"1":[0.03,2,3],"2":[0],"3":[0]}}"#;
+    for edges in [&[json!(current)][..], &[json!(current), json!(current)]] {
+        let body = load(edges);
+        assert_eq!((body.links.len(), body.findings.len()), (1, 0), "{:?}", body.findings);
+        assert_eq!((pairs(&body), TaxelGraph::of(&body).1), (vec![(0, 1), (0, 2)], None));
+    }
+    // What is made without them: each taxel in the row and the next.
+    let made = vec![(0, 1), (1, 2)];
+    assert_eq!(pairs(&load(&[])), made);
+    for outdated in [
+        r#"{"version":1,"edges":{"1":[0.03,2,3],"2":[0]}}"#,
+        r#"{"version":1,"edges":{"1":[0.03,2,3],"2":[0],"3":[0],"4":[0]}}"#,
+        r#"{"version":1,"edges":{"1":[0.0301,2,3],"2":[0],"3":[0]}}"#,
+    ] {
+        let body = load(&[json!(outdated)]);
+        assert!(TaxelGraph::of(&body).1.unwrap().contains("made anew"));
+        assert_eq!((pairs(&body), body.findings.len()), (made.clone(), 0));
+    }
+    let other = json!(current.replace("0.03", "0.04"));
+    for damaged in [vec![json!("{")], vec![json!(7)], vec![json!({"version": 1})], vec![json!(current), other]] {
+        let body = load(&damaged);
+        assert!(body.findings[0].contains("edges between taxels"), "{:?}", body.findings);
+        assert_eq!((pairs(&body), body.links.len()), (made.clone(), 1));
+    }
 }
 
 #[test]

@@ -56,7 +56,8 @@ impl Grouper<'_> {
         // Without a surface: only the origin of a plane chart depends on it, which is not stored.
         let Body { name, links, taxels, .. } = self.body;
         let (name, links, taxels) = (name.clone(), links.clone(), taxels.clone());
-        let mut bare = Body { name, links, taxels, surfaces: Vec::new(), fields: Vec::new(), findings: Vec::new() };
+        let (surfaces, fields, edges, findings) = (Vec::new(), Vec::new(), None, Vec::new());
+        let mut bare = Body { name, links, taxels, surfaces, fields, edges, findings };
         bare.fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
         let planes: Vec<_> =
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();

@@ -125,6 +125,7 @@ mod tests {
             surfaces: Vec::new(),
             taxels: Vec::new(),
             fields: Vec::new(),
+            edges: None,
             findings: Vec::new(),
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::author::place::nearest_on_its_side;
 use crate::author::placed::SurfacePoint;
-use crate::author::skin::{Authored, PlaceReport};
+use crate::author::skin::{Authored, PlaceReport, store_edges};
 use crate::body::{Body, Original, Sheet, sheets};
 use crate::error::Result;
 
@@ -13,10 +13,12 @@ use crate::error::Result;
 /// # Errors
 /// As [`sheets`].
 pub fn author_sheets(name: &str, sheets_of: &[Sheet]) -> Result<Authored> {
-    let file = Original::from_bytes(name, &sheets(sheets_of)?.to_bytes()?, None)?;
-    let (body, _) = file.read()?;
+    let mut file = Original::from_bytes(name, &sheets(sheets_of)?.to_bytes()?, None)?;
+    let (mut body, _) = file.read()?;
+    let mut notes = Vec::new();
+    store_edges(&mut file, &mut body, &mut notes);
     let places = sheets_of.iter().map(|sheet| report(&body, sheet)).collect();
-    Ok(Authored { file, body, places, notes: Vec::new() })
+    Ok(Authored { file, body, places, notes })
 }
 
 fn report(body: &Body, sheet: &Sheet) -> PlaceReport {

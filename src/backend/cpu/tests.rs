@@ -165,6 +165,7 @@ fn sheet(taxels: u32) -> Body {
         links: vec![link],
         surfaces: Vec::new(),
         taxels: (0..taxels).map(taxel).collect(),
+        edges: None,
         findings: Vec::new(),
     }
 }

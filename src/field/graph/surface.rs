@@ -1,0 +1,121 @@
+//! Edges between taxels whose cells on the surface share a border.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::nodes;
+use super::points::{self, LENGTH_PER_ROOT, LinkPoint};
+use crate::body::{Body, point_tree};
+use crate::field::cells::{COINCIDENT_M, Cells};
+use crate::field::geodesic::{LogMap, SurfacePlace};
+use crate::field::link_surface::LinkSurface;
+use crate::field::seats::{Group, Seat, seat};
+
+/// Cells share a border that is longer than this share of the root of the smaller one; others meet in a point.
+const MIN_BORDER: f64 = 1e-3;
+
+/// The edges of the pressure taxels of `body`, the lower index first; some may appear twice.
+pub(super) fn edges(body: &Body) -> Vec<(u32, u32)> {
+    let groups = Group::all(body, nodes(body).map(|taxel| body.taxels[taxel].link));
+    let mut seats: BTreeMap<usize, Seat> = BTreeMap::new();
+    for taxel in nodes(body) {
+        seats.extend(seat(body, &groups, &body.taxels[taxel]).map(|seat| (taxel, seat)));
+    }
+    let mut found = Vec::new();
+    // Per taxel its cell and its part of the surface, and the taxel that stands for all at its place.
+    let mut cells: BTreeMap<usize, (f64, (u32, u32))> = BTreeMap::new();
+    let mut leader: BTreeMap<usize, usize> = BTreeMap::new();
+    for (index, group) in groups.iter().enumerate() {
+        let here = seats.iter().filter(|(_, seat)| seat.group == index);
+        let (taxels, places): (Vec<usize>, Vec<SurfacePlace>) = here.map(|(&taxel, seat)| (taxel, seat.place)).unzip();
+        let topology = &group.surface.topology;
+        let divided = Cells::new(topology, &places);
+        for (point, &taxel) in taxels.iter().enumerate() {
+            // Where the surface is too rough there are no cells.
+            if divided.areas[point] > 0.0 {
+                let part = topology.part[places[point].triangle as usize];
+                cells.insert(taxel, (divided.areas[point], (index as u32, part)));
+                leader.insert(taxel, taxels[divided.first[point] as usize]);
+            }
+        }
+        let mut ways = Ways { surface: &group.surface, places: &places, map: None };
+        for (&(a, b), border) in &divided.borders {
+            let (a, b) = (a as usize, b as usize);
+            let [of_a, of_b] = [a, b].map(|point| divided.areas[point]);
+            let limit_m = LENGTH_PER_ROOT * of_a.max(of_b).sqrt() * (1.0 + 1e-6);
+            let is_border = border.length_m > MIN_BORDER * of_a.min(of_b).sqrt();
+            if is_border && (border.path_m <= limit_m || ways.is_within(a, b, limit_m)) {
+                found.push((taxels[a] as u32, taxels[b] as u32));
+            }
+        }
+    }
+    let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    nodes(body).for_each(|taxel| by_link.entry(body.taxels[taxel].link).or_default().push(taxel));
+    for taxels in by_link.values() {
+        found.extend(between_parts(body, taxels, &cells, &mut leader));
+    }
+    found.extend(
+        leader.iter().filter(|(taxel, leader)| taxel != leader).map(|(&taxel, &leader)| (leader as u32, taxel as u32)),
+    );
+    found
+}
+
+/// Lengths of shortest paths between places of a surface.
+struct Ways<'a> {
+    surface: &'a LinkSurface,
+    places: &'a [SurfacePlace],
+    /// The last start and limit, and its paths.
+    map: Option<(usize, f64, LogMap<'a>)>,
+}
+
+impl Ways<'_> {
+    /// Whether the shortest path from place `a` to `b` is at most `limit_m` long.
+    fn is_within(&mut self, a: usize, b: usize, limit_m: f64) -> bool {
+        let surface = self.surface;
+        let topology = &surface.topology;
+        let [from, to] = [a, b].map(|point| self.places[point]);
+        if from.position(topology).distance(to.position(topology)) > limit_m {
+            return false;
+        }
+        if self.map.as_ref().is_none_or(|(start, limit, _)| *start != a || *limit < limit_m) {
+            let map = LogMap::new(topology, from.inward(), DVec3::X, limit_m).ok();
+            self.map = map.map(|map| (a, limit_m, map));
+        }
+        let way = self.map.as_ref().and_then(|(.., map)| map.reach(&to));
+        way.is_some_and(|way| way.distance_m <= limit_m)
+    }
+}
+
+/// The edges between `taxels` of one link that are on different parts of its surface, or on none. Those at the place of another
+/// get that one as their leader.
+fn between_parts(
+    body: &Body,
+    taxels: &[usize],
+    cells: &BTreeMap<usize, (f64, (u32, u32))>,
+    leader: &mut BTreeMap<usize, usize>,
+) -> Vec<(u32, u32)> {
+    let loose: Vec<usize> = taxels.iter().copied().filter(|taxel| !cells.contains_key(taxel)).collect();
+    let position = |taxel: usize| body.taxels[taxel].position_in_link;
+    let normal = |taxel: usize| body.taxels[taxel].normal_in_link;
+    let tree = point_tree(loose.iter().map(|&taxel| position(taxel)));
+    for &taxel in &loose {
+        let here = tree.locate_within_distance(position(taxel).to_array(), COINCIDENT_M * COINCIDENT_M);
+        let here = here.map(|spot| loose[spot.data]).filter(|&other| normal(other).dot(normal(taxel)) > 0.0);
+        let first = here.min().map_or(taxel, |first| leader.get(&first).copied().unwrap_or(first));
+        leader.insert(taxel, first);
+    }
+    let point = |&taxel: &usize| {
+        let on_surface = cells.get(&taxel);
+        let area = body.taxels[taxel].area;
+        LinkPoint {
+            taxel: taxel as u32,
+            position: position(taxel),
+            normal: normal(taxel),
+            cell_m2: on_surface.map(|(area, _)| *area).or((area > 0.0).then_some(area)),
+            part: on_surface.map(|(_, part)| *part),
+        }
+    };
+    let leaders = taxels.iter().filter(|taxel| leader.get(taxel) == Some(taxel));
+    points::edges(&leaders.map(point).collect::<Vec<_>>())
+}
