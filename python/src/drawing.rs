@@ -93,7 +93,7 @@ impl Wish<'_> {
         let set = FieldSet::new(body)?;
         let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));
         let chosen = if self.fields.is_empty() { Vec::new() } else { named(&self.fields)? };
-        let options = Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone() };
+        let options = Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone(), edges: false };
         if let Some(read) = read {
             let options_of_engine = somatic::Options::default()
                 .scene(Scene::default().outputs(Outputs::USUAL).coordinates(Coordinates::Anchor))

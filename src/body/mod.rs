@@ -44,7 +44,6 @@ pub(crate) use ray_tree::{Ray, RayTree};
 pub use read::TaxelSource;
 pub(crate) use repair::listed;
 pub use sheet::{Sheet, SheetCell, sheets};
-pub(crate) use stored_edges::EDGES_KEY;
 pub use stored_edges::{EdgeRow, StoredEdges};
 pub use surface::{Hit, SurfaceIndex};
 pub(crate) use surface::{Nearest, PointTree, area_vector, point_tree};

@@ -1,5 +1,6 @@
 //! `somatic inspect`: what a body holds, for people and, as JSON, for programs.
 
+mod graph;
 mod inspection;
 mod json;
 mod report;
@@ -10,9 +11,10 @@ use clap::Args;
 use somatic::author::mesh::Up;
 use somatic::author::{DrawnPoses, coverage, lint_with_progress};
 use somatic::error::{Error, Result};
-use somatic::field::{ContactTolerance, FieldSet, rest_overlaps};
+use somatic::field::{ContactTolerance, FieldSet, TaxelGraph, rest_overlaps};
 use somatic::robot::{Kinematics, drawn_poses};
 
+use self::graph::SkinGraph;
 use self::inspection::Inspection;
 use super::bar::Bar;
 use super::bodies::load_body;
@@ -81,10 +83,13 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("looking for defects");
     let odd = lint_with_progress(&body, &fields, poses.as_ref(), &mut |share| bar.show(share));
     drop(bar);
+    let (graph, outdated) = TaxelGraph::of(&body);
+    findings.extend(outdated);
     findings.extend(odd.iter().map(ToString::to_string));
     let coverage = coverage(&body);
     let overlaps = rest_overlaps(&body, &ContactTolerance::new(&body, arguments.contact_tolerance));
-    let seen = Inspection { body, fields, coverage, overlaps, findings, odd };
+    let graph = SkinGraph::new(graph, &body);
+    let seen = Inspection { body, fields, graph, coverage, overlaps, findings, odd };
     print(&match arguments.json {
         true => json::text(&seen),
         false => report::text(&seen),

@@ -23,6 +23,7 @@ Examples:
   somatic render hand -o palm.png --field 'hand/palm*' --view top,bottom
   somatic render humanoid -o chart.png --uv head/skull/patch_14
   somatic render hand -o hand.png --ids --look-at hand/palm --view bottom
+  somatic render hand -o edges.png --edges
   somatic render hand -o touch.png --source touch.csv --at 2.9
   somatic render hand -o touch.png --source touch.csv --from 1 --to 4      an animation
   somatic render insoles.csv -o peak.png       a pressure system's export, with its own sensors
@@ -64,6 +65,10 @@ pub(super) struct Arguments {
     /// Label taxels with their ids.
     #[arg(long, conflicts_with_all = ["uv", "fields"])]
     ids: bool,
+
+    /// Connect taxels that are neighbours on the skin.
+    #[arg(long, conflicts_with = "uv")]
+    edges: bool,
 
     #[command(flatten)]
     touched: touched::Flags,
@@ -115,7 +120,8 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     let set = FieldSet::new(&body)?;
     let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));
     let fields = if arguments.fields.is_empty() { Vec::new() } else { named(&arguments.fields)? };
-    let options = Options { size: arguments.size.0, views, fields, look_at: arguments.look_at.clone() };
+    let (look_at, edges) = (arguments.look_at.clone(), arguments.edges);
+    let options = Options { size: arguments.size.0, views, fields, look_at, edges };
     let picture = match &arguments.uv {
         None if !asked.sources.is_empty() || arguments.ids => {
             arguments.touched.draw(&asked, &body, &set.fields, &options, arguments.ids)?

@@ -3,6 +3,7 @@
 
 mod colour;
 mod drawn;
+mod edges;
 mod labels;
 mod moments;
 mod shape;
@@ -19,6 +20,7 @@ pub use touch::{Moment, TouchPicture};
 pub use view::View;
 
 use self::colour::{PALETTE, PAPER, linear};
+use self::edges::Lines;
 use self::labels::Labels;
 use self::shape::{Dots, RIM};
 use self::view::Arrangement;
@@ -43,6 +45,8 @@ pub struct Options {
     pub fields: Vec<usize>,
     /// The field or link that fills the picture; all of the body without one.
     pub look_at: Option<String>,
+    /// Whether lines connect neighbouring taxels.
+    pub edges: bool,
 }
 
 /// A picture of `body` and its `fields`, which may be none.
@@ -61,6 +65,9 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Pictu
     let mut drawing = prepared.drawing(linear(PAPER));
     drawing.slices = dots.slices(&shown.coloured(fields), *middle, prepared.usual_radius() > 2.0);
     let mut pixels = raster::draw(&drawing)?;
+    if options.edges {
+        Lines::new(&prepared, body).draw(*size, &mut pixels)?;
+    }
     let mut labels = Labels::new(&title, size[0]);
     labels.key(shown.key(fields), options.size);
     for (view, placed) in views.iter().zip(&arrangement.views) {

@@ -5,6 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colour::{PALETTE, PAPER, linear};
+use super::edges::Lines;
 use super::labels::{INK, Labels};
 use super::{Options, Picture, Prepared, stem};
 use crate::backend::gpu::raster;
@@ -50,6 +51,7 @@ pub struct TouchPicture<'a> {
     fields: &'a [Field],
     prepared: Prepared,
     ids: bool,
+    edges: Option<Lines>,
 }
 
 impl<'a> TouchPicture<'a> {
@@ -60,7 +62,8 @@ impl<'a> TouchPicture<'a> {
     pub fn new(body: &'a Body, fields: &'a [Field], options: &Options, ids: bool) -> Result<Self> {
         let key = vec![(None, "0.00 s".to_owned())];
         let prepared = Prepared::new(body, fields, options, &title(body), key)?;
-        Ok(Self { body, fields, prepared, ids })
+        let edges = options.edges.then(|| Lines::new(&prepared, body));
+        Ok(Self { body, fields, prepared, ids, edges })
     }
 
     /// A picture of `moment`.
@@ -80,6 +83,9 @@ impl<'a> TouchPicture<'a> {
         let mut drawing = self.prepared.drawing(linear(PAPER));
         drawing.slices = dots.flat_slices(&taxels, *middle, usual > 2.0);
         let mut pixels = raster::draw(&drawing)?;
+        if let Some(lines) = &self.edges {
+            lines.draw(*size, &mut pixels)?;
+        }
 
         let mut labels = Labels::new(&title(self.body), size[0]);
         labels.key(vec![(None, moment.t_s.map_or(String::new(), |t_s| format!("{t_s:.2} s")))], *size);

@@ -24,7 +24,8 @@ fn json_has_the_keys_that_others_lean_on() {
         assert_eq!(keys(taxel), ["id", "link", "position", "normal", "area", "modality"]);
         assert_eq!((taxel["position"].as_array().unwrap().len(), &taxel["modality"]), (3, &json!("pressure")));
     }
-    assert_eq!(keys(&body)[3..], ["findings", "lint", "near_at_rest", "coverage"]);
+    let others = ["findings", "lint", "near_at_rest", "coverage", "edges", "islands", "without_edge", "few_edges"];
+    assert_eq!(keys(&body)[3..], others);
     let [small] = &body["lint"].as_array().unwrap()[..] else { panic!("{}", body["lint"]) };
     assert_eq!(keys(small), ["kind", "taxels", "fields", "worst", "unit", "place", "links", "what"]);
     assert_eq!((&small["kind"], &small["fields"]), (&json!("small_field"), &json!(["hand/side"])));

@@ -55,6 +55,21 @@ const BLUE: [u8; 3] = [0x00, 0x72, 0xB2];
 const ORANGE: [u8; 3] = [0xE6, 0x9F, 0x00];
 
 #[test]
+fn edges_connect_neighbours_that_a_view_sees() {
+    let arguments = ["mat", "--view", "top", "--size", "900"];
+    let Some(plain) = render(&arguments) else { return };
+    let lined = render(&[&arguments[..], &["--edges"]].concat()).unwrap();
+    let pairs = plain.pixels.chunks_exact(3).zip(lined.pixels.chunks_exact(3));
+    let changed: Vec<&[u8]> = pairs.filter(|(before, after)| before != after).map(|(_, after)| after).collect();
+    assert!(changed.len() > 1000, "{}", changed.len());
+    assert!(changed.iter().all(|pixel| *pixel == [0x30, 0x34, 0x3A]));
+    // From below no taxel is seen.
+    let below = ["mat", "--view", "bottom", "--size", "900"];
+    assert_eq!(render(&below).unwrap().pixels, render(&[&below[..], &["--edges"]].concat()).unwrap().pixels);
+    assert!(fails(2, &["render", "hand", "-o", "a.png", "--edges", "--uv", "hand/palm"]).contains("--uv"));
+}
+
+#[test]
 fn a_body_is_drawn_in_the_colours_of_its_fields() {
     let Some(hand) = render(&["hand", "--size", "900"]) else { return };
     assert_eq!(hand.width, 900);

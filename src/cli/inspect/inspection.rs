@@ -4,10 +4,13 @@ use somatic::author::{Coverage, Finding};
 use somatic::body::Body;
 use somatic::field::{Field, RestOverlap};
 
+use super::graph::SkinGraph;
+
 /// What is reported about a body.
 pub(super) struct Inspection {
     pub(super) body: Body,
     pub(super) fields: Vec<Field>,
+    pub(super) graph: SkinGraph,
     pub(super) coverage: Coverage,
     /// Links with taxels that are within the tolerance of self-contacts at rest.
     pub(super) overlaps: Vec<RestOverlap>,

@@ -22,7 +22,7 @@ pub(super) fn text(seen: &Inspection) -> String {
             "modality": taxel.modality.name(),
         })
     };
-    let whole = json!({
+    let mut whole = json!({
         "links": body.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>(),
         "taxels": (0..body.taxels.len()).map(taxel).collect::<Vec<_>>(),
         "fields": fields.iter().map(|f| field(body, fields, f)).collect::<Vec<_>>(),
@@ -44,6 +44,9 @@ pub(super) fn text(seen: &Inspection) -> String {
             })).collect::<Vec<_>>(),
         },
     });
+    for (name, value) in seen.graph.json(body) {
+        whole[name] = value;
+    }
     format!("{whole}\n")
 }
 

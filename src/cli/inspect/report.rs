@@ -24,6 +24,9 @@ pub(super) fn text(seen: &Inspection) -> String {
     for (what, value) in coverage(body, &seen.coverage) {
         line(what, value);
     }
+    for (what, value) in seen.graph.lines(body) {
+        line(what, value);
+    }
     let charts = fields.iter().filter(|field| field.chart.is_ok()).count();
     line("fields", format!("{}, {charts} with a chart", fields.len()));
     if !seen.overlaps.is_empty() {

@@ -8,7 +8,7 @@ mod refine;
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use self::polygon::{Candidate, Side, nearest_part, share, squared_at};
 use self::refine::refine;
@@ -186,7 +186,7 @@ impl Cells {
         for (point, place) in starts {
             let start = Start::new(topology, place.inward(), DVec3::X);
             for wedge in &start.wedges {
-                let squared = wedge.corners.map(|corner| corner.length_squared());
+                let squared = wedge.corners.map(DVec2::length_squared);
                 within.push((wedge.triangle, Candidate { site: point as u32, squared }));
             }
             is_reached[topology.part[place.triangle as usize] as usize] = true;

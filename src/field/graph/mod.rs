@@ -197,7 +197,7 @@ fn nodes(body: &Body) -> impl Iterator<Item = usize> + '_ {
 }
 
 fn place_at_rest(body: &Body, link: usize, position_in_link: DVec3) -> DVec3 {
-    body.links[link].world_from_link.transform_point3(position_in_link)
+    body.links[link].body_from_link.transform_point3(position_in_link)
 }
 
 #[cfg(test)]
