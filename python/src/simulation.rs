@@ -78,6 +78,7 @@ fn truth(py: Python<'_>, rows: &[Row]) -> PyResult<Py<PyAny>> {
         Ok(list.into_pyobject(py)?.into_any().unbind())
     };
     let nan = f64::NAN;
+    let vector = |vector: Option<[f64; 3]>| vector.unwrap_or([nan; 3]).to_vec();
     let fields = [
         ("frame", "i8", 1, whole(&|row| row.frame)?),
         ("touch", "i8", 1, whole(&|row| row.truth.touch)?),
@@ -88,15 +89,13 @@ fn truth(py: Python<'_>, rows: &[Row]) -> PyResult<Py<PyAny>> {
         ("normal", "f8", 3, numbers(3, &|truth| truth.normal_in_link.to_array().to_vec())?),
         ("uv", "f8", 2, numbers(2, &|truth| truth.uv.unwrap_or([nan; 2]).to_vec())?),
         ("angle", "f8", 1, numbers(1, &|truth| vec![truth.angle.unwrap_or(nan)])?),
-        (
-            "velocity",
-            "f8",
-            3,
-            numbers(3, &|truth| truth.velocity_in_link.map_or(vec![nan; 3], |v| v.to_array().to_vec()))?,
-        ),
+        ("velocity", "f8", 3, numbers(3, &|truth| vector(truth.velocity_in_link.map(Into::into)))?),
         ("velocity_uv", "f8", 2, numbers(2, &|truth| truth.velocity_uv.unwrap_or([nan; 2]).to_vec())?),
         ("speed", "f8", 1, numbers(1, &|truth| vec![truth.speed.unwrap_or(nan)])?),
         ("force", "f8", 1, numbers(1, &|truth| vec![truth.force_newton])?),
+        ("direction", "f8", 3, numbers(3, &|truth| vector(truth.direction_in_link.map(Into::into)))?),
+        ("principal_axis", "f8", 3, numbers(3, &|truth| vector(truth.principal_axis_in_link.map(Into::into)))?),
+        ("depth", "f8", 1, numbers(1, &|truth| vec![truth.depth_m.unwrap_or(nan)])?),
     ];
     structured(py, count, &fields).map(Bound::unbind)
 }
@@ -111,7 +110,9 @@ impl PySimulation {
 
     /// What is true, an array of structures, one for each touch that presses in a frame: `frame`, `touch`, `name`, `link`, `field`;
     /// `position` and `normal` [3] in the link's frame and `uv` [2] in the field's chart, in metres; `angle` along, in rad;
-    /// `velocity` [3], `velocity_uv` [2] and `speed`, in m/s; `force`, in N. What is not defined is NaN.
+    /// `velocity` [3], `velocity_uv` [2] and `speed`, in m/s; `force`, in N;
+    /// of touches of the whole body `direction` and `principal_axis` [3], unit vectors in the link's frame, and `depth`, in metres.
+    /// What is not defined is NaN.
     #[getter]
     fn truth(&self, py: Python<'_>) -> Py<PyAny> {
         self.truth.clone_ref(py)

@@ -360,6 +360,19 @@ impl SurfaceIndex {
         Some(Hit { position: triangle.geom().nearest(p), normal, triangle: number as usize })
     }
 
+    /// The surface point nearest to `p` of the triangles whose outward unit normal `fits`.
+    pub(crate) fn nearest_where(&self, p: DVec3, fits: impl Fn(DVec3) -> bool) -> Option<Hit> {
+        let triangle = self.tree.nearest_neighbor_iter(p.to_array()).find(|triangle| fits(triangle.data.0))?;
+        let (normal, number) = triangle.data;
+        Some(Hit { position: triangle.geom().nearest(p), normal, triangle: number as usize })
+    }
+
+    /// The triangles within `within_m` of `p`, in any order.
+    pub(crate) fn within(&self, p: DVec3, within_m: f64) -> impl Iterator<Item = usize> + '_ {
+        let near = self.tree.locate_within_distance(p.to_array(), within_m * within_m);
+        near.map(|triangle| triangle.data.1 as usize)
+    }
+
     /// The mean outward unit normal of the triangles within `within_m` of `p`.
     #[must_use]
     pub fn normal_around(&self, p: DVec3, within_m: f64) -> Option<DVec3> {

@@ -36,6 +36,15 @@ A simulation is TOML: the body, the rate, and touches, which move along paths in
   times_s = [0.5, 3.5]
   force_newton = [[0.5, 0], [0.7, 32], [3.3, 34], [3.5, 0]]
 
+  [[touch]]
+  on = \"body\"                   # across links, on the surface as it is curved; ball, ellipsoid, rod, strap or pair
+  indenter = \"strap\"
+  width_m = 0.02
+  length_m = 0.08
+  path = [{ taxel = 12 }, { link = \"palm\", at = [0.01, 0.0, 0.02] }]
+  speed_m_s = 0.02
+  press = { from_s = 0.5, to_s = 3, newton = 8, ramp_s = 0.3 }
+
 The truth has a row per frame and touch: its place, normal, angle, velocity, speed and force.";
 
 /// Write a simulated touch down as a recording, with what is true in it and its sensors' calibration beside it.

@@ -36,6 +36,7 @@ mod page;
 mod paper;
 mod plan;
 mod plot;
+mod presses;
 mod python;
 // The library's own numbers that look like chance.
 #[path = "../../src/author/random.rs"]

@@ -69,7 +69,7 @@ impl Layer {
         contact: Pressure::Gaussian,
     };
 
-    fn sigma_m(&self) -> f64 {
+    pub(super) fn sigma_m(&self) -> f64 {
         self.spread * self.thickness_m
     }
 

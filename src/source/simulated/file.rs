@@ -83,6 +83,7 @@ pub(super) struct SensorKeys {
     pub(super) bits: Option<Spanned<i64>>,
     pub(super) invert: Option<Spanned<bool>>,
     pub(super) area_m2: Option<Spanned<f64>>,
+    pub(super) covers: Option<Spanned<CoversName>>,
     pub(super) noise_sigma: Option<Spanned<f64>>,
     pub(super) gain_spread: Option<Spanned<f64>>,
     #[serde(default)]
@@ -119,6 +120,30 @@ pub(super) enum IndenterName {
     Fingertip,
     Flat,
     Edge,
+    Ellipsoid,
+    Strap,
+    Pair,
+}
+
+/// What a taxel feels of touches of the whole body.
+#[derive(Clone, Copy, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum CoversName {
+    Cell,
+    Area,
+}
+
+/// A place of a path: (u, v) in a field, (x, y, z) in a link, or one of the whole body.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "`path` has places [u, v], [x, y, z], { taxel = ID } or { link = \"NAME\", at = [x, y, z] }"
+)]
+pub(super) enum WaypointKeys {
+    Numbers(Vec<f64>),
+    Taxel { taxel: i64 },
+    Place { link: String, at: [f64; 3] },
 }
 
 #[derive(Deserialize)]
@@ -129,8 +154,11 @@ pub(super) struct TouchKeys {
     pub(super) indenter: Spanned<IndenterName>,
     pub(super) radius_m: Option<Spanned<f64>>,
     pub(super) length_m: Option<Spanned<f64>>,
+    pub(super) width_m: Option<Spanned<f64>>,
+    pub(super) radii_m: Option<Spanned<[f64; 3]>>,
+    pub(super) apart_m: Option<Spanned<f64>>,
     pub(super) angle_deg: Option<Spanned<AngleKeys>>,
-    pub(super) path: Spanned<Vec<Spanned<Vec<f64>>>>,
+    pub(super) path: Spanned<Vec<Spanned<WaypointKeys>>>,
     pub(super) times_s: Option<Spanned<Vec<f64>>>,
     pub(super) start_s: Option<Spanned<f64>>,
     pub(super) speed_m_s: Option<Spanned<f64>>,

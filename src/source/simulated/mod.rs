@@ -15,9 +15,11 @@ mod sensor;
 mod sensors;
 mod setup;
 mod truth;
+mod whole;
+mod whole_setup;
+mod whole_truth;
 
 use std::collections::BTreeMap;
-use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -30,6 +32,9 @@ use self::contact::{Footprint, Layer};
 use self::file::File;
 use self::sensor::{Reading, Sensor};
 use self::setup::{Setup, Touch};
+use self::truth::line_angle;
+use self::whole::BodySkin;
+use self::whole_truth::{Moment, TouchOfBody};
 use super::Source;
 use crate::body::{Body, Modality, Taxel};
 use crate::bundled;
@@ -50,7 +55,9 @@ pub struct SimulatedSource {
     /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
     ids: Vec<u32>,
     taxels: Vec<(usize, f64)>,
-    touches: Vec<LinkTouch>,
+    touches: Vec<Pressing>,
+    /// The skin of the whole body, if touches press that.
+    body_skin: Option<Arc<BodySkin>>,
     next: u64,
     truth: Vec<Truth>,
     forces_newton: Vec<f64>,
@@ -61,6 +68,12 @@ struct LinkTouch {
     touch: Touch,
     link: String,
     taxels: Arc<[(DVec3, DVec3)]>,
+}
+
+/// A touch of one link, or of the whole body.
+enum Pressing {
+    Link(LinkTouch),
+    Body(TouchOfBody),
 }
 
 /// What becomes of a touch that the body has no place for.
@@ -162,7 +175,17 @@ impl SimulatedSource {
         let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
         let mut touches = Vec::with_capacity(file.touch.len());
         let mut places = BTreeMap::new();
+        let mut body_skin = None;
+        let covers = whole_setup::covers(text, &file.sensor)?;
         for (index, keys) in file.touch.iter().enumerate() {
+            if whole_setup::is_of_body(keys.get_ref()) {
+                let make = || BodySkin::new(&body, &layer, &taxels, covers);
+                match (setup.body_touch(index, keys.get_ref(), &layer, &mut body_skin, make), wrong) {
+                    (Err(_), WrongTouch::LeaveOut) => {}
+                    (touch, _) => touches.push(Pressing::Body(TouchOfBody::new(touch?))),
+                }
+                continue;
+            }
             let touch = match (setup.touch(index, keys.get_ref()), wrong) {
                 (Err(_), WrongTouch::LeaveOut) => continue,
                 (touch, _) => touch?,
@@ -177,7 +200,8 @@ impl SimulatedSource {
                 taxels.iter().map(place).collect()
             };
             let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
-            touches.push(LinkTouch { link: body.links[touch.link].name.clone(), touch, taxels: places });
+            let link = body.links[touch.link].name.clone();
+            touches.push(Pressing::Link(LinkTouch { link, touch, taxels: places }));
         }
         Ok(Self {
             name: name.to_owned(),
@@ -189,6 +213,7 @@ impl SimulatedSource {
             ids,
             taxels,
             touches,
+            body_skin,
             next: 0,
             truth: Vec::new(),
             body,
@@ -259,7 +284,16 @@ impl SimulatedSource {
     /// Adds a touch's forces and its truth.
     fn press(&mut self, index: usize, frame: u64) -> Result<()> {
         let t_s = self.time(frame);
-        let LinkTouch { touch, link, taxels } = &self.touches[index];
+        let before_s = frame.checked_sub(1).map(|frame| self.time(frame));
+        let LinkTouch { touch, link, taxels } = match &mut self.touches[index] {
+            Pressing::Link(touch) => touch,
+            Pressing::Body(touch) => {
+                let Some(skin) = &self.body_skin else { return Ok(()) };
+                let moment = Moment { touch: index, frame, t_s, before_s };
+                self.truth.extend(touch.press(&self.body, skin, &moment, &mut self.forces_newton)?);
+                return Ok(());
+            }
+        };
         let Some(force_newton) = touch.force(t_s) else { return Ok(()) };
         let Some(place) = touch.path.place(t_s) else { return Err(Error::failed(touch.leaves_surface(t_s))) };
         let angle = touch.angle.as_ref().map(|angle| angle.held(t_s));
@@ -274,7 +308,7 @@ impl SimulatedSource {
                 *force += force_newton * footprint.share_on(offset.dot(across), offset.dot(along), *side_m);
             }
         }
-        let before = frame.checked_sub(1).map(|frame| self.time(frame)).filter(|&t_s| touch.force(t_s).is_some());
+        let before = before_s.filter(|&t_s| touch.force(t_s).is_some());
         let before = before.and_then(|before_s| Some((touch.path.place(before_s)?, t_s - before_s)));
         let velocity_in_link = before.map(|(before, dt_s)| (place.position_in_link - before.position_in_link) / dt_s);
         let velocity_uv = before.and_then(|(before, dt_s)| {
@@ -294,6 +328,9 @@ impl SimulatedSource {
             velocity_uv,
             speed: velocity_in_link.map(DVec3::length),
             force_newton,
+            direction_in_link: angle.map(|_| along),
+            principal_axis_in_link: None,
+            depth_m: None,
         });
         Ok(())
     }
@@ -329,12 +366,6 @@ impl Source for SimulatedSource {
     fn progress(&self) -> Option<f64> {
         Some(self.next as f64 / self.frames as f64)
     }
-}
-
-/// The angle of a line, in [0, π).
-fn line_angle(angle: f64) -> f64 {
-    let turned = angle.rem_euclid(PI);
-    if turned < PI { turned } else { 0.0 }
 }
 
 fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {

@@ -10,9 +10,36 @@ use crate::output::{OutputFile, OutputPath};
 use crate::signal::Frame;
 use crate::source::{Source as _, csv_file::put_value};
 
-const COLUMNS: [&str; 22] = [
-    "t", "frame", "touch", "name", "link", "field", "x", "y", "z", "nx", "ny", "nz", "u", "v", "angle", "vx", "vy",
-    "vz", "vu", "vv", "speed", "force",
+const COLUMNS: [&str; 29] = [
+    "t",
+    "frame",
+    "touch",
+    "name",
+    "link",
+    "field",
+    "x",
+    "y",
+    "z",
+    "nx",
+    "ny",
+    "nz",
+    "u",
+    "v",
+    "angle",
+    "vx",
+    "vy",
+    "vz",
+    "vu",
+    "vv",
+    "speed",
+    "force",
+    "direction_x",
+    "direction_y",
+    "direction_z",
+    "principal_axis_x",
+    "principal_axis_y",
+    "principal_axis_z",
+    "depth",
 ];
 
 /// Writes all frames of `simulation` as CSV to `frames` and their truth to `truth`: both files or neither. Returns the
@@ -94,5 +121,11 @@ fn truth_row(t_s: f64, frame: u64, truth: &Truth) -> [String; COLUMNS.len()] {
     let (speed, force) = (cell(truth.speed), cell(Some(truth.force_newton)));
     let (t, frame, touch) = (t_s.to_string(), frame.to_string(), truth.touch.to_string());
     let (name, link, angle) = (truth.name.clone(), truth.link.clone(), cell(truth.angle));
-    [t, frame, touch, name, link, field, x, y, z, nx, ny, nz, u, v, angle, vx, vy, vz, vu, vv, speed, force]
+    let [dx, dy, dz] = of(truth.direction_in_link);
+    let [ax, ay, az] = of(truth.principal_axis_in_link);
+    let depth = cell(truth.depth_m);
+    [
+        t, frame, touch, name, link, field, x, y, z, nx, ny, nz, u, v, angle, vx, vy, vz, vu, vv, speed, force, dx, dy,
+        dz, ax, ay, az, depth,
+    ]
 }

@@ -7,7 +7,7 @@ use glam::DVec3;
 use toml::Spanned;
 
 use super::contact::{Indenter, Layer};
-use super::file::{AngleKeys, ContactName, IndenterName, KernelName, LayerKeys, TouchKeys};
+use super::file::{AngleKeys, ContactName, IndenterName, KernelName, LayerKeys, TouchKeys, WaypointKeys};
 use super::layer::Kernel;
 use super::patch::Pressure;
 use super::path::{Path, PathFrame};
@@ -109,7 +109,7 @@ impl Setup<'_> {
             link,
             field,
             indenter,
-            angle: self.angle(keys, &indenter)?,
+            angle: self.angle(keys, indenter.is_long())?,
             path: Path { frame, surface, waypoints, times_s },
             force_newton: self.force(keys)?,
         };
@@ -131,6 +131,9 @@ impl Setup<'_> {
             (None, None) => Err(text.wrong(indenter.span(), format!("this indenter needs its `{key}`"))),
         };
         let refuse = |key: &str, value: &Option<Spanned<f64>>| text.refuse(key, value.as_ref(), "for this indenter");
+        refuse("width_m", &keys.width_m)?;
+        refuse("apart_m", &keys.apart_m)?;
+        text.refuse("radii_m", keys.radii_m.as_ref(), "for this indenter")?;
         let radius = |default| size("radius_m", &keys.radius_m, default);
         let length = || size("length_m", &keys.length_m, None);
         match indenter.get_ref() {
@@ -138,6 +141,10 @@ impl Setup<'_> {
             IndenterName::Edge => {
                 refuse("radius_m", &keys.radius_m)?;
                 Ok(Indenter::Edge { length_m: length()? })
+            }
+            IndenterName::Ellipsoid | IndenterName::Strap | IndenterName::Pair => {
+                let what = "this indenter presses whole bodies; give `on = \"body\"`, and places of the body as `path`";
+                Err(text.wrong(indenter.span(), what))
             }
             round => {
                 refuse("length_m", &keys.length_m)?;
@@ -153,16 +160,22 @@ impl Setup<'_> {
     /// Whether the waypoints are (u, v) rather than (x, y, z), and the waypoints.
     fn waypoints(&self, keys: &TouchKeys) -> Result<(bool, Vec<DVec3>)> {
         let path = keys.path.get_ref();
-        let wanted = path.first().map_or(0, |first| first.get_ref().len());
+        let wanted = match path.first().map(Spanned::get_ref) {
+            Some(WaypointKeys::Numbers(numbers)) => numbers.len(),
+            _ => 0,
+        };
         if path.is_empty() {
             return Err(self.text.wrong(keys.path.span(), "`path` is empty; give at least one place"));
         }
         let points = path.iter().map(|waypoint| {
-            let numbers = waypoint.get_ref();
             let wrong = |what: String| Err(self.text.wrong(waypoint.span(), what));
-            if numbers.len() != wanted || !(2..=3).contains(&wanted) {
-                return wrong("`path` is all [u, v] on a field, or all [x, y, z] on a link".to_owned());
-            }
+            let numbers = match waypoint.get_ref() {
+                WaypointKeys::Numbers(numbers) if numbers.len() == wanted && (2..=3).contains(&wanted) => numbers,
+                WaypointKeys::Numbers(_) => {
+                    return wrong("`path` is all [u, v] on a field, or all [x, y, z] on a link".to_owned());
+                }
+                _ => return wrong("`path` has a place of the whole body, which needs `on = \"body\"`".to_owned()),
+            };
             if let Some(bad) = numbers.iter().find(|x| x.is_nan() || x.abs() > 1e6) {
                 return wrong(format!("`path` has the coordinate {bad}; give metres"));
             }
@@ -203,6 +216,10 @@ impl Setup<'_> {
         let on = keys.on.get_ref();
         match self.body.link_index(on) {
             Some(link) => Ok((link, None, PathFrame::Link)),
+            None if on == "body" => {
+                let what = "on = \"body\" takes a `path` of { taxel = ID } or { link = \"NAME\", at = [x, y, z] }";
+                Err(self.text.wrong(keys.path.span(), what))
+            }
             None if self.fields.fields.iter().any(|field| field.name == *on) => {
                 let what = format!("`{on}` is a field, not a link; give its `path` as [u, v]");
                 Err(self.text.wrong(keys.on.span(), what))
@@ -217,7 +234,8 @@ impl Setup<'_> {
         fields.chain(self.body.links.iter().map(|link| link.name.as_str()))
     }
 
-    fn times(&self, keys: &TouchKeys, waypoints: &[DVec3]) -> Result<Vec<f64>> {
+    /// The times of `waypoints`.
+    pub(super) fn times(&self, keys: &TouchKeys, waypoints: &[DVec3]) -> Result<Vec<f64>> {
         let text = self.text;
         if let Some(times) = &keys.times_s {
             text.refuse("start_s", keys.start_s.as_ref(), "beside `times_s`")?;
@@ -252,9 +270,9 @@ impl Setup<'_> {
         Ok(times)
     }
 
-    fn angle(&self, keys: &TouchKeys, indenter: &Indenter) -> Result<Option<Profile>> {
+    pub(super) fn angle(&self, keys: &TouchKeys, is_long: bool) -> Result<Option<Profile>> {
         let text = self.text;
-        if !indenter.is_long() {
+        if !is_long {
             text.refuse("angle_deg", keys.angle_deg.as_ref(), "for a round indenter")?;
             return Ok(None);
         }
@@ -270,7 +288,7 @@ impl Setup<'_> {
         Ok(Some(Profile::new(points.into_iter().map(|[t_s, degrees]| (t_s, degrees.to_radians())).collect())))
     }
 
-    fn force(&self, keys: &TouchKeys) -> Result<Profile> {
+    pub(super) fn force(&self, keys: &TouchKeys) -> Result<Profile> {
         let text = self.text;
         let given = [keys.force_newton.is_some(), keys.tap.is_some(), keys.press.is_some(), keys.hold.is_some()];
         if given.into_iter().filter(|&is| is).count() != 1 {

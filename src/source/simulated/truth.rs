@@ -1,5 +1,7 @@
 //! The truth of a simulated frame.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 /// The true state of one touch in one frame.
@@ -9,11 +11,13 @@ pub struct Truth {
     pub touch: usize,
     /// Its name; `touch 1` and so on where the file gives none.
     pub name: String,
-    /// The link of the positions: the one that the file names, or the field's anchor.
+    /// The link of the positions: the one that the file names, the field's anchor, or the one that bears most of a touch of the
+    /// whole body.
     pub link: String,
     /// The field whose chart has (u, v) and the angle, if the file names one.
     pub field: Option<String>,
-    /// Middle of the contact on the body's surface, m.
+    /// Middle of the contact on the body's surface, m; of a touch of the whole body the surface point nearest to the mean of the
+    /// pressure in space.
     pub position_in_link: DVec3,
     /// Outward unit normal there.
     pub normal_in_link: DVec3,
@@ -27,6 +31,18 @@ pub struct Truth {
     pub velocity_uv: Option<[f64; 2]>,
     /// Length of `velocity_in_link`, m/s.
     pub speed: Option<f64>,
-    /// Force along the normal, N.
+    /// Force along the normal, N; of a touch of the whole body the integral of the pressure.
     pub force_newton: f64,
+    /// Unit vector along a rod, an edge, a strap or an ellipsoid, or from one of a pair to the other, in the tangent plane.
+    pub direction_in_link: Option<DVec3>,
+    /// Unit vector along the footprint on the taxels: of a touch of the whole body, if it is longer than wide.
+    pub principal_axis_in_link: Option<DVec3>,
+    /// How far the indenter's lowest point is under the surface, m: of a touch of the whole body.
+    pub depth_m: Option<f64>,
+}
+
+/// The angle of a line, in [0, π).
+pub(super) fn line_angle(angle: f64) -> f64 {
+    let turned = angle.rem_euclid(PI);
+    if turned < PI { turned } else { 0.0 }
 }

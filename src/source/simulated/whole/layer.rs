@@ -1,0 +1,78 @@
+//! How the layer over the taxels gives way, and how it spreads what presses on it, along a curved surface.
+
+use super::super::contact;
+use super::super::layer::Kernel;
+
+/// A Gaussian is cut off at this many standard deviations: 4 · 10⁻⁶ of a force lie beyond.
+const CUTOFF_SIGMAS: f64 = 5.0;
+/// Boussinesq's pressure is cut off at this many depths: 0.1 % of a force lie beyond.
+const CUTOFF_DEPTHS: f64 = 10.0;
+/// A layer counts as spreading at least this much, m.
+const MIN_SIGMA_M: f64 = 5e-4;
+/// Pieces of the surface are at most this large, m.
+const MAX_PIECE_M: f64 = 2e-3;
+
+/// The layer over the taxels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layer {
+    kernel: Kernel,
+    /// Standard deviation of the Gaussian, or of the one with the same peak.
+    sigma_m: f64,
+    /// Pressure per depth, Pa/m.
+    pub(super) stiffness_pa_m: f64,
+}
+
+impl Layer {
+    /// The layer that the file describes, which has a thickness.
+    pub(super) fn new(given: &contact::Layer) -> Self {
+        let sigma_m = match given.kernel {
+            Kernel::Gaussian => given.sigma_m(),
+            Kernel::Boussinesq => given.thickness_m * contact::Layer::SPREAD,
+        };
+        Self {
+            kernel: given.kernel,
+            sigma_m: sigma_m.max(MIN_SIGMA_M),
+            stiffness_pa_m: given.stiffness_pa / given.thickness_m,
+        }
+    }
+
+    fn depth_m(&self) -> f64 {
+        self.sigma_m / contact::Layer::SPREAD
+    }
+
+    /// How far along the surface a point force is felt, m.
+    pub(super) fn reach_m(&self) -> f64 {
+        match self.kernel {
+            Kernel::Gaussian => CUTOFF_SIGMAS * self.sigma_m,
+            Kernel::Boussinesq => CUTOFF_DEPTHS * self.depth_m(),
+        }
+    }
+
+    /// The edges of pieces that are small enough for this layer, m.
+    pub(super) fn piece_m(&self) -> f64 {
+        (self.sigma_m / 2.0).min(MAX_PIECE_M)
+    }
+
+    /// The edges of cubes in which forces may be put together, m.
+    pub(super) fn cube_m(&self) -> f64 {
+        self.sigma_m / 4.0
+    }
+
+    /// The pressure at this distance from a force, as a share of that below it.
+    pub(super) fn share_at(&self, distance_m: f64) -> f64 {
+        if distance_m > self.reach_m() {
+            return 0.0;
+        }
+        match self.kernel {
+            Kernel::Gaussian => {
+                let sigmas = distance_m / self.sigma_m;
+                libm::exp(-0.5 * sigmas * sigmas)
+            }
+            Kernel::Boussinesq => {
+                let depths = distance_m / self.depth_m();
+                let slope = 1.0 / (1.0 + depths * depths);
+                slope * slope * slope.sqrt()
+            }
+        }
+    }
+}

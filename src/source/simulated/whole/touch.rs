@@ -1,0 +1,207 @@
+//! One touch of a whole body: what it does to the taxels, and what is true of it.
+
+use glam::DVec3;
+
+use super::super::contact;
+use super::super::profile::Profile;
+use super::cells::{Cells, UNFELT};
+use super::chart::is_beside;
+use super::footprint::Footprint;
+use super::indenter::{END_M, Placed, Pose, Shape, walk};
+use super::layer::Layer;
+use super::path::{self, BodyPath, Waypoint};
+use super::press::{Pressure, Skin};
+use super::surface::WholeSurface;
+use crate::body::Body;
+
+/// What a taxel feels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::source::simulated) enum Covers {
+    /// The force on its cell: the surface that is nearer to it than to other taxels.
+    Cell,
+    /// The force on a square of its area.
+    Area,
+}
+
+/// What presses: one indenter, or two side by side with half of the force each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::source::simulated) enum Tool {
+    One(Shape),
+    Pair { shape: Shape, apart_m: f64 },
+}
+
+/// The skin of a whole body at rest, as simulated touches press it.
+pub(in crate::source::simulated) struct BodySkin {
+    surface: WholeSurface,
+    cells: Cells,
+    layer: Layer,
+    covers: Covers,
+}
+
+/// A touch of a whole body.
+pub(in crate::source::simulated) struct BodyTouch {
+    pub(in crate::source::simulated) name: String,
+    pub(in crate::source::simulated) tool: Tool,
+    /// rad
+    pub(in crate::source::simulated) angle: Profile,
+    pub(in crate::source::simulated) path: BodyPath,
+    pub(in crate::source::simulated) force_newton: Profile,
+}
+
+/// What one indenter does, in the body's frame at rest.
+pub(in crate::source::simulated) struct Contact {
+    pub(in crate::source::simulated) force_newton: f64,
+    pub(in crate::source::simulated) depth_m: f64,
+    pub(in crate::source::simulated) position: DVec3,
+    pub(in crate::source::simulated) normal: DVec3,
+    pub(in crate::source::simulated) link: usize,
+    pub(in crate::source::simulated) principal_axis: Option<DVec3>,
+    /// Of an indenter that has a direction.
+    pub(in crate::source::simulated) direction: Option<DVec3>,
+}
+
+impl Tool {
+    pub(in crate::source::simulated) fn is_long(&self) -> bool {
+        match self {
+            Self::One(shape) => shape.is_long(),
+            Self::Pair { .. } => true,
+        }
+    }
+}
+
+impl BodySkin {
+    /// The skin of `body` under `layer`, and the taxels with these indices and sides of squares of their area, m.
+    pub(in crate::source::simulated) fn new(
+        body: &Body,
+        layer: &contact::Layer,
+        taxels: &[(usize, f64)],
+        covers: Covers,
+    ) -> Self {
+        let layer = Layer::new(layer);
+        let (surface, cells) = (WholeSurface::new(body, layer.piece_m()), Cells::new(body, taxels));
+        Self { surface, cells, layer, covers }
+    }
+
+    /// The skin at `p`, if there is any within 20 mm.
+    pub(in crate::source::simulated) fn waypoint(&self, p: DVec3, outward: Option<DVec3>) -> Option<Waypoint> {
+        path::waypoint(&self.surface, p, outward)
+    }
+
+    /// Adds what the taxels feel of `pressure` to `forces_newton`.
+    fn feel(&self, pressure: &Pressure, forces_newton: &mut [f64]) {
+        match self.covers {
+            Covers::Cell => {
+                for felt in pressure.felt.iter().filter(|felt| felt.piece.taxel != UNFELT) {
+                    forces_newton[felt.piece.taxel as usize] += felt.force_newton;
+                }
+            }
+            Covers::Area => {
+                let reach_m = self.layer.reach_m();
+                let ends = pressure.loads.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), load| {
+                    (low.min(load.position), high.max(load.position))
+                });
+                for (index, (sensor, force)) in self.cells.sensors().iter().zip(forces_newton).enumerate() {
+                    let within = reach_m + sensor.side_m;
+                    if sensor.position.distance_squared(sensor.position.clamp(ends.0, ends.1)) <= within * within {
+                        *force += self.on_square(pressure, index);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The force on the square of a taxel's area: the pressure at Gauss's three by three nodes.
+    fn on_square(&self, pressure: &Pressure, taxel: usize) -> f64 {
+        /// √(3/5), and the weights of the outer and the middle node.
+        const NODES: [(f64, f64); 3] =
+            [(-0.774_596_669_241_483_4, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.774_596_669_241_483_4, 5.0 / 18.0)];
+        let sensor = &self.cells.sensors()[taxel];
+        let Some(spot) = self.surface.nearest(sensor.position, sensor.normal) else { return 0.0 };
+        let mesh = self.surface.facet(spot.facet).mesh;
+        let Some(part) = pressure.parts.get(&spot.facet).filter(|_| self.cells.is_on(taxel, mesh)) else {
+            return 0.0;
+        };
+        let skin = self.skin();
+        let u = sensor.normal.any_orthonormal_vector() * (sensor.side_m / 2.0);
+        let v = sensor.normal.cross(u);
+        let loads = || pressure.loads.iter().filter(|load| load.part == *part && is_beside(load.normal, sensor.normal));
+        let at = |p: DVec3| -> f64 {
+            let pressures = loads().filter(|load| load.spread_m2 > 0.0);
+            let of = |load: &super::press::Load| {
+                load.force_newton * skin.share(load, p - load.position, sensor.normal) / load.spread_m2
+            };
+            pressures.map(of).sum()
+        };
+        let nodes = NODES.iter().flat_map(|a| NODES.iter().map(move |b| (a, b)));
+        let mean: f64 = nodes.map(|((x, p), (y, q))| p * q * at(sensor.position + u * *x + v * *y)).sum();
+        mean * sensor.side_m * sensor.side_m
+    }
+
+    fn skin(&self) -> Skin<'_> {
+        Skin { surface: &self.surface, cells: &self.cells, layer: &self.layer }
+    }
+}
+
+impl BodyTouch {
+    /// The force at `t_s`, if the touch presses.
+    pub(in crate::source::simulated) fn force(&self, t_s: f64) -> Option<f64> {
+        self.force_newton.within(t_s).filter(|&force| force > 0.0)
+    }
+
+    /// A time up to `until_s` at which the touch presses and its path leaves the skin.
+    pub(in crate::source::simulated) fn leaves_skin(&self, skin: &BodySkin, until_s: f64) -> Option<f64> {
+        let times = self.path.times_to_check().chain(self.force_newton.times());
+        let mut pressed = times.filter(|&t_s| t_s <= until_s && self.force(t_s).is_some());
+        pressed.find(|&t_s| !self.path.is_on_skin(&skin.surface, t_s) || self.poses(skin, t_s).is_none())
+    }
+
+    /// The poses of its indenters; `None` where there is no skin for one.
+    fn poses(&self, skin: &BodySkin, t_s: f64) -> Option<Vec<(Shape, Pose)>> {
+        let pose = self.path.pose(&skin.surface, t_s, self.angle.held(t_s))?;
+        match self.tool {
+            Tool::One(shape) => Some(vec![(shape, pose)]),
+            Tool::Pair { shape, apart_m } => {
+                let beside = |along: DVec3| {
+                    let (way, left_m) = walk(&skin.surface, &pose.spot, along, apart_m / 2.0);
+                    // With a part of the way left, it has met the end of the skin.
+                    let (spot, _) = *way.last().filter(|_| left_m <= END_M)?;
+                    let normal = skin.surface.smooth_normal(&spot);
+                    let along = (pose.along - normal * pose.along.dot(normal)).normalize_or(pose.along);
+                    Some((shape, Pose { spot, normal, along }))
+                };
+                Some(vec![beside(-pose.along)?, beside(pose.along)?])
+            }
+        }
+    }
+
+    /// Presses at `t_s`, adds what the taxels feel to `forces_newton`, and returns what is true of each indenter; `None` where
+    /// there is no skin.
+    pub(in crate::source::simulated) fn press(
+        &self,
+        skin: &BodySkin,
+        t_s: f64,
+        force_newton: f64,
+        forces_newton: &mut [f64],
+    ) -> Option<Vec<Contact>> {
+        let poses = self.poses(skin, t_s)?;
+        let each_newton = force_newton / poses.len() as f64;
+        let mut contacts = Vec::with_capacity(poses.len());
+        for (shape, pose) in poses {
+            let placed = Placed::new(&skin.surface, shape, pose);
+            let pressure = skin.skin().press(&placed, each_newton);
+            skin.feel(&pressure, forces_newton);
+            let Footprint { spot, normal, link, principal_axis } = Footprint::new(&skin.surface, &pressure)?;
+            let flat = pose.along - normal * pose.along.dot(normal);
+            contacts.push(Contact {
+                force_newton: each_newton,
+                depth_m: pressure.depth_m,
+                position: spot.position,
+                normal,
+                link,
+                principal_axis,
+                direction: shape.is_long().then(|| flat.normalize_or(pose.along)),
+            });
+        }
+        Some(contacts)
+    }
+}

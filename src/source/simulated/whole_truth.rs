@@ -1,0 +1,99 @@
+//! Touches of the whole body in a simulation: their forces on the taxels, and their truth in the frames of links.
+
+use glam::DVec3;
+
+use super::truth::{Truth, line_angle};
+use super::whole::{BodySkin, BodyTouch, Contact};
+use super::whole_setup::leaves_skin;
+use crate::body::Body;
+use crate::error::{Error, Result};
+use crate::field::default_u;
+
+/// A touch of the whole body, and where its indenters were last.
+pub(super) struct TouchOfBody {
+    pub(super) touch: BodyTouch,
+    /// The frame, and the place of each indenter at rest.
+    last: Option<(u64, Vec<DVec3>)>,
+}
+
+/// A frame that is read.
+pub(super) struct Moment {
+    /// The touch's place in the file, from 0.
+    pub(super) touch: usize,
+    pub(super) frame: u64,
+    pub(super) t_s: f64,
+    /// Of the frame before, if there is one.
+    pub(super) before_s: Option<f64>,
+}
+
+impl TouchOfBody {
+    pub(super) fn new(touch: BodyTouch) -> Self {
+        Self { touch, last: None }
+    }
+
+    /// Presses, adds what the taxels feel to `forces_newton`, and returns what is true of each indenter.
+    pub(super) fn press(
+        &mut self,
+        body: &Body,
+        skin: &BodySkin,
+        moment: &Moment,
+        forces_newton: &mut [f64],
+    ) -> Result<Vec<Truth>> {
+        let (touch, &Moment { frame, t_s, before_s, .. }) = (&self.touch, moment);
+        let Some(force_newton) = touch.force(t_s) else { return Ok(Vec::new()) };
+        let off = |t_s: f64| Error::failed(leaves_skin(t_s));
+        let contacts = touch.press(skin, t_s, force_newton, forces_newton).ok_or_else(|| off(t_s))?;
+        let places = |contacts: &[Contact]| contacts.iter().map(|contact| contact.position).collect::<Vec<DVec3>>();
+        let known = self.last.take().filter(|(number, _)| number + 1 == frame).map(|(_, places)| places);
+        // Frames may be read in any order.
+        let before = match (known, before_s.and_then(|before_s| Some((before_s, touch.force(before_s)?)))) {
+            (None, Some((before_s, force))) => {
+                let mut unfelt = vec![0.0; forces_newton.len()];
+                let before = touch.press(skin, before_s, force, &mut unfelt).ok_or_else(|| off(before_s))?;
+                Some(places(&before))
+            }
+            (known, _) => known,
+        };
+        self.last = Some((frame, places(&contacts)));
+        let of_indenter = |(number, contact): (usize, &Contact)| {
+            let moved = before.as_ref().map(|places| contact.position - places[number]);
+            let name = match (contacts.len(), number) {
+                (1, _) => touch.name.clone(),
+                (_, 0) => format!("{} (first)", touch.name),
+                _ => format!("{} (second)", touch.name),
+            };
+            let velocity = moved.zip(before_s).map(|(moved, before_s)| moved / (t_s - before_s));
+            truth(body, moment.touch, name, contact, velocity)
+        };
+        Ok(contacts.iter().enumerate().map(of_indenter).collect())
+    }
+}
+
+/// The truth of `contact`, which moves with `velocity` on the body at rest.
+fn truth(body: &Body, touch: usize, name: String, contact: &Contact, velocity: Option<DVec3>) -> Truth {
+    let link = &body.links[contact.link];
+    let link_from_body = link.body_from_link.inverse();
+    let turned = |vector: DVec3| link_from_body.transform_vector3(vector);
+    let normal_in_link = turned(contact.normal);
+    let direction_in_link = contact.direction.map(turned);
+    let u = default_u(normal_in_link);
+    let u = (u - normal_in_link * u.dot(normal_in_link)).normalize_or(u);
+    let angle = direction_in_link.map(|d| libm::atan2(d.dot(normal_in_link.cross(u)), d.dot(u)));
+    Truth {
+        touch,
+        name,
+        link: link.name.clone(),
+        field: None,
+        position_in_link: link_from_body.transform_point3(contact.position),
+        normal_in_link,
+        uv: None,
+        angle: angle.map(line_angle),
+        velocity_in_link: velocity.map(turned),
+        velocity_uv: None,
+        speed: velocity.map(DVec3::length),
+        force_newton: contact.force_newton,
+        direction_in_link,
+        principal_axis_in_link: contact.principal_axis.map(turned),
+        depth_m: Some(contact.depth_m),
+    }
+}

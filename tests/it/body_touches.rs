@@ -1,0 +1,140 @@
+//! Simulated touches of whole bodies: across links, all of the force, the same however they are read, one line for what is wrong.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use somatic::Frame;
+use somatic::source::{SimulatedSource, Source as _};
+
+/// A rod over an elbow, a strap and a pair.
+fn elbow() -> SimulatedSource {
+    SimulatedSource::open(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/simulations/elbow.toml")).unwrap()
+}
+
+fn read(simulation: &mut SimulatedSource, number: u64) -> Frame {
+    simulation.seek(number);
+    let mut frame = Frame::missing(0.0, simulation.taxels().len());
+    assert!(simulation.next_frame(&mut frame).unwrap());
+    frame
+}
+
+#[test]
+fn a_rod_over_an_elbow_presses_both_links_with_all_of_its_force() {
+    let mut simulation = elbow();
+    let (mut links, mut turned_deg) = (BTreeSet::new(), 0.0_f64);
+    let mut before = None;
+    // The rod presses at 20 Hz from 0.2 to 2.2 s.
+    for number in (12..36).step_by(4) {
+        read(&mut simulation, number);
+        let [truth] = simulation.truth() else { panic!("one touch presses") };
+        let felt: f64 = simulation.forces_newton().iter().sum();
+        assert!((felt / truth.force_newton - 1.0).abs() < 0.01, "frame {number}: {felt} of {} N", truth.force_newton);
+        assert!((truth.normal_in_link.length() - 1.0).abs() < 1e-9 && truth.uv.is_none() && truth.field.is_none());
+        let speed = truth.speed.unwrap();
+        assert!((0.01..0.2).contains(&speed), "frame {number}: {speed} m/s");
+        let (axis, direction) = (truth.principal_axis_in_link.unwrap(), truth.direction_in_link.unwrap());
+        turned_deg = turned_deg.max(axis.cross(direction).length().asin().to_degrees());
+        let depth = truth.depth_m.unwrap();
+        assert!((1e-4..0.012).contains(&depth), "frame {number}: {depth} m");
+        links.insert(truth.link.clone());
+        assert!(before.replace(truth.position_in_link) != Some(truth.position_in_link));
+    }
+    assert_eq!(links.into_iter().collect::<Vec<_>>(), ["left_forearm", "left_upper_arm"]);
+    // A limb is no cylinder: its footprint lies otherwise than the rod.
+    assert!((0.5..30.0).contains(&turned_deg), "{turned_deg}°");
+    read(&mut simulation, 100);
+    let names: Vec<&str> = simulation.truth().iter().map(|truth| truth.name.as_str()).collect();
+    assert_eq!(names, ["fingers (first)", "fingers (second)"]);
+    let [one, other] = simulation.truth() else { panic!("two fingers press") };
+    let apart = one.position_in_link.distance(other.position_in_link);
+    assert!((0.025..0.031).contains(&apart) && one.force_newton == other.force_newton, "{apart}");
+}
+
+#[test]
+fn frames_of_whole_bodies_are_the_same_in_any_order() {
+    let (mut ahead, mut back) = (elbow(), elbow());
+    let numbers = [20_u64, 21, 22];
+    let forwards: Vec<(Frame, _)> =
+        numbers.iter().map(|&number| (read(&mut ahead, number), ahead.truth().to_vec())).collect();
+    for (&number, (frame, truth)) in numbers.iter().zip(&forwards).rev() {
+        assert_eq!(&read(&mut back, number), frame, "frame {number}");
+        assert_eq!(back.truth(), truth, "frame {number}");
+    }
+}
+
+#[test]
+fn a_taxel_feels_its_cell_or_its_area() {
+    let touch = |sensor: &str| {
+        let text = format!(
+            "body = \"hand\"\nrate_hz = 1\nduration_s = 1\n[layer]\nthickness_m = 0.002\n[sensor]\n{sensor}\n[[touch]]\n\
+             on = \"body\"\nindenter = \"ball\"\nradius_m = 0.004\npath = [{{ taxel = 4 }}]\nhold = {{ newton = 1 }}\n"
+        );
+        let mut simulation = SimulatedSource::from_text("a.toml", &text, Path::new("")).unwrap();
+        read(&mut simulation, 0);
+        simulation.forces_newton().to_vec()
+    };
+    let cells: f64 = touch("").iter().sum();
+    assert!((0.5..1.0 + 1e-9).contains(&cells), "{cells} N");
+    // A small sensor feels its area's share of the pressure above it.
+    let [small, smaller] = ["area_m2 = 2e-7", "area_m2 = 1e-7"].map(|area| touch(area)[4]);
+    assert!((small / smaller / 2.0 - 1.0).abs() < 0.01, "{small} {smaller}");
+    assert_eq!(touch("covers = \"area\"\narea_m2 = 1e-7")[4], smaller);
+    assert_eq!(touch("covers = \"cell\"").iter().sum::<f64>(), cells);
+}
+
+#[test]
+fn what_is_wrong_with_a_touch_of_the_body_is_said_in_one_line() {
+    const SOUND: &str = "body = \"hand\"\nrate_hz = 1\nduration_s = 1\n[layer]\nthickness_m = 0.002\n[[touch]]\non = \"body\"\n\
+                         indenter = \"rod\"\nradius_m = 0.004\nlength_m = 0.02\npath = [{ taxel = 4 }]\nhold = { newton = 1 }\n";
+    let open = |text: &str| SimulatedSource::from_text("a.toml", text, Path::new(""));
+    assert!(open(SOUND).is_ok());
+    for (from, to, expected) in [
+        (
+            "0.002",
+            "0",
+            "line 7, column 6: `on` is body, which needs a layer that gives way; give [layer] its `thickness_m`",
+        ),
+        ("\"rod\"", "\"flat\"", "line 8, column 12: on = \"body\" takes ball, ellipsoid, rod, strap and pair"),
+        ("\"rod\"", "\"strap\"", "`radius_m` has no effect for this indenter"),
+        ("\"rod\"\nradius_m = 0.004", "\"strap\"", "this indenter needs its `width_m`"),
+        ("\"rod\"\nradius_m = 0.004\nlength_m = 0.02", "\"ellipsoid\"", "this indenter needs its `radii_m`"),
+        (
+            "\"rod\"\nradius_m = 0.004\nlength_m = 0.02",
+            "\"ellipsoid\"\nradii_m = [1, 0, 1]",
+            "`radii_m` is three lengths over 0",
+        ),
+        ("radius_m = 0.004", "radius_m = 4", "`radius_m` is 4; on = \"body\" takes up to 1 m"),
+        ("{ taxel = 4 }", "{ taxel = 999 }", "line 11, column 9: the body has no taxel 999"),
+        ("{ taxel = 4 }", "{ taxel = 4, u = 1 }", "`path` has places [u, v], [x, y, z], { taxel = ID }"),
+        ("{ taxel = 4 }", "{ link = \"thum\", at = [0, 0, 0] }", "there is no link `thum`; did you mean `thumb`?"),
+        (
+            "{ taxel = 4 }",
+            "{ link = \"thumb\", at = [0, 1, 0] }",
+            "`path` has a place over 20 mm from the body's surface",
+        ),
+        ("{ taxel = 4 }", "{ link = \"thumb\", at = [0, nan, 0] }", "`path` has the coordinate NaN"),
+        ("{ taxel = 4 }", "{ taxel = 4 }, [0, 0, 0]", "on = \"body\" needs a `path` of { taxel = ID }"),
+        ("{ taxel = 4 }", "[0, 0, 0]", "on = \"body\" takes a `path` of { taxel = ID }"),
+        (
+            "\"body\"\nindenter",
+            "\"thumb\"\nindenter",
+            "`path` has a place of the whole body, which needs `on = \"body\"`",
+        ),
+        ("[[touch]]", "[sensor]\narea_m2 = 1e-5\ncovers = \"cell\"\n[[touch]]", "beside `area_m2` it must be area"),
+        (
+            "\"rod\"\nradius_m = 0.004\nlength_m = 0.02",
+            "\"pair\"\nradius_m = 0.004\napart_m = 0.9",
+            "`path` leaves the skin at 0",
+        ),
+    ] {
+        assert!(SOUND.contains(from), "{from}");
+        let line =
+            open(&SOUND.replacen(from, to, 1)).err().unwrap_or_else(|| panic!("`{to}` should be refused")).to_string();
+        assert!(line.contains(expected) && !line.contains('\n'), "`{to}`:\n  {line}\nhas no\n  {expected}");
+    }
+    // Where one link is touched, nothing of the body is taken.
+    let strap =
+        SOUND.replace("\"body\"", "\"thumb\"").replace("{ taxel = 4 }", "[0, 0, 0]").replace("\"rod\"", "\"strap\"");
+    let line = open(&strap.replace("radius_m = 0.004", "width_m = 0.004")).err().unwrap().to_string();
+    assert!(line.contains("`width_m` has no effect") || line.contains("presses whole bodies"), "{line}");
+}
