@@ -11,16 +11,25 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use somatic::Result;
+use somatic::body::{Body, Glb};
+use somatic::field::TaxelGraph;
 
 /// Every file that the recipes make: its name in `bodies/`, and its bytes.
 pub(crate) fn files() -> Result<Vec<(&'static str, Vec<u8>)>> {
     let hand = hand::make();
     Ok(vec![
-        ("hand.glb", hand.glb.to_bytes()?),
+        ("hand.glb", with_edges(hand.glb)?),
         ("touch.csv", touch::csv(&hand.sensors).into_bytes()),
-        ("mat.glb", mat::make().to_bytes()?),
+        ("mat.glb", with_edges(mat::make())?),
         ("humanoid.glb", humanoid::make()?),
     ])
+}
+
+/// `glb` with the edges between its taxels.
+fn with_edges(mut glb: Glb) -> Result<Vec<u8>> {
+    let body = Body::from_bytes("body", &glb.to_bytes()?)?;
+    glb.edges(&TaxelGraph::made(&body).to_stored(&body));
+    glb.to_bytes()
 }
 
 fn main() -> ExitCode {

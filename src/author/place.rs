@@ -99,7 +99,10 @@ pub fn place_by_density(
     density: impl Fn(&Placed) -> f64,
     progress: Progress<'_>,
 ) -> Result<Vec<Placed>> {
-    Ok(with_cells(positions, triangles, by_density(positions, triangles, count, seed, density, progress)?))
+    let mut placed = by_density(positions, triangles, count, seed, &density, progress)?;
+    let is_skin = skin_by_density(positions, triangles, &density);
+    set_cell_areas(positions, triangles, &|_| 0, &is_skin, &mut placed);
+    Ok(placed)
 }
 
 /// As [`place_by_density`], without areas.
@@ -205,10 +208,46 @@ fn those(samples: &[Placed], kept: &[usize]) -> Vec<Placed> {
 
 /// `placed`, each with the area of its cell, if it is one surface.
 fn with_cells(positions: &[DVec3], triangles: &[[u32; 3]], mut placed: Vec<Placed>) -> Vec<Placed> {
-    let points: Vec<CellPoint> = placed.iter().map(Placed::cell_point).collect();
-    let areas = cell_areas(positions, triangles, &|_| 0, &points);
-    placed.iter_mut().zip(areas).for_each(|(placed, area)| placed.point.area = area);
+    set_cell_areas(positions, triangles, &|_| 0, &vec![true; triangles.len()], &mut placed);
     placed
+}
+
+/// Gives each of `placed` the area of its cell on the triangles that are skin or hold a point; `group_of` a vertex is the surface
+/// that it belongs to.
+pub(super) fn set_cell_areas(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    group_of: &dyn Fn(u32) -> u32,
+    is_skin: &[bool],
+    placed: &mut [Placed],
+) {
+    let mut counts = is_skin.to_vec();
+    placed.iter().for_each(|placed| counts[placed.triangle] = true);
+    let mut number = vec![0; triangles.len()];
+    let mut skin = Vec::with_capacity(triangles.len());
+    for (triangle, _) in counts.iter().enumerate().filter(|(_, counts)| **counts) {
+        number[triangle] = skin.len();
+        skin.push(triangles[triangle]);
+    }
+    let point = |placed: &Placed| CellPoint { triangle: number[placed.triangle], ..placed.cell_point() };
+    let points: Vec<CellPoint> = placed.iter().map(point).collect();
+    let areas = cell_areas(positions, &skin, group_of, &points);
+    placed.iter_mut().zip(areas).for_each(|(placed, area)| placed.point.area = area);
+}
+
+/// Per triangle whether a density over 0 in its middle makes it skin.
+pub(super) fn skin_by_density(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    density: impl Fn(&Placed) -> f64,
+) -> Vec<bool> {
+    let middle = |(triangle, corners): (usize, &[u32; 3])| {
+        let [a, b, c] = corners.map(|corner| positions[corner as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let point = SurfacePoint { position: (a + b + c) / 3.0, normal, area: 0.0 };
+        density(&Placed { point, triangle, barycentric: [1.0 / 3.0; 3] }) > 0.0
+    };
+    triangles.iter().enumerate().map(middle).collect()
 }
 
 /// Per point the distance to its nearest neighbour on its side, m; `None` if there is none.

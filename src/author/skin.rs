@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::group::{FilePaint, Grouper, Grouping, group_while};
 use super::lattice::Lattice;
 use super::origin::Origin;
-use super::place::{apart, by_density, evenly, evenly_apart, nearest_on_its_side};
+use super::place::{apart, by_density, evenly, evenly_apart, nearest_on_its_side, set_cell_areas, skin_by_density};
 use super::placed::{Placed, Progress, SurfacePoint, report_progress};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{PlaceSpec, Placement, Recipe, shown};
@@ -16,7 +16,7 @@ use super::region::Regions;
 use super::rest_surface::{MeshTaxel, RestSurface};
 use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel, listed};
 use crate::error::{Error, Result, failed};
-use crate::field::{CellPoint, TaxelGraph, cell_areas, unions};
+use crate::field::{TaxelGraph, unions};
 
 /// Progress before and after placing taxels, and when they are in fields.
 const PROGRESS_OPENED: f64 = 0.05;
@@ -186,13 +186,12 @@ fn place_taxels(
     let chosen: Vec<usize> = (0..region.len()).filter(|&triangle| region[triangle]).collect();
     let triangles: Vec<[u32; 3]> = chosen.iter().map(|&triangle| rest_surface.triangles[triangle]).collect();
     let positions = &rest_surface.positions;
-    let sampled = |mut placed: Vec<Placed>| {
-        let points: Vec<CellPoint> = placed.iter().map(Placed::cell_point).collect();
-        let areas = cell_areas(positions, &triangles, &|vertex| rest_surface.group_of(vertex), &points);
-        placed.iter_mut().zip(areas).for_each(|(placed, area)| placed.point.area = area);
+    let on_skin = |mut placed: Vec<Placed>, is_skin: &[bool]| {
+        set_cell_areas(positions, &triangles, &|vertex| rest_surface.group_of(vertex), is_skin, &mut placed);
         let onto_canvas = |p: Placed| Placed { triangle: chosen[p.triangle], ..p };
         placed.into_iter().map(|p| Snapped { placed: onto_canvas(p), id: None, moved_m: 0.0 }).collect()
     };
+    let sampled = |placed: Vec<Placed>| on_skin(placed, &vec![true; triangles.len()]);
     Ok(match &place.how {
         Placement::Evenly { count, apart_m: None } => sampled(evenly(positions, &triangles, *count, seed, progress)?),
         Placement::Evenly { count, apart_m: Some(apart_m) } => {
@@ -224,7 +223,8 @@ fn place_taxels(
                 let corners = triangles[p.triangle].map(|v| painted[v as usize].unwrap_or(0.0));
                 corners.iter().zip(p.barycentric).map(|(value, weight)| value * weight).sum()
             };
-            sampled(by_density(positions, &triangles, *count, seed, density, progress)?)
+            let placed = by_density(positions, &triangles, *count, seed, density, progress)?;
+            on_skin(placed, &skin_by_density(positions, &triangles, density))
         }
         Placement::Grid { hexagonal, pitch_m, origin, u } => {
             check_fits(rest_surface, &chosen, "pitch", *pitch_m)?;

@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
+/// Largest taxel id: integers up to this one are exact as f32.
+pub const MAX_TAXEL_ID: u32 = 1 << 24;
+
 /// Version of the field JSON that is written, and the latest that is read.
 pub(crate) const VERSION: u32 = 1;
 

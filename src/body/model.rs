@@ -7,9 +7,6 @@ use super::joint::LinkJoint;
 use super::layout::FieldSpec;
 use super::stored_edges::StoredEdges;
 
-/// Largest taxel id: integers up to this one are exact as f32.
-pub const MAX_TAXEL_ID: u32 = 1 << 24;
-
 /// A rigid part of a robot, from a glTF node.
 #[derive(Clone, Debug)]
 pub struct Link {
@@ -157,7 +154,7 @@ impl Modality {
 /// One sensor on the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taxel {
-    /// Stable id, unique in the body, at most [`MAX_TAXEL_ID`].
+    /// Stable id, unique in the body, at most [`crate::body::MAX_TAXEL_ID`].
     pub id: u32,
     /// Index of its link.
     pub link: usize,

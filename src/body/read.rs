@@ -9,8 +9,8 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 
 use super::document::{Document, refuse_other_formats};
-use super::layout::{AREA, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
-use super::model::{Body, Home, Link, MAX_TAXEL_ID, Modality, Surface, Taxel};
+use super::layout::{AREA, FieldSpec, MAX_TAXEL_ID, MODALITY, NORMAL, TAXEL_ID};
+use super::model::{Body, Home, Link, Modality, Surface, Taxel};
 use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
 use super::primitives::{attribute, custom, has_mode, is_taxels};
 use super::repair;

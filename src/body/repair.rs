@@ -8,8 +8,8 @@ use json::mesh::Mode;
 use json::validation::Checked;
 
 use super::document::Document;
-use super::layout::FieldSpec;
-use super::model::{Body, MAX_TAXEL_ID};
+use super::layout::{FieldSpec, MAX_TAXEL_ID};
+use super::model::Body;
 use super::primitives::is_taxels;
 use crate::error::{Result, failed};
 

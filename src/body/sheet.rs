@@ -5,8 +5,8 @@ use std::collections::{BTreeSet, HashMap};
 use glam::DVec3;
 
 use super::glb::{Glb, MeshData};
-use super::layout::{ChartKind, ChartSpec, FieldSpec, MemberSpec};
-use super::model::{MAX_TAXEL_ID, Modality, Taxel};
+use super::layout::{ChartKind, ChartSpec, FieldSpec, MAX_TAXEL_ID, MemberSpec};
+use super::model::{Modality, Taxel};
 use crate::error::{Error, Result, failed};
 
 /// Cells whose corners are nearer to each other than this share them, m.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use serde::Deserialize;
 
-use super::model::MAX_TAXEL_ID;
+use super::layout::MAX_TAXEL_ID;
 use crate::error::{Error, Result, failed};
 
 /// Version of the JSON that is written, and the latest that is read.

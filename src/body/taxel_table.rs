@@ -6,7 +6,8 @@ use std::io::Read;
 
 use glam::DVec3;
 
-use super::model::{Body, MAX_TAXEL_ID, Modality};
+use super::layout::MAX_TAXEL_ID;
+use super::model::{Body, Modality};
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_TAXELS;
 

@@ -121,11 +121,6 @@ fn what_is_wrong_with_a_touch_of_the_body_is_said_in_one_line() {
             "`path` has a place of the whole body, which needs `on = \"body\"`",
         ),
         ("[[touch]]", "[sensor]\narea_m2 = 1e-5\ncovers = \"cell\"\n[[touch]]", "beside `area_m2` it must be area"),
-        (
-            "\"rod\"\nradius_m = 0.004\nlength_m = 0.02",
-            "\"pair\"\nradius_m = 0.004\napart_m = 0.9",
-            "`path` leaves the skin at 0",
-        ),
     ] {
         assert!(SOUND.contains(from), "{from}");
         let line =

@@ -656,5 +656,5 @@ fn the_bytes_are_the_same_on_every_machine() {
     let (frames, truth) = written(&mut SimulatedSource::open(example("rod.toml")).unwrap());
     let found = [fingerprint(&frames), fingerprint(&truth)];
     // Change these only with the model, the example or the hand itself; never because one machine disagrees.
-    assert_eq!(found, [0xB95A_3D5F_001F_200B, 0x8C1C_E77A_C86F_DF41], "{found:#018x?}");
+    assert_eq!(found, [0xB95A_3D5F_001F_200B, 0x8662_146D_F111_EB92], "{found:#018x?}");
 }

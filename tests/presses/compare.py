@@ -1,6 +1,6 @@
 """What simulated touches of a whole body are by an integration of their own, against what `somatic simulate` wrote.
 
-    compare.py where ROBOT                              the URDF of a robot of example-robot-data, and the folder of packages
+    compare.py where ROBOT                              the URDF of a robot of example-robot-data, and the folder of the package
     compare.py compare BODY.glb SIMULATION.toml FRAMES.csv TRUTH.csv TAXELS.json [LINE ...]
 
 Each touch of the simulation stays at a taxel. `compare` prints a JSON object: per touch how far the place is from the truth's, m,
@@ -533,7 +533,7 @@ def where(robot):
     files = [Path(file.locate()).resolve() for file in importlib.metadata.files("example-robot-data")]
     urdf = next(file for file in files if file.name == f"{robot}.urdf")
     print(urdf)
-    print(next(parent.parent for parent in urdf.parents if parent.name == "robots").parent)
+    print(next(parent.parent for parent in urdf.parents if parent.name == "robots"))
 
 
 if __name__ == "__main__":
