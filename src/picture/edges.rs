@@ -3,7 +3,8 @@
 use glam::DVec3;
 use plotters::prelude::*;
 
-use super::Prepared;
+use super::shape::Dots;
+use super::view::{Arrangement, View};
 use crate::body::{Body, Ray, RayTree};
 use crate::error::Result;
 use crate::field::TaxelGraph;
@@ -22,9 +23,16 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    /// For the edges between the taxels of `body` that each view sees.
-    pub(super) fn new(prepared: &Prepared, body: &Body) -> Self {
-        let Prepared { middle, arrangement, dots, views, .. } = prepared;
+    /// For the edges between the taxels of `body` that each of `views` sees; `middle` is what they look at, and `thick` how
+    /// thick they are, pixels.
+    pub(super) fn new(
+        body: &Body,
+        dots: &Dots,
+        views: &[View],
+        arrangement: &Arrangement,
+        middle: DVec3,
+        thick: u32,
+    ) -> Self {
         let (graph, _) = TaxelGraph::of(body);
         let surface = RayTree::new(body.triangles_at_rest().into_iter().map(|(_, corners)| corners));
         let mut lines = Vec::new();
@@ -38,7 +46,7 @@ impl Lines {
             let seen: Vec<bool> = (0..dots.places.len()).map(is_seen).collect();
             let [left, top, width, height] = arrangement.views[index].part.map(|pixels| pixels as i32);
             let pixel = |place: DVec3| {
-                let [x, y] = arrangement.pixel(index, place - *middle);
+                let [x, y] = arrangement.pixel(index, place - middle);
                 (x.round() as i32, y.round() as i32)
             };
             // A view may show less than the body.
@@ -51,7 +59,7 @@ impl Lines {
                 }
             }
         }
-        Self { lines, thick: if prepared.usual_radius() > 4.0 { 2 } else { 1 } }
+        Self { lines, thick }
     }
 
     /// Draws them into a picture of `size`.

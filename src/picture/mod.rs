@@ -66,7 +66,7 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Pictu
     drawing.slices = dots.slices(&shown.coloured(fields), *middle, prepared.usual_radius() > 2.0);
     let mut pixels = raster::draw(&drawing)?;
     if options.edges {
-        Lines::new(&prepared, body).draw(*size, &mut pixels)?;
+        prepared.edges(body).draw(*size, &mut pixels)?;
     }
     let mut labels = Labels::new(&title, size[0]);
     labels.key(shown.key(fields), options.size);
@@ -128,6 +128,12 @@ impl Prepared {
         let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
         let (corners, faces) = shape::surface(&triangles, middle);
         Ok(Self { dots, views, middle, arrangement, size, radius_m, corners, faces })
+    }
+
+    /// The lines between neighbouring taxels.
+    fn edges(&self, body: &Body) -> Lines {
+        let thick = if self.usual_radius() > 4.0 { 2 } else { 1 };
+        Lines::new(body, &self.dots, &self.views, &self.arrangement, self.middle, thick)
     }
 
     /// Radius of a usual disc, pixels.

@@ -62,7 +62,7 @@ impl<'a> TouchPicture<'a> {
     pub fn new(body: &'a Body, fields: &'a [Field], options: &Options, ids: bool) -> Result<Self> {
         let key = vec![(None, "0.00 s".to_owned())];
         let prepared = Prepared::new(body, fields, options, &title(body), key)?;
-        let edges = options.edges.then(|| Lines::new(&prepared, body));
+        let edges = options.edges.then(|| prepared.edges(body));
         Ok(Self { body, fields, prepared, ids, edges })
     }
 

@@ -69,6 +69,7 @@ mod tradeoff;
 mod tune;
 #[cfg(all(unix, feature = "page"))]
 mod view;
+mod voronoi;
 mod world;
 
 use std::io::Write as _;

@@ -12,6 +12,8 @@ pub(super) struct Refined {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Per triangle the one that it is a part of.
     pub(super) parent: Vec<u32>,
+    /// Per triangle whether its edges have not been looked at: an edge that is short enough once stays so.
+    is_new: Vec<bool>,
 }
 
 /// Cuts all edges of `topology` in two that are longer than `shortest` and than what `wanted` gives at their middles, again and
@@ -26,6 +28,7 @@ pub(super) fn refine(
         positions: topology.positions.clone(),
         triangles: topology.triangles.clone(),
         parent: (0..topology.triangles.len() as u32).collect(),
+        is_new: vec![true; topology.triangles.len()],
     };
     let mut is_cut = false;
     while refined.triangles.len() < most && refined.cut(shortest, &wanted) {
@@ -38,7 +41,7 @@ impl Refined {
     /// Cuts long edges once; whether there was one.
     fn cut(&mut self, shortest: f64, wanted: &impl Fn(DVec3) -> f64) -> bool {
         let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
-        for &[a, b, c] in &self.triangles {
+        for (&[a, b, c], _) in self.triangles.iter().zip(&self.is_new).filter(|(_, is_new)| **is_new) {
             for (from, to) in [(a, b), (b, c), (c, a)] {
                 let key = (from.min(to), from.max(to));
                 let [p, q] = [key.0, key.1].map(|v| self.positions[v as usize]);
@@ -53,6 +56,7 @@ impl Refined {
             return false;
         }
         let (triangles, parents) = (std::mem::take(&mut self.triangles), std::mem::take(&mut self.parent));
+        self.is_new.clear();
         for (corners, parent) in triangles.into_iter().zip(parents) {
             let [a, b, c] = corners;
             let middle = |(from, to): (u32, u32)| middles.get(&(from.min(to), from.max(to))).copied();
@@ -60,6 +64,7 @@ impl Refined {
             for part in self.parts(corners, cuts) {
                 self.triangles.push(part);
                 self.parent.push(parent);
+                self.is_new.push(cuts.iter().any(Option::is_some));
             }
         }
         true

@@ -4,6 +4,7 @@
 //! along the surface is at most 2 √(the larger cell). Parts of one link's surface that no mesh connects, and taxels without a
 //! surface, get edges by their places: see `points.rs`. Links that no surface connects have no edges between them.
 
+mod nodes;
 mod points;
 mod surface;
 
@@ -11,7 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use crate::body::{Body, EdgeRow, Modality, StoredEdges, listed};
+use self::nodes::nodes;
+use crate::body::{Body, EdgeRow, StoredEdges, listed};
 
 /// Stored sums of lengths are rounded to whole parts of this many a metre.
 const PARTS_PER_M: f64 = 1e6;
@@ -189,11 +191,6 @@ impl TaxelGraph {
         }
         Self { neighbours }
     }
-}
-
-/// Indices of the pressure taxels of `body`.
-fn nodes(body: &Body) -> impl Iterator<Item = usize> + '_ {
-    (0..body.taxels.len()).filter(|&taxel| body.taxels[taxel].modality == Modality::Pressure)
 }
 
 fn place_at_rest(body: &Body, link: usize, position_in_link: DVec3) -> DVec3 {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::nodes;
+use super::nodes::nodes;
 use super::points::{self, LENGTH_PER_ROOT, LinkPoint};
 use crate::body::{Body, point_tree};
 use crate::field::cells::{COINCIDENT_M, Cells};

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::chart::{carried, unrolled};
+use super::pieces::between;
 use super::surface::{Spot, WholeSurface, faces};
 
 /// Distance of the points of a strap's middle line, m.
@@ -107,6 +108,14 @@ impl Placed {
     /// Its middle when its lowest point is `depth_m` under the surface.
     fn middle(&self, depth_m: f64) -> DVec3 {
         self.pose.spot.position + self.pose.normal * (self.shape.deepest_m() - depth_m)
+    }
+
+    /// The triangles that make up the part of that with these corners which lies between its flat ends, if it has such.
+    pub(super) fn between_ends(&self, corners: [DVec3; 3]) -> Vec<[DVec3; 3]> {
+        let Shape::Rod { length_m, .. } = self.shape else { return vec![corners] };
+        // They stay where they are at any depth.
+        let middle = self.pose.spot.position.dot(self.pose.along);
+        between(corners, self.pose.along, [middle - length_m / 2.0, middle + length_m / 2.0])
     }
 
     /// Points and a radius around them that hold all of the surface that it may press at depths from `from_m` to `to_m`.

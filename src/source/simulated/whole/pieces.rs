@@ -42,6 +42,32 @@ pub(super) fn pieces(
     }
 }
 
+/// The triangles that make up the part of that with these corners which lies between two planes: those of the points whose
+/// coordinate along `along` is `from` and `to`.
+pub(super) fn between(corners: [DVec3; 3], along: DVec3, [from, to]: [f64; 2]) -> Vec<[DVec3; 3]> {
+    let coordinates = corners.map(|p| p.dot(along));
+    if coordinates.iter().all(|&x| (from..=to).contains(&x)) {
+        return vec![corners];
+    }
+    let mut outline = corners.to_vec();
+    for (limit, inwards) in [(from, 1.0), (to, -1.0)] {
+        let beyond = |p: DVec3| (p.dot(along) - limit) * inwards;
+        let mut cut = Vec::with_capacity(outline.len() + 1);
+        for (index, &p) in outline.iter().enumerate() {
+            let q = outline[(index + 1) % outline.len()];
+            let (here, there) = (beyond(p), beyond(q));
+            if here >= 0.0 {
+                cut.push(p);
+            }
+            if (here < 0.0) != (there < 0.0) {
+                cut.push(p + (q - p) * (here / (here - there)));
+            }
+        }
+        outline = cut;
+    }
+    outline.windows(2).skip(1).map(|pair| [outline[0], pair[0], pair[1]]).collect()
+}
+
 pub(super) fn middle([a, b, c]: [DVec3; 3]) -> DVec3 {
     (a + b + c) / 3.0
 }
@@ -49,6 +75,21 @@ pub(super) fn middle([a, b, c]: [DVec3; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_triangle_is_cut_at_both_planes() {
+        let corners = [DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0];
+        let area =
+            |parts: &[[DVec3; 3]]| -> f64 { parts.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).z / 2.0).sum() };
+        for (ends, wanted) in
+            [([0.0, 4.0], 8.0), ([1.0, 2.0], 2.5), ([-1.0, 1.0], 3.5), ([3.0, 9.0], 0.5), ([5.0, 6.0], 0.0)]
+        {
+            let parts = between(corners, DVec3::X, ends);
+            assert!((area(&parts) - wanted).abs() < 1e-12, "{ends:?}: {}", area(&parts));
+            let inside = |p: &DVec3| p.x >= ends[0] - 1e-12 && p.x <= ends[1] + 1e-12;
+            assert!(parts.iter().flatten().all(inside), "{parts:?}");
+        }
+    }
 
     #[test]
     fn pieces_are_the_whole_triangle_and_no_longer_than_asked() {

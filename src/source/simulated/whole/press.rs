@@ -159,12 +159,14 @@ impl Skin<'_> {
         for index in facets {
             let facet = self.surface.facet(index);
             let may_hold = |p: DVec3, radius: f64| placed.may_hold(from_m, to_m, p, radius);
-            pieces(facet.corners, edge_m, may_hold, |corners, area_m2| {
-                let middle = middle(corners);
-                if let Some(bulge) = placed.presses(middle, facet.normal) {
-                    found.push(Pressed { facet: index, middle, area_m2, bulge });
-                }
-            });
+            for corners in placed.between_ends(facet.corners) {
+                pieces(corners, edge_m, may_hold, |corners, area_m2| {
+                    let middle = middle(corners);
+                    if let Some(bulge) = placed.presses(middle, facet.normal) {
+                        found.push(Pressed { facet: index, middle, area_m2, bulge });
+                    }
+                });
+            }
         }
         found
     }
