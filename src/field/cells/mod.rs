@@ -338,7 +338,6 @@ fn depth([a, b, c]: [DVec3; 3], p: DVec3) -> f64 {
 /// How far points are from each other.
 struct Spacing {
     tree: PointTree,
-    positions: Vec<DVec3>,
     /// Per point the distance to the nearest other, m.
     nearest_m: Vec<f64>,
     /// The least of them, m.
@@ -355,13 +354,21 @@ impl Spacing {
         };
         let nearest_m: Vec<f64> = positions.iter().enumerate().map(nearest).collect();
         let least_m = nearest_m.iter().copied().fold(f64::INFINITY, f64::min);
-        Self { tree, positions, nearest_m, least_m }
+        Self { tree, nearest_m, least_m }
     }
 
-    /// Maximum length of an edge around `p`, m.
+    /// Maximum length of an edge around `p`, m. It changes by no more than `EDGE_SHARE` a metre: where it leapt, an edge that is cut
+    /// beside a longer one that is not would come back as the new edge, again and again.
     fn edge_at(&self, p: DVec3) -> f64 {
-        let Some(nearest) = self.tree.nearest_neighbor(p.to_array()) else { return f64::INFINITY };
-        EDGE_SHARE * self.nearest_m[nearest.data].max(self.positions[nearest.data].distance(p))
+        let mut least_m = f64::INFINITY;
+        for (spot, squared) in self.tree.nearest_neighbor_iter_with_distance_2(p.to_array()) {
+            let away_m = squared.sqrt();
+            if away_m >= least_m {
+                break;
+            }
+            least_m = least_m.min(self.nearest_m[spot.data].max(away_m));
+        }
+        EDGE_SHARE * least_m
     }
 }
 
