@@ -183,6 +183,27 @@ def sampled(corners, spacing):
     return np.concatenate(points), np.concatenate(areas), np.concatenate(of)
 
 
+def between(corners, along, low, high):
+    """The triangles that make up what lies between two planes across `along`, and whose they are."""
+    found, of = [], []
+    for index, triangle in enumerate(corners):
+        outline = list(triangle)
+        for limit, inwards in ((low, 1), (high, -1)):
+            beyond = [(p @ along - limit) * inwards for p in outline]
+            cut = []
+            for k, p in enumerate(outline):
+                q, here, there = outline[(k + 1) % len(outline)], beyond[k], beyond[(k + 1) % len(outline)]
+                if here >= 0:
+                    cut.append(p)
+                if (here < 0) != (there < 0):
+                    cut.append(p + (q - p) * here / (here - there))
+            outline = cut
+        for k in range(1, len(outline) - 1):
+            found.append((outline[0], outline[k], outline[k + 1]))
+            of.append(index)
+    return np.array(found, float).reshape(-1, 3, 3), np.array(of, int)
+
+
 def rows(triangle, area, lengths, spacing):
     """The points of a long triangle in rows along its longest edge, with the rows' areas."""
     k = int(np.argmax(lengths))
@@ -364,15 +385,22 @@ class Touch:
             most = keys["radii_m"][2] if kind == "ellipsoid" else keys["radius_m"]
             near = body.near(pose[0] + pose[1] * (most - told_depth), size[kind]() + 2 * margin)
             low, high = told_depth - margin, min(told_depth + margin, most)
+        corners = body.corners[near]
+        if kind == "rod":
+            # Its flat ends stay where they are at any depth.
+            middle, half = pose[0] @ pose[2], keys["length_m"] / 2
+            corners, of = between(corners, pose[2], middle - half, middle + half)
+            near = near[of]
         # Coarse first, to find where it presses, then fine there.
         for spacing in (1.5e-3, 0.4e-3, 0.12e-3):
-            points, areas, of = sampled(body.corners[near], spacing)
+            points, areas, of = sampled(corners, spacing)
             normals = body.normals[near][of]
             maybe = (self.depths(pose, high, points, normals, line) > 0) | (self.depths(pose, low, points, normals, line) > 0)
             if maybe.sum() > 4000 or spacing == 0.12e-3:
                 break
             wide = np.unique(of[maybe | (self.depths(pose, high + 2 * spacing, points, normals, line) > 0)])
-            near = near[wide] if len(wide) else near
+            if len(wide):
+                near, corners = near[wide], corners[wide]
         points, areas, normals, facets = points[maybe], areas[maybe], normals[maybe], near[of[maybe]]
         open_ = ~self.covered(points, normals)
         points, areas, normals, facets = points[open_], areas[open_], normals[open_], facets[open_]

@@ -11,8 +11,8 @@ use super::layer::Layer;
 use super::pieces::{middle, pieces};
 use super::surface::{Piece, Tile, WholeSurface};
 
-/// Pieces that an indenter presses, at least: as many as place its pressure to a hundredth of its size.
-const ENOUGH: usize = 800;
+/// Pieces that an indenter presses, at least: as many as give its force to a hundredth, and its place far better.
+const ENOUGH: usize = 2000;
 /// Edges of the pieces that an indenter presses, at least, m.
 const MIN_EDGE_M: f64 = 3e-5;
 /// Attempts at pieces of the right size.
