@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::*;
-use crate::body::{Glb, MeshData, Taxel};
+use crate::body::{Glb, MeshData, Modality, Taxel};
 
 const PITCH: f64 = 0.01;
 
