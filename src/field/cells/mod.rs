@@ -149,7 +149,7 @@ impl Cells {
         let is_first = |&point: &usize| first[point] as usize == point;
         let starts: Vec<usize> = (0..places.len()).filter(is_first).collect();
         let mut cells = Self { areas: vec![0.0; places.len()], first, borders: BTreeMap::new(), pieces: Vec::new() };
-        let spacing = Spacing::of(starts.iter().map(|&start| positions[start]).collect());
+        let spacing = Spacing::of(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
         let most = CUTS_PER_TRIANGLE * topology.triangles.len() + CUTS_PER_POINT * starts.len();
         let refined = refine(topology, EDGE_SHARE * spacing.least_m, |p| spacing.edge_at(p), most);
         match refined {
@@ -345,7 +345,7 @@ struct Spacing {
 }
 
 impl Spacing {
-    fn of(positions: Vec<DVec3>) -> Self {
+    fn of(positions: &[DVec3]) -> Self {
         let tree = point_tree(positions.iter().copied());
         let nearest = |(index, at): (usize, &DVec3)| {
             let mut others = tree.nearest_neighbor_iter_with_distance_2(at.to_array());
