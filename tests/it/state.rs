@@ -63,7 +63,7 @@ fn a_recording_goes_on_from_a_state_with_the_same_bits() {
         {
             let case = Case { backend, cadence, drift, tare };
             let whole = percepts(&mut case.engine(&body), &frames, 32);
-            for start in [0, 1, 37, 100] {
+            for start in [1, 37] {
                 let mut first = case.engine(&body);
                 percepts(&mut first, &frames[..start], 16);
                 let state = first.state().unwrap();
@@ -78,7 +78,7 @@ fn a_recording_goes_on_from_a_state_with_the_same_bits() {
                     assert_eq!(differs, None, "{case:?} from frame {start}");
                 }
                 let without = percepts(&mut case.engine(&body), &frames[start..], 19);
-                assert!(start == 0 || without != whole[start..], "{case:?}: the state should matter");
+                assert!(without != whole[start..], "{case:?}: the state should matter");
             }
         }
     }

@@ -25,6 +25,10 @@ COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 
 
+class Inside(Exception):
+    """All that an indenter reaches is inside the body, as at a taxel that nothing can touch."""
+
+
 def unit(v):
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-300)
 
@@ -411,6 +415,8 @@ class Touch:
             low, high = (middle, high) if force(middle) < self.force else (low, middle)
         own = self.depths(pose, high, points, normals, line) * areas
         keep = own > 0
+        if not keep.any():
+            raise Inside
         points, normals, facets, own = points[keep], normals[keep], facets[keep], own[keep] * self.force / own.sum()
         return high, told, self.spread(points, normals, facets, own)
 
@@ -527,7 +533,11 @@ def compare(body_path, simulation, frames, truth, listed, *lines):
         sums = {}
         for pose, row in zip(touch.poses, said):
             number = lambda *columns: np.array([float(row[column]) for column in columns])
-            depth, force, pressed = touch.press(pose, float(row["depth"]))
+            try:
+                depth, force, pressed = touch.press(pose, float(row["depth"]))
+            except Inside:
+                found.append({"touch": index, "indenter": touch_keys["indenter"], "covered": True})
+                continue
             world = body.world[names[row["link"]]]
             place = world[:3, :3] @ number("x", "y", "z") + world[:3, 3]
             normal = world[:3, :3] @ number("nx", "ny", "nz")
@@ -549,6 +559,8 @@ def compare(body_path, simulation, frames, truth, listed, *lines):
             found.append(one)
             for taxel, force in taxel_forces(body, pressed, taxels, carried).items():
                 sums[taxel] = sums.get(taxel, 0.0) + force
+        if not sums:
+            continue
         row = rows[int(said[0]["frame"])]
         whole = sum(float(one["force"]) for one in said)
         apart = [abs(float(row[str(taxel)]) - force) for taxel, force in sums.items()]
