@@ -10,9 +10,11 @@ mod fit;
 mod ids;
 mod input;
 mod links;
+mod on_skin;
 mod place;
 mod post;
 mod self_contacts;
+mod skin_fits;
 mod spread;
 mod state;
 
@@ -22,6 +24,7 @@ use self::drift_state::DriftState;
 use self::ids::ranges;
 use self::input::Input;
 use self::links::Links;
+use self::on_skin::OnSkin;
 use self::post::PostState;
 use self::self_contacts::SelfContacts;
 pub use self::state::EngineState;
@@ -30,10 +33,11 @@ use crate::backend::{self, Backend, BackendKind, Picks, Step};
 use crate::body::Body;
 use crate::error::{Error, Result};
 use crate::field::{FieldSet, NoChart, Recharted, neighbours};
-use crate::percept::Percepts;
+use crate::percept::{LinkShare, Percepts};
 use crate::scene::{Cadence, Plan, Scene};
 use crate::signal::{Calibration, Frame, FrameTime, Intake, RawValue, Receptor, Unfit, Wiring};
 use crate::stage::{Pressed, calibrate};
+use crate::touch::Skin;
 
 /// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
 #[derive(Clone, Debug)]
@@ -113,6 +117,8 @@ pub struct Engine {
     pressed: Vec<Pressed>,
     /// Where self-contacts are asked for.
     self_contacts: Option<SelfContacts>,
+    /// Where touches of the whole body are asked for.
+    on_skin: Option<OnSkin>,
     /// Fields that could not have the kind of chart that is asked for.
     kept_charts: Vec<(String, NoChart)>,
 }
@@ -151,6 +157,7 @@ impl Engine {
             ));
         }
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
+        let layer = calibration.layer;
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
         let mut engine = Self {
             steps: Vec::new(),
@@ -159,6 +166,7 @@ impl Engine {
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
                 .with_columns(plan.columns, plan.kept_pressures())
                 .with_letters(plan.letters().len())
+                .with_touch_frames(plan.touched_from.is_some())
                 .with_names((0..plan.fields.len()).map(|field| plan.label(field)).collect()),
             check: None,
             post: PostState::initial(&plan),
@@ -182,6 +190,7 @@ impl Engine {
                 plan.fields.iter().map(|field| plan.members_of(field).len()).max().unwrap_or(0),
             ),
             self_contacts: SelfContacts::new(body, &plan, &scene),
+            on_skin: OnSkin::new(body, &plan, &scene, layer),
             kept_charts: recharted.kept,
             plan,
         };
@@ -266,7 +275,8 @@ impl Engine {
         self.ids.binary_search(&id).ok()
     }
 
-    /// What is to be known before the first frame, a line each: taxels that no letter reads, and drift that no taxel can tell.
+    /// What is to be known before the first frame, a line each: taxels that no letter reads, drift that no taxel can tell, and edges
+    /// between taxels that are not those of the body's file.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let drift = self.drift.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
@@ -274,7 +284,44 @@ impl Engine {
              and drift is taken for pressure; give the body more fields, or leave `time_constant_s` of [drift] out"
                 .to_owned()
         });
-        self.plan.left_out.remark().into_iter().chain(drift).collect()
+        let edges = self.on_skin.as_ref().and_then(OnSkin::note).map(str::to_owned);
+        self.plan.left_out.remark().into_iter().chain(drift).chain(edges).collect()
+    }
+
+    /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`] asks for them. Its nodes are what
+    /// [`crate::TouchFrame::taxels`] counts.
+    #[must_use]
+    pub fn skin(&self) -> Option<&Skin> {
+        self.on_skin.as_ref().map(OnSkin::skin)
+    }
+
+    /// Puts into `to`, in place of what it holds, what pressed on each link in the last frame, whatever touches it is of, in the body's
+    /// order: its total, and its wrench in the link's frame where that is known. A controller takes this off what it measures.
+    /// Nothing unless [`Scene::touches`] asks for touches.
+    ///
+    /// ```
+    /// # fn main() -> somatic::Result<()> {
+    /// use somatic::{Body, Engine, Options, RawValue, Scene, bundled, touch};
+    ///
+    /// let body = Body::from_bytes("hand", bundled::HAND)?;
+    /// let scene = Scene::default().touches(touch::Options::default());
+    /// let mut engine = Engine::new(&body, Options::default().scene(scene))?;
+    /// let mut frame = engine.frame(0.0);
+    /// frame.values.fill(RawValue::new(0.0));
+    /// frame.values[engine.index_of_taxel(4).unwrap()] = RawValue::new(5.0);
+    /// engine.process_one(&frame)?;
+    /// let mut presses = Vec::new();
+    /// engine.presses_on_links(&mut presses);
+    /// // Counts are no newtons: there is no wrench.
+    /// assert!(presses[0].total == 5.0 && presses[0].wrench.is_none());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn presses_on_links(&self, to: &mut Vec<LinkShare>) {
+        to.clear();
+        if let Some(on_skin) = &self.on_skin {
+            on_skin.on_links(to);
+        }
     }
 
     /// What has changed since about how percepts are computed, to be said once: a GPU that [`BackendKind::Auto`] had chosen was

@@ -129,7 +129,7 @@ impl GainsSurvey {
         let percepts = self.engine.process(frames)?.clone();
         for (index, frame) in frames.iter().enumerate() {
             for field in 0..percepts.fields() {
-                if percepts.touches(index, field).len() != 1 || self.engine.plan().fields[field].divided {
+                if percepts.field_touches(index, field).len() != 1 || self.engine.plan().fields[field].divided {
                     continue;
                 }
                 self.seen += 1;

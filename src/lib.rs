@@ -101,6 +101,7 @@ pub mod signal;
 pub mod sink;
 pub mod source;
 mod stage;
+pub mod touch;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 pub mod wire;
@@ -112,8 +113,8 @@ pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{
-    COLUMNS, Column, ContactKind, Fit, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact,
-    SelfContactSide, Touch,
+    COLUMNS, Column, ContactKind, FieldTouch, Fit, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact,
+    SelfContactSide, TOUCH_COLUMNS, Touch, TouchColumn, TouchFlags, TouchFrame, TouchOutputs,
 };
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, FrameTime, Letter, Pose, RawValue, Receptor};

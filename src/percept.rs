@@ -36,6 +36,8 @@ mod flags;
 mod keep;
 mod presence;
 mod self_contacts;
+mod touch;
+mod touch_columns;
 mod typed;
 
 pub use batch::Percepts;
@@ -48,6 +50,8 @@ pub use export::ColumnValues;
 pub use fit::{Fit, FitSigma};
 pub use flags::Flags;
 pub use self_contacts::{SelfContact, SelfContactSide};
+pub use touch::{FieldShare, LinkShare, Touch, TouchFit, TouchFlags, TouchFrame, Wrench};
+pub use touch_columns::{TOUCH_COLUMNS, TouchColumn, TouchOutputs};
 
 /// The arithmetic that made the numbers, and so the digits worth printing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +64,7 @@ pub enum Precision {
 
 /// One of a field's separate touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
+pub struct FieldTouch {
     /// Lasts from onset to release, and is never used again for the field.
     pub id: u64,
     /// Σ wᵢPᵢ over its taxels.
@@ -78,7 +82,7 @@ pub struct Touch {
     pub flags: Flags,
 }
 
-impl Touch {
+impl FieldTouch {
     /// The quantity of `column`, an output of the fit, its components first, if it is present.
     #[must_use]
     pub fn value(&self, column: &Column) -> Option<[f64; 3]> {

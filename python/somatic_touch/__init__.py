@@ -12,7 +12,7 @@ np.float32(360.0)
 """
 
 from ._errors import InputError, SomaticError, UsageError
-from ._flags import Flags
+from ._flags import Flags, TouchFlags
 from ._native import (
     Body,
     Calibration,
@@ -52,6 +52,7 @@ __all__ = [
     "SelfContacts",
     "Simulation",
     "SomaticError",
+    "TouchFlags",
     "Touches",
     "UsageError",
     "View",

@@ -1,4 +1,4 @@
-"""The bits of `Percepts.flags`."""
+"""The bits of `Percepts.flags` and of `Touches.flags`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,14 @@ import enum
 import operator
 
 
-class Flags(enum.IntFlag):
+class _Flags(enum.IntFlag):
+    @classmethod
+    def _missing_(cls, value: object) -> object:
+        # NumPy's integers are none of Python's.
+        return super()._missing_(operator.index(value))  # type: ignore[arg-type]
+
+
+class Flags(_Flags):
     """Why a quantity is absent or in doubt, and what was wrong with the input.
 
     >>> import somatic_touch as st
@@ -43,10 +50,33 @@ class Flags(enum.IntFlag):
     STALE_POSE = 1 << 27
     NO_POSE = 1 << 28
 
-    @classmethod
-    def _missing_(cls, value: object) -> object:
-        # NumPy's integers are none of Python's.
-        return super()._missing_(operator.index(value))  # type: ignore[arg-type]
+
+class TouchFlags(_Flags):
+    """Why a quantity of a touch is absent or in doubt, and what was wrong with the input.
+
+    >>> import somatic_touch as st
+    >>> st.TouchFlags.YOUNG | st.TouchFlags.NO_UNIT
+    <TouchFlags.YOUNG|NO_UNIT: 8256>
+    """
+
+    ONE_TAXEL = 1 << 0
+    TIE = 1 << 1
+    COINCIDENT = 1 << 2
+    ISOTROPIC = 1 << 3
+    WRAPPED = 1 << 4
+    SEVERAL_LINKS = 1 << 5
+    YOUNG = 1 << 6
+    MERGED = 1 << 7
+    SATURATED = 1 << 8
+    FAULTY_INPUT = 1 << 9
+    OUT_OF_RANGE = 1 << 10
+    INCOMPLETE = 1 << 11
+    STALE = 1 << 12
+    NO_UNIT = 1 << 13
+    FEW_TAXELS = 1 << 14
+    OFF_SKIN = 1 << 15
+    POOR_FIT = 1 << 16
+    NO_LAYER = 1 << 17
 
 
-Flags.__module__ = "somatic_touch"
+Flags.__module__ = TouchFlags.__module__ = "somatic_touch"

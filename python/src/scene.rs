@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyDictMethods, PyFloat, PyInt, PyString};
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use somatic::error::{parse_toml, unknown};
+use somatic::error::parse_toml;
 use somatic::renamed::new_name;
 use somatic::scene::{
-    Arithmetic, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy,
+    Arithmetic, AskedOutputs, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy,
 };
 use somatic::signal::{FsrSignal, Quantity};
-use somatic::{BackendKind, Calibration, Error, Letter, Options, Outputs, Receptor, Scene};
+use somatic::{BackendKind, Calibration, Error, Letter, Options, Outputs, Receptor, Scene, TouchOutputs, touch};
 
 use crate::error::{OrRaise, usage};
 
@@ -52,12 +52,27 @@ const OF_THE_COMMAND: [&str; 31] = [
     "zenoh_config",
 ];
 
+/// When touches of the whole body begin and end.
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct TouchKeys {
+    on: f64,
+    off: f64,
+}
+
+impl TouchKeys {
+    fn options(self, outputs: TouchOutputs) -> touch::Options {
+        touch::Options { on: self.on, off: self.off, outputs, ..touch::Options::default() }
+    }
+}
+
 /// The keys of a scene that say what is computed.
 #[derive(Clone, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct Keys {
     #[serde(deserialize_with = "list")]
-    outputs: Vec<Named>,
+    outputs: Vec<AskedOutputs>,
+    touch: Option<TouchKeys>,
     #[serde(deserialize_with = "list")]
     fields: Vec<String>,
     #[serde(deserialize_with = "list")]
@@ -96,21 +111,6 @@ struct KnobKeys {
     coverage: Option<Coverage>,
     #[serde(deserialize_with = "word")]
     cadence: Option<Cadence>,
-}
-
-/// An output by its name.
-#[derive(Clone, Copy)]
-struct Named(Outputs);
-
-impl FromStr for Named {
-    type Err = Error;
-
-    fn from_str(name: &str) -> somatic::Result<Self> {
-        Outputs::named(name).map(Self).ok_or_else(|| {
-            let names: Vec<String> = Outputs::all().names().collect();
-            Error::usage(unknown("output", name, names.iter().map(String::as_str)))
-        })
-    }
 }
 
 /// One text or a list of them.
@@ -259,7 +259,8 @@ impl PyScene {
         let Keys { letters, signal, accuracy, .. } = &self.keys;
         let has_unit =
             |calibration: &Calibration| calibration.taxels.iter().any(|taxel| taxel.quantity != Quantity::Count);
-        let outputs = match self.keys.outputs.iter().map(|named| named.0).reduce(|a, b| a | b) {
+        let asked = self.keys.outputs.iter().copied().reduce(|a, b| a | b);
+        let outputs = match asked.map(|asked| asked.of_fields) {
             Some(outputs) => outputs,
             None if calibration.is_some_and(has_unit) => Outputs::USUAL | Outputs::FORCE,
             None => Outputs::USUAL,
@@ -281,6 +282,11 @@ impl PyScene {
             .filter(self.keys.filter()?)
             .knobs(knobs)
             .contact_tolerance_m(self.keys.contact_tolerance_m)
+            .touches(
+                asked
+                    .and_then(AskedOutputs::of_body)
+                    .map(|outputs| self.keys.touch.unwrap_or_default().options(outputs)),
+            )
             .relative_to(self.keys.relative_to.clone())
             .coordinates(self.keys.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()
@@ -319,6 +325,13 @@ impl Keys {
         }
         if let Some(tolerance) = self.contact_tolerance_m.filter(|it| !(it.is_finite() && *it > 0.0)) {
             return Err(Error::usage(format!("contact_tolerance_m: {tolerance} is no distance; give metres over 0")));
+        }
+        if let Some(TouchKeys { on, off }) = self.touch
+            && !([on, off].iter().all(|p| p.is_finite() && *p >= 0.0) && off <= on)
+        {
+            return Err(Error::usage(format!(
+                "touch: on = {on} and off = {off}: give numbers from 0 on, off no larger than on"
+            )));
         }
         if self.batch == Some(0) {
             return Err(Error::usage("batch: 0 is no number of frames; give one from 1 on"));

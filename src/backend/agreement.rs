@@ -6,7 +6,7 @@ use std::fmt;
 use glam::{DVec2, DVec3};
 
 use super::bounds::CellBound;
-use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Percepts, Touch};
+use crate::percept::{COLUMNS, Column, FieldTouch, Flags, Measure, Outputs, Percept, Percepts};
 use crate::stage::POSE_ROUNDING;
 use crate::stage::angle::{between_directions, between_lines};
 use crate::stage::limit::Limit;
@@ -137,7 +137,7 @@ pub(crate) fn compare(
             let bound = &bounds[frame * names.len() + field];
             let mut cell = Cell { quantities: &mut agreement.quantities, failure: None };
             cell.compare(&reference.get(frame, field), bound, &candidate.get(frame, field));
-            cell.compare_touches(reference.touches(frame, field), bound, candidate.touches(frame, field));
+            cell.compare_touches(reference.field_touches(frame, field), bound, candidate.field_touches(frame, field));
             let failure = cell.failure;
             agreement.percepts += 1;
             if let Some(what) = failure {
@@ -305,21 +305,21 @@ impl Cell<'_> {
         }
     }
 
-    fn compare_touches(&mut self, right: &[Touch], bound: &CellBound, got: &[Touch]) {
+    fn compare_touches(&mut self, right: &[FieldTouch], bound: &CellBound, got: &[FieldTouch]) {
         let touches = name(Outputs::TOUCHES);
         for index in 0..right.len().max(got.len()) {
             let (right, got) = (right.get(index), got.get(index));
             let same = |a: &(u64, u32), b: &(u64, u32)| if a == b { 0.0 } else { f64::INFINITY };
             let limit = bound.touch;
-            let identity = |touch: &Touch| (touch.id, touch.active);
+            let identity = |touch: &FieldTouch| (touch.id, touch.active);
             self.quantity(&touches, right.map(identity), got.map(identity), limit.map(|_| 0.0), same);
-            let of = |touch: &Touch| touch.total;
+            let of = |touch: &FieldTouch| touch.total;
             let total = limit.map(|limit| limit.total * right.map_or(0.0, of));
             self.quantity(&format!("{touches}.total"), right.map(of), got.map(of), total, distance);
-            let of = |touch: &Touch| touch.centroid;
+            let of = |touch: &FieldTouch| touch.centroid;
             let place = limit.map(|limit| [limit.place; 2]);
             self.place(&format!("{touches}.centroid"), right.and_then(of), got.and_then(of), place);
-            let of = |touch: &Touch| touch.position;
+            let of = |touch: &FieldTouch| touch.position;
             let limit = far(limit.map(|limit| limit.position), right.and_then(of));
             self.quantity(&format!("{touches}.position"), right.and_then(of), got.and_then(of), limit, apart_in_space);
         }
@@ -485,7 +485,7 @@ mod tests {
 
     #[test]
     fn a_touch_that_is_not_there_fails() {
-        let touch = Touch {
+        let touch = FieldTouch {
             id: 1,
             total: 10.0,
             active: 3,
@@ -494,12 +494,12 @@ mod tests {
             fit: None,
             flags: Flags::empty(),
         };
-        let touched = |touches: &[Touch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
+        let touched = |touches: &[FieldTouch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
         let right = touched(&[touch]);
         let limit =
             CellBound { touch: Limit::Within(TouchBound { total: 1e-6, place: 1e-6, position: 1e-6 }), ..bound() };
         assert!(compare(&right, &[limit], &touched(&[touch]), &NAMES).holds());
-        for touches in [vec![], vec![Touch { centroid: None, ..touch }], vec![touch, touch]] {
+        for touches in [vec![], vec![FieldTouch { centroid: None, ..touch }], vec![touch, touch]] {
             assert!(!compare(&right, &[limit], &touched(&touches), &NAMES).holds(), "{touches:?}");
         }
     }

@@ -46,7 +46,7 @@ pub(crate) use repair::listed;
 pub use sheet::{Sheet, SheetCell, sheets};
 pub use stored_edges::{EdgeRow, StoredEdges};
 pub use surface::{Hit, SurfaceIndex};
-pub(crate) use surface::{Nearest, PointTree, area_vector, point_tree};
+pub(crate) use surface::{Nearest, PointTree, area_vector, nearest_on_triangle, point_tree};
 pub use taxel_table::{TaxelRow, read_taxel_table, taxel_table};
 pub(crate) use topology::next;
 pub use topology::{Flaws, NONE, Topology};

@@ -225,6 +225,11 @@ pub(crate) fn area_vector([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
+/// The point of a triangle that is nearest to `p`.
+pub(crate) fn nearest_on_triangle(corners: [DVec3; 3], p: DVec3) -> DVec3 {
+    Triangle(corners).nearest(p)
+}
+
 /// Three corners, counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
 struct Triangle([DVec3; 3]);

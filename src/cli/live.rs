@@ -3,14 +3,16 @@
 use std::time::{Duration, Instant};
 
 use console::{Term, style};
-use somatic::{Engine, Outputs, Percept, Percepts, plain};
+use somatic::{Body, Engine, Outputs, Percept, Percepts, plain};
 
 use super::screen::Screen;
 use super::words::{clipped, count, fitted, number, span};
 
 mod columns;
+mod on_skin;
 
 use columns::{PrintedUnit, Scale};
+use on_skin::TouchTable;
 
 /// Between two drawings: as fast as reading needs, slow enough not to flicker.
 const REDRAW_INTERVAL: Duration = Duration::from_millis(66);
@@ -29,7 +31,7 @@ pub(super) enum ViewKind {
 /// What a view shows about a run.
 pub(super) struct RunInfo<'a> {
     pub(super) engine: &'a Engine,
-    pub(super) body: &'a str,
+    pub(super) body: &'a Body,
     pub(super) source: &'a str,
     pub(super) all_fields: bool,
 }
@@ -207,6 +209,7 @@ struct Table {
     outputs: Outputs,
     all_fields: bool,
     rows: Vec<FieldRow>,
+    touches: Option<TouchTable>,
     largest_total: f64,
     unit: PrintedUnit,
     /// What positions in the world are in.
@@ -220,6 +223,7 @@ impl Table {
     fn new(about: &RunInfo<'_>) -> Self {
         let (name, what, _) = about.engine.backend();
         let plan = about.engine.plan();
+        let unit = plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::of);
         let row = |field: usize| FieldRow {
             name: plain::line(&plan.label(field)).into_owned(),
             latest: None,
@@ -229,13 +233,14 @@ impl Table {
             largest: None,
         };
         Self {
-            title: plain::line(&format!("{} ← {}", about.body, about.source)).into_owned(),
+            title: plain::line(&format!("{} ← {}", about.body.name, about.source)).into_owned(),
             backend: format!("{name}, {what}"),
             outputs: plan.outputs(),
             all_fields: about.all_fields,
             rows: (0..plan.fields().len()).map(row).collect(),
+            touches: TouchTable::new(about.engine, about.body, unit),
             largest_total: 0.0,
-            unit: plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::of),
+            unit,
             world: plain::line(plan.world()).into_owned(),
             in_world: false,
             tallest: 0,
@@ -244,13 +249,16 @@ impl Table {
 
     fn see(&mut self, percepts: &Percepts) {
         let now = Instant::now();
+        if let Some(touches) = &mut self.touches {
+            touches.see(percepts);
+        }
         for frame in 0..percepts.frames() {
             for percept in percepts.touched(frame) {
                 let row = &mut self.rows[percept.field];
                 row.frames_touched += 1;
                 row.touched_at = Some(now);
                 row.latest = Some(percept);
-                row.touches = percepts.touches(frame, percept.field).len();
+                row.touches = percepts.field_touches(frame, percept.field).len();
                 self.in_world |= percept.in_world;
                 if let Some(total) = percept.total {
                     self.largest_total = self.largest_total.max(total);
@@ -282,6 +290,9 @@ impl Table {
         }
         if rows >= 8 && wide(&self.title) + 2 <= columns {
             lines.insert(0, format!("  {}", style(&self.title).bold()));
+        }
+        if let Some(touches) = &mut self.touches {
+            lines.extend(touches.lines(columns.saturating_sub(2)).into_iter().map(|line| format!("  {line}")));
         }
         let shown = |row: &&FieldRow| self.all_fields || row.touched_at.is_some_and(|at| at.elapsed() < FADE_TIME);
         let visible: Vec<&FieldRow> = self.rows.iter().filter(shown).collect();
@@ -317,6 +328,9 @@ impl Table {
             number_of_frames(pace.frames as f64 / seconds.max(1e-9)),
             self.backend
         );
+        if let Some(touches) = &self.touches {
+            text += &touches.summary();
+        }
         let touched: Vec<&FieldRow> = self.rows.iter().filter(|row| row.frames_touched > 0).collect();
         if touched.is_empty() {
             return text + &format!("none of {} was touched\n", count(self.rows.len() as u64, "field"));

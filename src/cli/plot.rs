@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use somatic::percept::Unit;
 use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
+use somatic::scene::AskedOutputs;
 use somatic::signal::Quantity;
 use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
 
@@ -130,7 +131,7 @@ fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> Run
         body: arguments.body.clone(),
         sources: source.cloned().into_iter().collect(),
         fields: arguments.fields.clone(),
-        outputs: vec![outputs_for(wanted)],
+        outputs: vec![AskedOutputs::from(outputs_for(wanted))],
         calibration: arguments.calibration.clone(),
         backend: Some(BackendKind::Cpu),
         from: arguments.from,

@@ -215,7 +215,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
     #[cfg(feature = "page")]
     let taxels = source.taxels().to_vec();
-    let about = RunInfo { engine: &engine, body: &body.name, source: &input.name, all_fields: asked.all_fields };
+    let about = RunInfo { engine: &engine, body: &body, source: &input.name, all_fields: asked.all_fields };
     let view = view.open(&about);
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]

@@ -8,6 +8,7 @@ mod flags;
 mod jointed;
 mod joints_delay;
 mod outputs;
+mod touches;
 mod within;
 
 use std::path::{Path, PathBuf};
@@ -18,20 +19,20 @@ use serde::Deserialize;
 use somatic::author::mesh::Up;
 use somatic::error::parse_toml;
 use somatic::limits::{self, MAX_TOML_BYTES};
-use somatic::scene::{Coordinates, FilterBy};
+use somatic::scene::{AskedOutputs, Coordinates, FilterBy};
 use somatic::signal::{FsrSignal, Letter, Receptor};
 use somatic::sink::{RecordPart, RosTime, SinkSpec};
 use somatic::source::{SourceSpec, VendorFormat};
 use somatic::{BackendKind, Body, Error, Options, Outputs, Result, Scene, bundled};
 
 use self::accuracy::Accuracy;
-pub(super) use self::deserialize::output;
 use self::deserialize::{OneOrMany, batch, names_of, outputs, window, word, words};
 use self::flags::{ACCURACY, COMPUTED, OUTPUT, RECORDINGS, ROBOT};
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
 use self::joints_delay::JointsDelay;
 use self::outputs::output_names;
-pub(super) use self::outputs::{outputs_help, outputs_or_usual};
+pub(super) use self::outputs::{output, outputs_help, outputs_or_usual};
+use self::touches::TouchKeys;
 use self::within::{sink_within, source_within, states_within};
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
@@ -70,10 +71,14 @@ pub(super) struct RunOptions {
 
     /// Compute only these quantities [default: all but touches, self_contacts, speed_in_world, filtered_*, fit_* and *_sigma;
     /// force only where P has a unit].
-    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
     #[schemars(with = "Vec<String>", transform = output_names)]
-    pub(super) outputs: Vec<Outputs>,
+    pub(super) outputs: Vec<AskedOutputs>,
+
+    /// When touches of the whole body begin and end: `on` and `off`, in the unit of P.
+    #[arg(skip)]
+    pub(super) touch: Option<TouchKeys>,
 
     /// The calibration of the sensors, a TOML file; without one, pressures are raw values [default: the source's own,
     /// if it has one].
@@ -364,7 +369,7 @@ impl RunOptions {
         }
         let asked = merged! {
             values: zenoh_config ros_time joints joint_states up joints_delay joints_max_age body backend calibration rate wiring format grid pitch unit layout live_rate board_rate batch speed from to repeat max_age max_gap contact_tolerance
-                coordinates relative_to filter_window filter_by filter_time filter_over,
+                coordinates relative_to touch filter_window filter_by filter_time filter_over,
             lists: sources sinks allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict force verify quiet
         };
@@ -373,7 +378,8 @@ impl RunOptions {
     }
 
     pub(super) fn outputs(&self) -> Outputs {
-        outputs_or_usual(&self.outputs).with_needed()
+        let of_fields: Vec<Outputs> = self.outputs.iter().map(|asked| asked.of_fields).collect();
+        outputs_or_usual(&of_fields).with_needed()
     }
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.
@@ -410,6 +416,7 @@ impl RunOptions {
             .filter(self.filter(outputs)?)
             .knobs(self.accuracy.knobs())
             .contact_tolerance_m(self.contact_tolerance)
+            .touches(self.touches())
             .relative_to(self.relative_to.clone())
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()

@@ -195,12 +195,21 @@ impl Engine {
             }
         }
         post.finish(&raw, &mut self.percepts, &mut self.post, Some(&mut *self.backend))?;
+        if let Some(on_skin) = &mut self.on_skin {
+            on_skin.find((&self.plan, &self.links), frames, &raw, self.intake.stale(), &mut self.percepts);
+        }
         if let Some(check) = &mut check {
             check.finish(&post, &raw, first_bound)?;
         }
         if let Some(drift) = &mut self.drift {
             let cells = range.start * self.plan.fields.len()..range.end * self.plan.fields.len();
             drift.note_contact(&self.percepts.flags[cells.clone()]);
+            if let Some(first) = self.plan.touched_from {
+                let slots = self.plan.slots();
+                for index in range.clone() {
+                    drift.note_pressed(&self.percepts.pressures[index * slots..][first..][..channels]);
+                }
+            }
             drift.flag_unknown_drift(&mut self.percepts.flags[cells.clone()]);
             check.into_iter().for_each(|check| drift.flag_unknown_drift(&mut check.right.flags[cells.clone()]));
         }

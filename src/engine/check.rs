@@ -149,7 +149,7 @@ mod tests {
     use crate::backend::agreement::{Agreement, compare};
     use crate::body::Body;
     use crate::engine::{Engine, Options};
-    use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Store, Touch, Values};
+    use crate::percept::{COLUMNS, Column, FieldTouch, Flags, Measure, Outputs, Percept, Store, Values};
     use crate::scene::Scene;
     use crate::signal::{Pose, RawValue};
     use crate::stage::limit::Limit;
@@ -199,8 +199,8 @@ mod tests {
         /// The last percept for which `right` and `limit` give a value and a bound over 0.
         fn find(
             &self,
-            right: impl Fn(&Percept, Option<&Touch>) -> Option<f64>,
-            limit: impl Fn(&CellBound, &(Percept, Option<Touch>)) -> Limit,
+            right: impl Fn(&Percept, Option<&FieldTouch>) -> Option<f64>,
+            limit: impl Fn(&CellBound, &(Percept, Option<FieldTouch>)) -> Limit,
         ) -> (usize, f64, f64) {
             let right_of = |cell: usize| self.right(cell).and_then(|(percept, touch)| right(&percept, touch.as_ref()));
             let mut cells = (0..self.check.bounds.len()).rev();
@@ -211,15 +211,16 @@ mod tests {
             found.expect("a value that is compared")
         }
 
-        fn right(&self, cell: usize) -> Option<(Percept, Option<Touch>)> {
+        fn right(&self, cell: usize) -> Option<(Percept, Option<FieldTouch>)> {
             let (frame, field) = (cell / self.check.right.fields(), cell % self.check.right.fields());
-            Some((self.check.right.get(frame, field), self.check.right.touches(frame, field).first().copied()))
+            Some((self.check.right.get(frame, field), self.check.right.field_touches(frame, field).first().copied()))
         }
     }
 
     type Change = fn(&mut Percepts);
     /// Its name, what is right, how far off it may be, and how to put another.
-    type OfTouch = (&'static str, fn(&Touch) -> Option<f64>, fn(TouchBound, &Touch) -> f64, fn(&mut Touch, f64));
+    type OfTouch =
+        (&'static str, fn(&FieldTouch) -> Option<f64>, fn(TouchBound, &FieldTouch) -> f64, fn(&mut FieldTouch, f64));
 
     /// Puts `value` into component `component` of `column`; whether that is kept in single precision.
     fn put(percepts: &mut Percepts, cell: usize, column: &Column, component: usize, value: f64) -> bool {
@@ -312,7 +313,7 @@ mod tests {
                 }
             }
             for (name, right, limit, put) in of_touches {
-                let of = |bound: &CellBound, (_, touch): &(Percept, Option<Touch>)| match (bound.touch, touch) {
+                let of = |bound: &CellBound, (_, touch): &(Percept, Option<FieldTouch>)| match (bound.touch, touch) {
                     (Limit::Within(bound), Some(touch)) => Limit::Within(limit(bound, touch)),
                     _ => Limit::TooClose,
                 };

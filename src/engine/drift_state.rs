@@ -21,6 +21,9 @@ pub(super) struct DriftState {
     groups: Vec<Vec<Option<usize>>>,
     /// Per field, whether it was in contact in this epoch.
     touched: Vec<bool>,
+    /// The channels that no field reads, which only touches of the whole body are found on; and which were pressed in this epoch.
+    alone: Vec<usize>,
+    alone_pressed: Vec<bool>,
     /// Per field, whether the drift of one of its taxels is unknown.
     unknown: Vec<bool>,
 }
@@ -32,7 +35,10 @@ impl DriftState {
     }
 
     fn in_groups(plan: &Plan, keys: DriftKeys, groups: Vec<Vec<Option<usize>>>) -> Option<Self> {
+        let is_read = plan.touched_channels(&vec![true; plan.fields.len()]);
         Some(Self {
+            alone: (0..plan.channels()).filter(|&channel| !is_read[channel]).collect(),
+            alone_pressed: vec![false; plan.channels()],
             compensation: DriftCompensation::new(
                 keys,
                 (0..plan.channels()).map(|channel| kept(plan, channel)),
@@ -92,6 +98,13 @@ impl DriftState {
         }
     }
 
+    /// Notes which channels that no field reads are pressed in a frame, by channel.
+    pub(super) fn note_pressed(&mut self, pressures: &[f64]) {
+        for &channel in &self.alone {
+            self.alone_pressed[channel] |= pressures[channel] > 0.0;
+        }
+    }
+
     pub(super) fn flag_unknown_drift(&self, cells: &mut [Flags]) {
         for frame in cells.chunks_exact_mut(self.unknown.len()) {
             for (flags, &unknown) in frame.iter_mut().zip(&self.unknown) {
@@ -103,11 +116,16 @@ impl DriftState {
 
     /// Judges the epoch that ends, and puts the outcome into `plan`. Returns whether anything changed in it.
     pub(super) fn close(&mut self, plan: &mut Plan) -> bool {
-        let contact = plan.touched_channels(&self.touched);
+        let mut contact = plan.touched_channels(&self.touched);
+        self.alone.iter().for_each(|&channel| contact[channel] = self.alone_pressed[channel]);
         self.touched.fill(false);
+        self.alone_pressed.fill(false);
+        let alone = &self.alone;
         let changed = self.compensation.close(&contact, |pressed| {
             let holds = |field| plan.members_of(field).iter().any(|m| pressed[plan.channel_of(m.slot as usize)]);
-            plan.touched_channels(&plan.fields.iter().map(holds).collect::<Vec<_>>())
+            let mut touched = plan.touched_channels(&plan.fields.iter().map(holds).collect::<Vec<_>>());
+            alone.iter().for_each(|&channel| touched[channel] = pressed[channel]);
+            touched
         });
         let unknown: Vec<bool> = self.compensation.unknown().collect();
         for (flagged, field) in self.unknown.iter_mut().zip(plan.fields.iter()) {

@@ -10,7 +10,7 @@ use super::self_contacts::SelfContacts;
 use super::spread::{self, Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::error::Result;
-use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Touch, Values};
+use crate::percept::{FieldTouch, Flags, Host, Outputs, Percepts, Precision, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
@@ -380,7 +380,7 @@ impl Post<'_> {
         };
         percepts.push_touches(found.iter().map(|touch| {
             let place = touch.place * unit_m;
-            Touch {
+            FieldTouch {
                 id: touch.id,
                 total: touch.total,
                 active: touch.active,

@@ -61,7 +61,7 @@ impl SelfContacts {
             touched = true;
             let Some(world) = world else { continue };
             placed = true;
-            sides.extend(percepts.touches(index, number).iter().filter_map(|touch| {
+            sides.extend(percepts.field_touches(index, number).iter().filter_map(|touch| {
                 let position = DVec3::from_array(touch.position?);
                 let normal = touch.centroid.map(|[u, v]| place::on_skin(field, DVec3::new(u, v, 0.0)).1);
                 Some(Side {
@@ -78,7 +78,7 @@ impl SelfContacts {
         if restarts {
             memory.restart();
         }
-        memory.release(|field, id| percepts.touches(index, field).iter().any(|touch| touch.id == id));
+        memory.release(|field, id| percepts.field_touches(index, field).iter().any(|touch| touch.id == id));
         let found =
             pairs(&sides, |a, b| self.tolerance.between_m(a, b), |a, b| self.overlaps.contains(&[a.min(b), a.max(b)]));
         let contact = |pair: &crate::stage::self_contacts::Pair| {

@@ -3,11 +3,13 @@
 use super::Engine;
 use super::cadence::ChangeState;
 use super::drift_state::DriftState;
+use super::on_skin::OnSkin;
 use super::post::PostState;
 use crate::backend::BackendState;
 use crate::error::{Error, Result};
 use crate::signal::{FrameTime, IntakeState, TaxelCalibration};
 use crate::stage::layout;
+use crate::touch::TouchState;
 
 /// Everything that the next percepts depend on beside the next frames.
 ///
@@ -42,6 +44,7 @@ pub struct EngineState {
     post: PostState,
     cadence: Option<ChangeState>,
     drift: Option<DriftState>,
+    touches: Option<TouchState>,
 }
 
 impl EngineState {
@@ -69,6 +72,7 @@ impl Engine {
             post: self.post.clone(),
             cadence: self.cadence.as_ref().map(|cadence| cadence.state.clone()),
             drift: self.drift.clone(),
+            touches: self.on_skin.as_ref().map(OnSkin::state),
         })
     }
 
@@ -83,7 +87,8 @@ impl Engine {
             && state.intake.taxels() == self.ids.len()
             && state.calibration.is_some() == self.recalibrates
             && state.cadence.is_some() == self.cadence.is_some()
-            && state.drift.is_some() == self.drift.is_some();
+            && state.drift.is_some() == self.drift.is_some()
+            && state.touches.is_some() == self.on_skin.is_some();
         if !fits {
             return Err(Error::usage(
                 "the state is of an engine with another body, scene or calibration; restore it where it fits",
@@ -101,6 +106,9 @@ impl Engine {
         self.drift.clone_from(&state.drift);
         if let (Some(cadence), Some(state)) = (&mut self.cadence, &state.cadence) {
             cadence.state.clone_from(state);
+        }
+        if let (Some(on_skin), Some(touches)) = (&mut self.on_skin, &state.touches) {
+            on_skin.restore(touches);
         }
         (self.frames_done, self.last_time, self.tare) = (state.frames_done, state.last_time, state.tare);
         self.check = None;

@@ -3,6 +3,7 @@
 //! [`FieldSet::new`] builds the fields that a body's file specifies: a parent gets the union of its descendants' taxels,
 //! every field an anchor, and a chart if it has one.
 
+mod cell_surface;
 mod cells;
 mod chart;
 mod distortion;
@@ -20,6 +21,7 @@ mod surface_grid;
 mod surface_groups;
 mod unroll;
 
+pub(crate) use cell_surface::CellSurface;
 pub(crate) use cells::{COINCIDENT_M, CellPoint, cell_areas};
 pub(crate) use chart::default_u;
 pub use chart::{Chart, NoChart};

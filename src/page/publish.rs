@@ -129,7 +129,7 @@ impl Publisher {
         snapshot.touches.clear();
         if percepts.outputs().contains(Outputs::TOUCHES) {
             for percept in &snapshot.percepts {
-                let touches = percepts.touches(last, percept.field).iter();
+                let touches = percepts.field_touches(last, percept.field).iter();
                 snapshot.touches.extend(touches.map(|touch| (percept.field as u32, *touch)));
             }
         }

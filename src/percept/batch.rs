@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::columns::{Column, Component, Host, Store};
-use super::{Flags, Outputs, Percept, Precision, SelfContact, Touch};
+use super::{FieldTouch, Flags, Outputs, Percept, Precision, SelfContact, Touch, TouchFrame};
 
 /// Backends' numbers in one precision, part by part, each a value per cell; a cell is `frame · fields + field`.
 ///
@@ -68,12 +68,14 @@ pub struct Percepts {
     pub(super) host: [Vec<f64>; Host::COUNT],
     /// P, frame by frame, each taxel by taxel.
     pub(crate) pressures: Vec<f64>,
-    touches: Vec<Touch>,
+    touches: Vec<FieldTouch>,
     /// Per cell, the end of its touches.
     touch_ends: Vec<u32>,
     self_contacts: Vec<SelfContact>,
     /// Per frame, the end of its self-contacts, and whether they are known.
     self_contact_ends: Vec<(u32, bool)>,
+    /// Touches of the whole body by frame, where they are wanted.
+    touch_frames: Option<Vec<TouchFrame>>,
 }
 
 impl Percepts {
@@ -104,6 +106,7 @@ impl Percepts {
             touch_ends: Vec::new(),
             self_contacts: Vec::new(),
             self_contact_ends: Vec::new(),
+            touch_frames: None,
         }
     }
 
@@ -126,9 +129,17 @@ impl Percepts {
         self
     }
 
+    /// The same, with touches of the whole body if they are wanted.
+    pub(crate) fn with_touch_frames(mut self, are_wanted: bool) -> Self {
+        self.touch_frames = are_wanted.then(Vec::new);
+        self
+    }
+
     /// Whether both have room for the same columns of the same fields.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let shape = |of: &Self| (of.outputs, of.columns, of.fields, of.letters, of.slots, of.precision());
+        let shape = |of: &Self| {
+            (of.outputs, of.columns, of.fields, of.letters, of.slots, of.precision(), of.touch_frames.is_some())
+        };
         shape(self) == shape(other) && Arc::ptr_eq(&self.names, &other.names)
     }
 
@@ -138,6 +149,7 @@ impl Percepts {
             .with_columns(self.columns, self.slots)
             .with_letters(self.letters)
             .with_names(Arc::clone(&self.names))
+            .with_touch_frames(self.touch_frames.is_some())
     }
 
     /// Makes room for `frames` frames, every cell empty. Allocates only when a batch is larger than all before it.
@@ -167,6 +179,10 @@ impl Percepts {
         self.touch_ends.clear();
         self.self_contacts.clear();
         self.self_contact_ends.clear();
+        if let Some(touch_frames) = &mut self.touch_frames {
+            touch_frames.resize_with(frames, TouchFrame::default);
+            touch_frames.iter_mut().for_each(TouchFrame::clear);
+        }
         match &mut self.values {
             Values::F32(columns) => columns.resize(self.columns, cells),
             Values::F64(columns) => {
@@ -275,10 +291,32 @@ impl Percepts {
         }
     }
 
+    /// The touches of the whole body in the batch's frame `frame`; `None` unless [`crate::Scene::touches`] asks for them.
+    #[must_use]
+    pub fn touches(&self, frame: usize) -> Option<&TouchFrame> {
+        self.touch_frames.as_ref().map(|frames| &frames[frame])
+    }
+
+    /// Takes those of frame `frame` out, to be filled in and [put back](Self::put_touch_frame).
+    pub(crate) fn take_touch_frame(&mut self, frame: usize) -> TouchFrame {
+        self.touch_frames.as_mut().and_then(|frames| frames.get_mut(frame)).map(std::mem::take).unwrap_or_default()
+    }
+
+    /// A touch of the whole body: its frame, and its place there.
+    pub(crate) fn touch_mut(&mut self, (frame, touch): (usize, usize)) -> Option<&mut Touch> {
+        self.touch_frames.as_mut()?.get_mut(frame)?.touches.get_mut(touch)
+    }
+
+    pub(crate) fn put_touch_frame(&mut self, frame: usize, found: TouchFrame) {
+        if let Some(place) = self.touch_frames.as_mut().and_then(|frames| frames.get_mut(frame)) {
+            *place = found;
+        }
+    }
+
     /// The separate touches of field `field` in the batch's frame `frame`, the oldest first; none unless
     /// [`Outputs::TOUCHES`] was asked for.
     #[must_use]
-    pub fn touches(&self, frame: usize, field: usize) -> &[Touch] {
+    pub fn field_touches(&self, frame: usize, field: usize) -> &[FieldTouch] {
         &self.touches[self.touches_of(frame * self.fields + field)]
     }
 
@@ -290,7 +328,7 @@ impl Percepts {
     }
 
     /// Adds the touches of the next cell, if they are asked for; cells are filled in their order.
-    pub(crate) fn push_touches(&mut self, touches: impl IntoIterator<Item = Touch>) {
+    pub(crate) fn push_touches(&mut self, touches: impl IntoIterator<Item = FieldTouch>) {
         if !self.outputs.contains(Outputs::TOUCHES) {
             return;
         }
@@ -299,7 +337,7 @@ impl Percepts {
     }
 
     /// The touches of a cell that have been added.
-    pub(crate) fn touches_mut(&mut self, cell: usize) -> &mut [Touch] {
+    pub(crate) fn touches_mut(&mut self, cell: usize) -> &mut [FieldTouch] {
         let of_cell = self.touches_of(cell);
         &mut self.touches[of_cell]
     }

@@ -53,6 +53,8 @@ pub enum Unit {
     MetrePerSecond,
     /// N.
     Newton,
+    /// Pa.
+    Pascal,
     /// None: a [`ContactKind`], which data files name.
     Kind,
 }
@@ -70,6 +72,7 @@ impl Unit {
             Self::Radian => "rad",
             Self::MetrePerSecond => "m/s",
             Self::Newton => "N",
+            Self::Pascal => "Pa",
         }
     }
 }

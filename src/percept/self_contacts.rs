@@ -34,7 +34,7 @@ impl SelfContact {
 pub struct SelfContactSide {
     /// Index of the field, as [`crate::Percept::field`] counts.
     pub field: usize,
-    /// The touch, as [`crate::Touch::id`] has it.
+    /// The touch, as [`crate::FieldTouch::id`] has it.
     pub touch: u64,
     /// Σ wᵢPᵢ of the touch, in the unit of P.
     pub total: f64,

@@ -1,8 +1,10 @@
 //! What fitting contacts needs to know of a plan: the layer over each field, and from when on a taxel feels anything.
 
+use glam::DVec2;
+
 use super::OrientationBy;
 use super::plan::{Plan, PlanField};
-use crate::percept::Flags;
+use crate::percept::{Flags, TouchOutputs};
 use crate::signal::{LayerResponse, Quantity, RawValue, Receptor};
 use crate::stage::calibrate::{self, Felt};
 use crate::stage::fit::{Layer, STEPS, Taxel};
@@ -11,7 +13,7 @@ use crate::stage::fit::{Layer, STEPS, Taxel};
 /// would be off by as much as the layer's σ where that is a tenth wrong.
 const CURVED: f64 = 0.1;
 /// A place is beyond the sensors where it is farther from every one than this share of the longest way between neighbours.
-const REACH: f64 = 0.6;
+pub(crate) const REACH: f64 = 0.6;
 
 impl PlanField {
     /// What contacts are fitted under, for a letter of `receptor` and orientations `by` something, or why none are.
@@ -42,17 +44,23 @@ impl Plan {
     /// What member `member` of `field` feels where it reads `value`, as fits of contacts take it, if that can be used.
     pub(crate) fn pressed_taxel(&self, field: &PlanField, member: usize, value: RawValue) -> Option<Taxel> {
         let slot = self.members_of(field)[member].slot as usize;
+        self.felt(slot, field.quantity, field.places[member].truncate() * f64::from(field.unit_m), value)
+    }
+
+    /// What the taxel of `slot`, whose P is `quantity`, feels at `place_m` in a chart where it reads `value`, as fits of contacts take
+    /// it, if that can be used.
+    pub(crate) fn felt(&self, slot: usize, quantity: Quantity, place_m: DVec2, value: RawValue) -> Option<Taxel> {
         let (channel, curve) = (self.channel_of(slot), self.curve_of(slot));
         let calibration = &self.calibrations[channel];
         let Felt { pressure, sigma } = calibrate::felt(value, calibration, curve)?;
         // What a soft onset has taken off, the contact has pressed with all the same.
         let taken_off = self.onset(channel).threshold;
         // Contacts press with a force.
-        let by = if field.quantity == Quantity::Pascal { self.areas[channel] } else { 1.0 };
+        let by = if quantity == Quantity::Pascal { self.areas[channel] } else { 1.0 };
         let noted = self.feels_from.get(slot).copied();
         let feels_from = noted.unwrap_or_else(|| calibrate::threshold(calibration, curve));
         Some(Taxel {
-            place_m: field.places[member].truncate() * f64::from(field.unit_m),
+            place_m,
             area_m2: self.areas[channel],
             pressure: if pressure > 0.0 { by * (pressure + taken_off) } else { 0.0 },
             threshold: by * (feels_from + taken_off),
@@ -62,7 +70,7 @@ impl Plan {
 
     /// Notes from when on each slot's taxel feels anything, where contacts are fitted.
     pub(super) fn note_what_is_felt(&mut self) {
-        if self.stages().fit {
+        if self.stages().fit || self.touch_outputs().is_some_and(|outputs| outputs.intersects(TouchOutputs::FIT)) {
             let of = |slot: usize| {
                 calibrate::threshold(&self.calibrations[slot % self.calibrations.len()], self.curve_of(slot))
             };

@@ -1,5 +1,6 @@
 //! Scenes: what a user asks for; and the plan made of it.
 
+mod asked;
 mod choose_fields;
 mod curves;
 mod explain;
@@ -13,10 +14,12 @@ mod plan;
 mod slots;
 mod stages;
 
+pub use asked::AskedOutputs;
 pub use choose_fields::choose_fields;
 pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
+pub(crate) use layer::REACH;
 pub(crate) use members::LinkPart;
 pub use plan::Plan;
 pub(crate) use plan::PlanField;
@@ -27,6 +30,7 @@ use crate::error::{Error, Result, suggestion};
 use crate::percept::Outputs;
 use crate::signal::Letter;
 pub use crate::stage::filter::FilterBy;
+use crate::touch;
 
 /// What a user asks of a body.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +54,9 @@ pub struct Scene {
     pub coordinates: Coordinates,
     /// The link in whose frame everything is given instead of the world: poses are taken from there on.
     pub relative_to: Option<String>,
+    /// What is asked of touches of the whole body ([`crate::Percepts::touches`]): with it, every pressure taxel of the body is read,
+    /// also where `fields` names few. `None` looks for no touches.
+    pub touches: Option<touch::Options>,
     /// How far the places of two touches may be apart that are one contact, m; for [`Outputs::SELF_CONTACTS`]. `None` is that of
     /// [`crate::field::ContactTolerance`].
     pub contact_tolerance_m: Option<f64>,
@@ -67,6 +74,7 @@ impl Default for Scene {
             relative_to: None,
             filter: MotionFilter::default(),
             knobs: Knobs::default(),
+            touches: None,
             contact_tolerance_m: None,
         }
     }
@@ -80,6 +88,7 @@ setters!(Scene {
     filter: MotionFilter,
     knobs: Knobs,
     coordinates: Coordinates,
+    touches: impl Into<Option<touch::Options>>,
     contact_tolerance_m: Option<f64>,
 });
 

@@ -16,7 +16,7 @@ use super::{Coordinates, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
-use crate::percept::{Flags, Outputs};
+use crate::percept::{Flags, Outputs, TouchOutputs};
 use crate::signal::{Calibration, Letter, Mark, Quantity, Receptor, Response, TaxelCalibration};
 use crate::stage::fit::Layer;
 use crate::stage::hysteresis::Thresholds;
@@ -55,6 +55,10 @@ pub struct Plan {
     pub(crate) curves: Curves,
     /// Per slot, the P up to which its taxel reads 0, where contacts are fitted.
     pub(crate) feels_from: Vec<f64>,
+    /// The slot of the first channel in the letter that touches of the whole body are found in, where they are wanted: its
+    /// channels are all of the body's pressure taxels.
+    pub(crate) touched_from: Option<usize>,
+    touch_outputs: Option<TouchOutputs>,
     /// The slots that fields on several links read, ascending, where positions in the world are wanted.
     pub(crate) spread_slots: Vec<u32>,
     /// By field, the largest weight of a member.
@@ -171,6 +175,7 @@ impl Plan {
         let read: BTreeSet<usize> = chosen
             .iter()
             .flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel))
+            .chain((0..body.taxels.len()).filter(|_| scene.touches.is_some()))
             .filter(|&taxel| is_pressure(body, taxel))
             .collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
@@ -193,6 +198,8 @@ impl Plan {
             taxels: Vec::new(),
             curves: Curves::default(),
             feels_from: Vec::new(),
+            touched_from: None,
+            touch_outputs: scene.touches.map(|touches| touches.outputs),
             spread_slots: Vec::new(),
             heaviest: Vec::new(),
             left_out,
@@ -201,6 +208,9 @@ impl Plan {
             body_taxels: Vec::new(),
         };
         let first_slots = plan.lay_out_slots(calibration)?;
+        if scene.touches.is_some() {
+            plan.find_touches(&first_slots)?;
+        }
         plan.note_what_is_felt();
         let nearest = Nearest::new(body);
         let around = plan.stages().touches.then(|| neighbours(body));

@@ -16,7 +16,11 @@ pub(super) fn units(plan: &Plan) -> Vec<(&'static str, Value)> {
 }
 
 fn unit(plan: &Plan, column: &Column) -> Value {
-    match (column.unit, plan.common_quantity()) {
+    in_unit(plan, column.unit)
+}
+
+fn in_unit(plan: &Plan, unit: Unit) -> Value {
+    match (unit, plan.common_quantity()) {
         (Unit::P, Some(quantity)) => quantity.symbol().into(),
         (Unit::Force, Some(quantity)) => quantity.of_force().symbol().into(),
         (Unit::P, None) => {
@@ -34,5 +38,10 @@ pub(super) fn line(plan: &Plan, body: Option<&Body>) -> String {
         let fields: Vec<String> = (0..plan.fields().len()).map(|index| plan.label(index)).collect();
         json!({"name": body.name, "taxels": body.taxels.len(), "fields": fields})
     });
-    json!({"somatic": VERSION, "units": units, "body": body}).to_string()
+    let mut line = json!({"somatic": VERSION, "units": units, "body": body});
+    if let Some(outputs) = plan.touch_outputs() {
+        let of_touches = outputs.columns().map(|column| (column.name.to_owned(), in_unit(plan, column.unit)));
+        line["touches"] = Value::Object(of_touches.collect());
+    }
+    line.to_string()
 }

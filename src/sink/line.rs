@@ -1,15 +1,19 @@
 //! Writes a frame's percepts as one line of JSON. Absent quantities are omitted.
 
-use serde::Serialize;
-
 use super::FieldNames;
-use crate::percept::{COLUMNS, Flags, Outputs, Percept, Percepts, Precision, SelfContact, Store, Touch, Unit};
+use super::json::{key, print};
+use super::touch_line::{SkinNames, TouchWriter};
+use crate::percept::{
+    COLUMNS, FieldTouch, Flags, Outputs, Percept, Percepts, Precision, SelfContact, Store, TouchFrame, Unit,
+};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
     heads: Vec<Head>,
     flags: Vec<(Flags, String)>,
     all_fields: bool,
+    /// Where percepts hold touches of the whole body.
+    touches: Option<TouchWriter>,
 }
 
 /// The start of a field's object, up to the value of `contact`.
@@ -48,7 +52,14 @@ impl LineWriter {
             heads: names.iter().map(Head::new).collect(),
             flags: Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect(),
             all_fields,
+            touches: None,
         }
+    }
+
+    /// The same, with touches of the whole body where they are looked for: those on `skin`.
+    pub(super) fn with_skin(mut self, skin: Option<&SkinNames>) -> Self {
+        self.touches = skin.map(TouchWriter::new);
+        self
     }
 
     pub(super) fn fields(&self) -> usize {
@@ -68,6 +79,10 @@ impl LineWriter {
         print(line, &percepts.t_s(frame));
         line.extend_from_slice(b",\"frame\":");
         print(line, &percepts.frame_number(frame));
+        let on_skin = self.touches.as_ref().zip(percepts.touches(frame));
+        if let Some((touches, found)) = on_skin {
+            touches.write(found, |field| &heads[field as usize].field, line);
+        }
         line.extend_from_slice(b",\"fields\":[");
         let mut first = true;
         let listed = (0..percepts.fields()).filter(|&field| *all_fields || percepts.in_contact(frame, field));
@@ -80,8 +95,10 @@ impl LineWriter {
             line.extend_from_slice(head.as_bytes());
             print(line, &percept.contact);
             print_quantities(line, &percept, percepts.precision());
-            if percepts.outputs().contains(Outputs::TOUCHES) && percept.contact {
-                self.write_touches(percepts.touches(frame, percept.field), percepts.outputs(), line);
+            if let Some((_, found)) = on_skin {
+                write_parts(found, percept.field, line);
+            } else if percepts.outputs().contains(Outputs::TOUCHES) && percept.contact {
+                self.write_touches(percepts.field_touches(frame, percept.field), percepts.outputs(), line);
             }
             self.write_flags(percept.flags, line);
             line.push(b'}');
@@ -137,7 +154,7 @@ impl LineWriter {
         line.push(b']');
     }
 
-    fn write_touches(&self, touches: &[Touch], outputs: Outputs, line: &mut Vec<u8>) {
+    fn write_touches(&self, touches: &[FieldTouch], outputs: Outputs, line: &mut Vec<u8>) {
         let fit = outputs.of_each_touch();
         key(line, "touches");
         line.push(b'[');
@@ -166,7 +183,22 @@ impl LineWriter {
     }
 }
 
-fn print_fit(line: &mut Vec<u8>, touch: &Touch, outputs: Outputs) {
+/// The touches that a field holds parts of, each with the field's share of its total.
+fn write_parts(found: &TouchFrame, field: usize, line: &mut Vec<u8>) {
+    key(line, "touches");
+    line.push(b'{');
+    let mut first = true;
+    for touch in &found.touches {
+        let Some(part) = found.fields(touch).iter().find(|part| part.field as usize == field) else { continue };
+        line.extend_from_slice(if std::mem::take(&mut first) { b"\"" } else { b",\"" });
+        print(line, &touch.id);
+        line.extend_from_slice(b"\":");
+        print(line, &(part.total / touch.total));
+    }
+    line.push(b'}');
+}
+
+fn print_fit(line: &mut Vec<u8>, touch: &FieldTouch, outputs: Outputs) {
     for column in outputs.columns() {
         let Some(components) = touch.value(column) else { continue };
         key(line, column.name);
@@ -205,14 +237,4 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
             }
         }
     }
-}
-
-fn key(line: &mut Vec<u8>, name: &str) {
-    line.extend_from_slice(b",\"");
-    line.extend_from_slice(name.as_bytes());
-    line.extend_from_slice(b"\":");
-}
-
-fn print(line: &mut Vec<u8>, value: &impl Serialize) {
-    serde_json::to_writer(line, value).expect("plain data prints into memory");
 }

@@ -5,6 +5,7 @@
 #[cfg(any(test, feature = "ros2", feature = "zenoh"))]
 mod handover;
 mod header;
+mod json;
 mod line;
 mod ndjson;
 #[cfg(feature = "page")]
@@ -15,6 +16,7 @@ mod recorded;
 mod ros2;
 mod spec;
 mod table;
+mod touch_line;
 #[cfg(feature = "mcap")]
 mod view;
 #[cfg(feature = "zenoh")]
@@ -36,6 +38,7 @@ pub use table::ParquetSink;
 #[cfg(feature = "arrow")]
 pub use table::{ArrowTable, TableKind};
 pub use table::{CsvSink, TableColumn, TableType, percept_columns, self_contact_columns, touch_columns};
+pub use touch_line::SkinNames;
 #[cfg(feature = "zenoh")]
 pub use zenoh_sink::{ZenohSink, limb_frame_bytes, limb_percept_bytes};
 
@@ -235,6 +238,14 @@ pub struct Session<'a> {
     /// Which times messages of ROS have.
     #[cfg(feature = "mcap")]
     pub ros_time: RosTime,
+}
+
+impl Session<'_> {
+    /// What touches of the whole body are said of; `None` where none are looked for.
+    #[must_use]
+    pub fn skin(&self) -> Option<SkinNames> {
+        SkinNames::of(self.body?, self.plan?)
+    }
 }
 
 /// A part of a recording.

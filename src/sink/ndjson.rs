@@ -5,6 +5,7 @@
 use std::io::{self, BufWriter, ErrorKind, Write};
 
 use super::line::LineWriter;
+use super::touch_line::SkinNames;
 use super::{FieldNames, Flow, Sink};
 use crate::error::{Result, failed};
 use crate::output::{OutputFile, OutputPath};
@@ -71,6 +72,13 @@ impl NdjsonSink {
             line: Vec::new(),
             closed: false,
         }
+    }
+
+    /// The same, with touches of the whole body where they are looked for: those on `skin`.
+    #[must_use]
+    pub fn with_skin(mut self, skin: Option<&SkinNames>) -> Self {
+        self.lines = self.lines.with_skin(skin);
+        self
     }
 
     /// The same, beginning with `header` as its first line.

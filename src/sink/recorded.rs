@@ -32,11 +32,13 @@ impl RecordingSink {
         for (name, media_type, bytes) in &session.attached {
             recorder.attach(name, media_type, bytes)?;
         }
+        let skin = session.skin();
         let holds = |part| session.parts.is_empty() || session.parts.contains(&part);
         Ok(Self {
             recorder,
             frames: holds(RecordPart::Frames),
-            percepts: holds(RecordPart::Percepts).then(|| LineWriter::new(&session.names, session.all_fields)),
+            percepts: holds(RecordPart::Percepts)
+                .then(|| LineWriter::new(&session.names, session.all_fields).with_skin(skin.as_ref())),
             view: session.body.filter(|_| holds(RecordPart::View)).map(|body| ViewWriter::new(body, &session.names)),
             line: Vec::new(),
         })

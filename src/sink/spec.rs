@@ -334,13 +334,17 @@ impl SinkTarget {
     /// It cannot be opened.
     pub fn open(self, session: &Session<'_>) -> Result<Box<dyn Sink + Send>> {
         let (names, all_fields) = (&session.names, session.all_fields);
+        let skin = session.skin();
         let header = session.plan.filter(|_| session.header).map(|plan| header::line(plan, session.body));
         match self {
-            Self::Ndjson(output) => {
-                Ok(Box::new(NdjsonSink::to_file(output, names, all_fields)?.with_header(header.as_deref())?))
-            }
+            Self::Ndjson(output) => Ok(Box::new(
+                NdjsonSink::to_file(output, names, all_fields)?
+                    .with_skin(skin.as_ref())
+                    .with_header(header.as_deref())?,
+            )),
             Self::Stdout => {
-                let sink = NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields);
+                let sink = NdjsonSink::to_writer("standard output", std::io::stdout(), names, all_fields)
+                    .with_skin(skin.as_ref());
                 Ok(Box::new(sink.with_header(header.as_deref())?))
             }
             Self::Csv { percepts, touches, self_contacts, wide } => {

@@ -64,7 +64,7 @@ impl ZenohSink {
         // Any number that the last start most likely did not have.
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
         let boot = (now.as_micros() ^ u128::from(std::process::id())) as u8;
-        let lines = LineWriter::new(&session.names, session.all_fields);
+        let lines = LineWriter::new(&session.names, session.all_fields).with_skin(session.skin().as_ref());
         Ok(Self { packets, sends, lines, sent, values: Vec::new(), layout, boot, sequence: 0, last_s: 0.0 })
     }
 

@@ -64,6 +64,7 @@ mod skins;
 mod skips;
 mod sources;
 mod tables;
+mod touches;
 mod tradeoff;
 #[cfg(unix)]
 mod tune;

@@ -530,7 +530,7 @@ fn nothing_is_kept_over_a_restart_of_time() {
             let mut engine = Engine::new(&body, options.clone()).unwrap();
             let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
             assert!(agreement.holds(), "{agreement}");
-            let id = |index: usize| percepts.touches(index, 0).first().map(|touch| touch.id);
+            let id = |index: usize| percepts.field_touches(index, 0).first().map(|touch| touch.id);
             let ids: Vec<Option<u64>> = (0..7).map(id).collect();
             // A stamp that repeats is no restart; identities are never used again.
             assert_eq!(ids, [Some(1), Some(1), None, Some(2), Some(2), Some(2), Some(3)], "{backend:?}, {back_or_on}");
@@ -543,7 +543,10 @@ fn nothing_is_kept_over_a_restart_of_time() {
             let mut alone = Engine::new(&body, options).unwrap();
             for (index, frame) in frames.iter().enumerate() {
                 let one = alone.process_one(frame).unwrap();
-                assert_eq!((one.get(0, 0), one.touches(0, 0)), (whole.get(index, 0), whole.touches(index, 0)));
+                assert_eq!(
+                    (one.get(0, 0), one.field_touches(0, 0)),
+                    (whole.get(index, 0), whole.field_touches(index, 0))
+                );
             }
         }
     }

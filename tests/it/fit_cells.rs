@@ -137,7 +137,7 @@ impl Cell {
         let percepts = engine.process(&frames).unwrap();
         let mut errors = Errors::default();
         for (frame, truth) in truths.iter().enumerate() {
-            let touches = percepts.touches(frame, 0);
+            let touches = percepts.field_touches(frame, 0);
             for touch in touches {
                 let centroid = DVec2::from_array(touch.centroid.unwrap());
                 let near = |a: &(DVec2, Option<f64>)| a.0.distance(centroid);

@@ -1,8 +1,12 @@
 //! Every separate touch of a field has a fit of its own.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use somatic::source::{SimulatedSource, Source};
-use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percepts, Scene};
+use somatic::touch;
+use somatic::{
+    BackendKind, Body, Calibration, Engine, FieldTouch, Flags, Frame, Options, Outputs, Percepts, Scene, TouchFlags,
+    TouchOutputs,
+};
 
 use crate::common::Flat;
 
@@ -23,6 +27,10 @@ fn grid() -> Body {
 
 /// The percepts of the two balls, and where each was in each frame.
 fn pressed(outputs: Outputs, backend: BackendKind, layered: bool) -> (Percepts, Vec<[DVec2; 2]>) {
+    pressed_in(Scene::default().outputs(outputs).fields(["grid"]), backend, layered)
+}
+
+fn pressed_in(scene: Scene, backend: BackendKind, layered: bool) -> (Percepts, Vec<[DVec2; 2]>) {
     let body = grid();
     let mut source = SimulatedSource::on_body("two-balls", TWO_BALLS, body.clone()).unwrap();
     let mut calibration = source.calibration();
@@ -31,7 +39,6 @@ fn pressed(outputs: Outputs, backend: BackendKind, layered: bool) -> (Percepts, 
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(&calibration, &ids).unwrap();
-    let scene = Scene::default().outputs(outputs).fields(["grid"]);
     let options = Options::default().scene(scene).calibration(calibration).backend(backend).batch(256);
     let mut engine = Engine::new(&body, options).unwrap();
     engine.set_channels(source.taxels()).unwrap();
@@ -49,7 +56,7 @@ fn each_touch_has_its_own_fit_and_the_field_that_of_the_strongest() {
     let (percepts, truths) = pressed(Outputs::all(), BackendKind::Cpu, true);
     let (mut centroids, mut fits) = (Vec::new(), Vec::new());
     for (frame, truth) in truths.iter().enumerate() {
-        let touches = percepts.touches(frame, 0);
+        let touches = percepts.field_touches(frame, 0);
         assert_eq!(touches.len(), 2, "frame {frame}");
         for touch in touches {
             let Some(fit) = touch.fit else {
@@ -83,7 +90,10 @@ fn touches_have_the_same_fits_on_every_backend() {
     let outputs = Outputs::TOUCHES | Outputs::FIT_PLACE | Outputs::FIT_FORCE;
     let of = |backend| {
         let (percepts, _) = pressed(outputs, backend, true);
-        (0..percepts.frames()).flat_map(|frame| percepts.touches(frame, 0).to_vec()).map(|t| t.fit).collect::<Vec<_>>()
+        (0..percepts.frames())
+            .flat_map(|frame| percepts.field_touches(frame, 0).to_vec())
+            .map(|t| t.fit)
+            .collect::<Vec<_>>()
     };
     let right = of(BackendKind::Reference);
     assert!(right.iter().flatten().count() > 180);
@@ -109,13 +119,13 @@ fn touches_have_the_same_fits_on_every_backend() {
 fn a_touch_without_a_fit_says_why() {
     let (percepts, truths) = pressed(Outputs::TOUCHES | Outputs::FIT, BackendKind::Cpu, false);
     for frame in 0..truths.len() {
-        for touch in percepts.touches(frame, 0) {
+        for touch in percepts.field_touches(frame, 0) {
             assert!(touch.fit.is_none() && touch.flags == Flags::NO_LAYER, "{touch:?}");
         }
     }
     // Where none is asked for there is nothing to say.
     let (percepts, _) = pressed(Outputs::TOUCHES, BackendKind::Cpu, true);
-    assert!(percepts.touches(5, 0).iter().all(|touch| touch.fit.is_none() && touch.flags.is_empty()));
+    assert!(percepts.field_touches(5, 0).iter().all(|touch| touch.fit.is_none() && touch.flags.is_empty()));
 }
 
 #[test]
@@ -155,4 +165,51 @@ fn the_speed_of_a_rod_is_that_of_its_fits() {
         rms(&fits)
     );
     assert!(fits.len() > 60 && rms(&fits) < 4.0 && rms(&fits) < 0.4 * rms(&centroids) && young >= 10);
+}
+
+/// On a flat grid the chart of a touch is the field's, turned about its base: what is fitted in either is the same contact.
+#[test]
+fn touches_of_the_whole_body_have_the_fits_of_the_fields_where_it_is_flat() {
+    let (of_field, _) = pressed(Outputs::TOUCHES | Outputs::FIT, BackendKind::Cpu, true);
+    let on_skin = |layered| {
+        let asked = touch::Options { outputs: TouchOutputs::all(), ..touch::Options::default() };
+        pressed_in(Scene::default().outputs(Outputs::TOTAL).touches(asked), BackendKind::Cpu, layered)
+    };
+    let (percepts, truths) = on_skin(true);
+    let (mut compared, mut errors) = (0, Vec::new());
+    for (frame, truth) in truths.iter().enumerate() {
+        for touch in &percepts.touches(frame).unwrap().touches {
+            let same = of_field.field_touches(frame, 0).iter().min_by(|a, b| {
+                let off = |other: &FieldTouch| (other.total - touch.total).abs();
+                off(a).total_cmp(&off(b))
+            });
+            let same = same.unwrap();
+            // Which taxels are one touch is decided otherwise: compare where both have the same ones.
+            if (same.total - touch.total).abs() > 1e-9 * touch.total {
+                continue;
+            }
+            let (Some(fit), Some(right)) = (touch.fit, same.fit) else { continue };
+            // The grid lies in its link's x and −z.
+            let flat = |p: DVec3| DVec2::new(p.x, -p.z);
+            let place = flat(fit.place);
+            assert!(fit.kind == right.kind && fit.place.y.abs() < 1e-9, "{fit:?} {right:?}");
+            assert!(place.distance(DVec2::from_array(right.place)) < 1e-5, "{fit:?} {right:?}");
+            assert!((fit.width_m / right.width - 1.0).abs() < 1e-2, "{fit:?} {right:?}");
+            if let (Some(force), Some(known)) = (fit.force, right.force) {
+                assert!((force / known - 1.0).abs() < 1e-2, "{fit:?} {right:?}");
+            }
+            if let (Some(along), Some(angle)) = (fit.direction, right.angle) {
+                let wanted = DVec2::from_angle(angle);
+                assert!(flat(along).perp_dot(wanted).abs() < 0.02 && along.y.abs() < 1e-9, "{fit:?} {right:?}");
+            }
+            let off = truth.iter().map(|truth| truth.distance(place)).fold(f64::INFINITY, f64::min);
+            errors.push(off);
+            compared += 1;
+        }
+    }
+    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    assert!(compared > 150 && rms < 1e-3, "{compared} {rms}");
+    let (without, _) = on_skin(false);
+    let touches = (0..without.frames()).flat_map(|frame| &without.touches(frame).unwrap().touches);
+    assert!(touches.into_iter().all(|touch| touch.fit.is_none() && touch.flags.contains(TouchFlags::NO_LAYER)));
 }

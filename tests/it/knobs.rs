@@ -168,7 +168,7 @@ fn a_field_is_looked_at_when_it_changes_and_moves_from_change_to_change() {
                         // A centimetre in ten frames, not in the last of them; and told until there is news.
                         _ => assert!((left.speed.unwrap() - 1.0).abs() < 1e-5, "{kind:?}, {turn}: {left:?}"),
                     }
-                    said.push(format!("{left:?} {right:?} {:?}", percepts.touches(index, 0)));
+                    said.push(format!("{left:?} {right:?} {:?}", percepts.field_touches(index, 0)));
                 }
             }
             seen.push(said);

@@ -32,6 +32,7 @@ mod letters;
 mod lint;
 mod meshes;
 mod motion;
+mod on_skin;
 mod paths;
 mod properties;
 // The library's own numbers that look like chance.

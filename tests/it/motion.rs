@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use somatic::scene::{Arithmetic, Cadence, MotionFilter};
-use somatic::{Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Scene, Touch};
+use somatic::{Body, Calibration, Engine, FieldTouch, Flags, Frame, Options, Outputs, Percept, Scene};
 
 use crate::common::{Flat, backends, frame, ways};
 
@@ -162,15 +162,15 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
         for cut in [1, frames.len()] {
             let scene = Scene::default().outputs(Outputs::TOUCHES | Outputs::CENTROID);
             let mut engine = Engine::new(&cross(), Options::default().backend(backend).scene(scene)).unwrap();
-            let mut seen: Vec<Vec<Touch>> = Vec::new();
+            let mut seen: Vec<Vec<FieldTouch>> = Vec::new();
             let mut several = Vec::new();
             for part in frames.chunks(cut) {
                 let (percepts, agreement) = engine.process_and_compare(part).unwrap();
                 assert!(agreement.holds(), "{backend:?}: {agreement}");
-                seen.extend((0..part.len()).map(|frame| percepts.touches(frame, 0).to_vec()));
+                seen.extend((0..part.len()).map(|frame| percepts.field_touches(frame, 0).to_vec()));
                 several.extend((0..part.len()).map(|frame| percepts.get(frame, 0).flags.contains(Flags::SEVERAL)));
             }
-            let told = |touches: &[Touch]| -> Vec<(u64, f64, u32, f64)> {
+            let told = |touches: &[FieldTouch]| -> Vec<(u64, f64, u32, f64)> {
                 touches.iter().map(|t| (t.id, t.total, t.active, t.centroid.unwrap()[0])).collect()
             };
             assert_eq!(told(&seen[0]), [(1, 4.0, 2, -3.5), (2, 6.0, 1, 4.0)]);
@@ -183,7 +183,7 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
         }
         let mut usual = Engine::new(&cross(), Options::default().backend(backend)).unwrap();
         let percepts = usual.process(&frames).unwrap();
-        assert!(percepts.touches(0, 0).is_empty() && !percepts.get(0, 0).flags.contains(Flags::SEVERAL));
+        assert!(percepts.field_touches(0, 0).is_empty() && !percepts.get(0, 0).flags.contains(Flags::SEVERAL));
     }
 }
 

@@ -62,7 +62,7 @@ fn check_sums(percepts: &Percepts, agreement: &Agreement) {
     }
     let fields = percepts.fields();
     let touches = (0..percepts.frames()).flat_map(|frame| (0..fields).map(move |field| (frame, field)));
-    let touches: usize = touches.map(|(frame, field)| percepts.touches(frame, field).len()).sum();
+    let touches: usize = touches.map(|(frame, field)| percepts.field_touches(frame, field).len()).sum();
     for name in ["touches", "touches.total", "touches.position"] {
         assert!(count(name) >= touches as u64, "{name}: {} of {touches} touches", count(name));
     }

@@ -161,7 +161,7 @@ fn a_field_over_links_that_move_is_where_its_members_are_now() {
                         speeds += 1;
                     }
                     // Each touch lies on one link, and so among the members' places.
-                    let touches = whole.touches(index, number);
+                    let touches = whole.field_touches(index, number);
                     let total: f64 = touches.iter().map(|touch| touch.total).sum();
                     let sum: DVec3 =
                         touches.iter().map(|touch| touch.total * DVec3::from_array(touch.position.unwrap())).sum();
@@ -175,7 +175,7 @@ fn a_field_over_links_that_move_is_where_its_members_are_now() {
                 let one = alone.process_one(frame).unwrap();
                 for number in 0..names.len() {
                     assert_eq!(one.get(0, number), whole.get(index, number));
-                    assert_eq!(one.touches(0, number), whole.touches(index, number));
+                    assert_eq!(one.field_touches(0, number), whole.field_touches(index, number));
                 }
             }
         }
@@ -203,7 +203,7 @@ fn a_field_over_links_of_which_one_that_is_pressed_has_no_pose_has_no_position()
             let has_flag = percept.flags.contains(Flags::NO_POSE);
             assert_eq!((percept.position.is_some(), has_flag), (mean.is_some(), mean.is_none()), "{name}");
             let [known, unknown] = [true, false].map(|is_known| {
-                percepts.touches(0, number).iter().filter(|touch| touch.position.is_some() == is_known).count()
+                percepts.field_touches(0, number).iter().filter(|touch| touch.position.is_some() == is_known).count()
             });
             assert!(mean.is_none() || unknown == 0, "{name}");
             placed += usize::from(mean.is_some());

@@ -11,6 +11,7 @@ import polars
 import pyarrow.parquet
 
 VECTORS = {2: "uv", 3: "xyz"}
+LISTS = ("flags", "links", "fields", "taxels")
 
 
 def flat(field):
@@ -19,7 +20,11 @@ def flat(field):
     for key, value in field.items():
         if key == "touches":
             continue
-        if isinstance(value, list) and key != "flags":
+        if key == "spread":
+            row.update(zip(("spread_along", "spread_across"), value))
+        elif key in LISTS:
+            row[key] = [str(name) for name in value]
+        elif isinstance(value, list):
             row.update({f"{key}_{VECTORS[len(value)][i]}": v for i, v in enumerate(value)})
         else:
             row[key] = value
@@ -37,7 +42,11 @@ def rows_of(lines):
             head = {"t": line["t"], "frame": line["frame"]}
             percepts.append(head | flat(field))
             link = {key: field[key] for key in ("field", "link", "letter", "signal") if key in field}
-            touches.extend(head | link | flat(touch) for touch in field.get("touches", []))
+            # With a fit among the outputs, a field has touches of its own; else there are its shares of those of the body.
+            own = field.get("touches", [])
+            touches.extend(head | link | flat(touch) for touch in own if isinstance(own, list))
+        for touch in line.get("touches", []):
+            touches.append({"t": line["t"], "frame": line["frame"], "touch": touch.pop("id")} | flat(touch))
     return percepts, touches
 
 

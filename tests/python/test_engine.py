@@ -199,6 +199,9 @@ def test_flags_are_the_library_s(somatic) -> None:
 
     known = {name: 1 << int(bit) for name, bit in re.findall(r"const (\w+) = 1 << (\d+);", source)}
     assert {flag.name: flag.value for flag in st.Flags} == known
+    source = (__import__("conftest").ROOT / "src" / "percept" / "touch.rs").read_text()
+    known = {name: 1 << int(bit) for name, bit in re.findall(r"const (\w+) = 1 << (\d+);", source)}
+    assert {flag.name: flag.value for flag in st.TouchFlags} == known
 
 
 def test_scenes(tmp_path) -> None:

@@ -24,7 +24,8 @@ def compare(p: st.Percepts, text: str) -> int:
     lines = [json.loads(line) for line in text.splitlines()]
     assert len(lines) == len(p.t)
     touches = p.touches
-    touch_rows = iter(zip(touches.id, touches.total, touches.active, touches.centroid, touches.position, strict=True))
+    columns = {name: touches[name] for name in ("principal_axis", "velocity", "spread", "anisotropy")}
+    touch_rows = iter(zip(touches.id, touches.total, touches.active, touches.link, touches.position, range(len(touches)), strict=True))
     for index, line in enumerate(lines):
         assert line["t"] == p.t[index]
         assert [field["field"] for field in line["fields"]] == p.fields
@@ -41,13 +42,15 @@ def compare(p: st.Percepts, text: str) -> int:
                     compared += 1
                 elif column.dtype.kind == "f":
                     assert np.isnan(got).all()
-            for touch in field.get("touches", []):
-                identity, total, active, centroid, position = next(touch_rows)
-                assert (identity, active) == (touch["id"], touch["active"])
-                assert np.float32(total) == np.float32(touch["total"])
-                assert np.array_equal(np.float32(centroid), np.float32(touch.get("centroid", [np.nan] * 2)), equal_nan=True)
-                assert np.array_equal(np.float32(position), np.float32(touch["position"]))
-                compared += 1
+        for touch in line["touches"]:
+            identity, total, active, link, position, row = next(touch_rows)
+            assert (identity, active, link) == (touch["id"], touch["active"], touch["link"])
+            assert total == touch["total"] and np.array_equal(position, touch["position"])
+            assert [flag.name.lower() for flag in st.TouchFlags(touches.flags[row])] == touch["flags"]
+            for name in ("principal_axis", "velocity", "spread", "anisotropy"):
+                got = columns[name][row]
+                assert np.isnan(got).all() if name not in touch else np.array_equal(got, touch[name]), (index, name)
+            compared += 1
     assert next(touch_rows, None) is None
     return compared
 

@@ -49,17 +49,23 @@ def test_pandas_and_polars_have_the_same(p: st.Percepts) -> None:
     assert list(frame.columns) == other.columns == table.column_names
     assert np.array_equal(frame["total"], table["total"]) and np.array_equal(other["total"], table["total"])
     assert frame["field"].astype(str).tolist() == other["field"].cast(pl.String).to_list()
-    assert pl.DataFrame(p.touches)["id"].to_list() == p.touches.id.tolist()
+    assert pl.DataFrame(p.touches)["touch"].to_list() == p.touches.id.tolist()
 
 
 def test_touches_are_a_table(p: st.Percepts) -> None:
     touches = p.touches
     table = pa.table(touches)
     assert table.num_rows == len(touches) > 100
-    for name in ("t", "id", "total", "active"):
+    for name in ("t", "total", "active", "age"):
         assert np.array_equal(table[name], getattr(touches, name))
+    assert np.array_equal(table["touch"], touches.id) and table["link"].to_pylist() == touches.link
     assert np.array_equal(touches.t, p.t[touches.frame])
-    assert {p.fields[field] for field in touches.field} <= set(p.fields)
+    with pytest.raises(st.UsageError, match="of a field's own touches"):
+        touches.field  # noqa: B018
+    with pytest.raises(st.UsageError, match="add `touches.orientation`"):
+        touches["orientation"]
+    with pytest.raises(st.UsageError, match="there are: total"):
+        touches["weight"]
     with pytest.raises(st.UsageError, match="not asked for"):
         st.Engine(st.Body.bundled("hand"), backend="cpu").step(0, [0] * 40).touches  # noqa: B018
 

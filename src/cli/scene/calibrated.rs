@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::signal::Quantity;
 use somatic::source::{SimulatedSource, SourceSpec};
-use somatic::{Body, Calibration, Error, Outputs, Result};
+use somatic::{Body, Calibration, Error, Outputs, Result, touch};
 
 use super::RunOptions;
 use crate::cli::attached;
@@ -26,6 +26,12 @@ impl RunOptions {
             (true, true) => self.outputs() | Outputs::FORCE,
             (true, false) => self.outputs(),
         })
+    }
+
+    /// What is asked of touches of the whole body; `None` looks for none.
+    pub(super) fn touches(&self) -> Option<touch::Options> {
+        let outputs = self.outputs.iter().copied().reduce(|a, b| a | b)?.of_body()?;
+        Some(self.touch.unwrap_or_default().options(outputs))
     }
 
     /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation and an export

@@ -38,6 +38,12 @@ impl RunOptions {
         if let Some(gap) = self.max_gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
             return Err(Error::usage(format!("--max-gap {gap} is not a time span; give seconds over 0")));
         }
+        if let Some(touch) = self.touch {
+            touch.check()?;
+            if self.touches().is_none() {
+                return Err(Error::usage("[touch] is for touches; add them to `outputs`"));
+            }
+        }
         if let Some(tolerance) = self.contact_tolerance {
             if !self.outputs().contains(Outputs::SELF_CONTACTS) {
                 return Err(Error::usage("--contact-tolerance is for self_contacts; add them to --outputs"));

@@ -7,16 +7,8 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use somatic::error::unknown;
-use somatic::scene::MotionFilter;
-use somatic::{Error, Outputs, Result};
-
-pub(in crate::cli) fn output(name: &str) -> Result<Outputs> {
-    Outputs::named(name).ok_or_else(|| {
-        let names: Vec<String> = Outputs::all().names().collect();
-        Error::usage(unknown("output", name, names.iter().map(String::as_str)))
-    })
-}
+use somatic::Result;
+use somatic::scene::{AskedOutputs, MotionFilter};
 
 // As a schema says it.
 /// One text, or a list of them.
@@ -84,18 +76,8 @@ pub(super) fn names_of<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>
     Ok(checked.into_iter().map(|Checked(text, _)| text).collect())
 }
 
-struct Output(Outputs);
-
-impl FromStr for Output {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        output(name).map(Self)
-    }
-}
-
-pub(super) fn outputs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Outputs>, D::Error> {
-    Ok(words(from)?.into_iter().map(|Output(output)| output).collect())
+pub(super) fn outputs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<AskedOutputs>, D::Error> {
+    words(from)
 }
 
 pub(super) fn batch<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {

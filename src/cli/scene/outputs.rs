@@ -1,17 +1,26 @@
 //! The outputs that are asked for, and what help and schema say of them.
 
-use somatic::Outputs;
+use somatic::error::unknown;
+use somatic::scene::AskedOutputs;
+use somatic::{Error, Outputs, Result};
+
+pub(in crate::cli) fn output(name: &str) -> Result<Outputs> {
+    Outputs::named(name).ok_or_else(|| {
+        let names: Vec<String> = Outputs::all().names().collect();
+        Error::usage(unknown("output", name, names.iter().map(String::as_str)))
+    })
+}
 
 /// Says in a schema which outputs there are.
 pub(super) fn output_names(schema: &mut schemars::Schema) {
-    let names: Vec<String> = Outputs::all().names().collect();
+    let names: Vec<String> = AskedOutputs::names().collect();
     schema.insert("items".to_owned(), serde_json::json!({"type": "string", "enum": names}));
 }
 
 pub(in crate::cli) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
-        "Compute only these quantities: {} [default: all but touches, self_contacts, speed_in_world, filtered_*, fit_* and \
+        "Compute only these quantities: {}; touches.NAME adds one to those of touches [default: all but touches, self_contacts, speed_in_world, filtered_*, fit_* and \
          *_sigma; force only where P has a unit]",
         names.join(", ")
     )

@@ -3,23 +3,24 @@
 //! Windows run from all points at once, so that each ends soon beyond its own cell. In each triangle that several points
 //! reach, their distances to its corners give the borders (`polygon.rs`). Long edges are cut beforehand (`refine.rs`).
 
+mod marched;
+mod parts;
 mod polygon;
 mod refine;
+mod spacing;
 
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
+use self::marched::Marched;
+use self::parts::{Parts, corner_at};
 use self::polygon::{Candidate, Side, nearest_part, share, squared_at};
 use self::refine::refine;
+pub(crate) use self::spacing::COINCIDENT_M;
+use self::spacing::Spacing;
 use super::geodesic::{Start, SurfacePlace, Waves};
-use crate::body::{NONE, PointTree, SurfaceIndex, Topology, area_vector, point_tree};
-
-/// Points nearer to each other than this share a cell, m.
-pub(crate) const COINCIDENT_M: f64 = 1e-6;
-
-/// Edges are cut that are longer than this share of the distance from the nearest point to its own nearest.
-const EDGE_SHARE: f64 = 0.7;
+use crate::body::{NONE, SurfaceIndex, Topology, area_vector, point_tree};
 
 /// The largest number of triangles after cutting: per triangle before, and per point.
 const CUTS_PER_TRIANGLE: usize = 4;
@@ -27,8 +28,12 @@ const CUTS_PER_POINT: usize = 60;
 
 /// Number of windows at which a surface counts as too rough: in all, per triangle, and where there are few of these.
 const MAX_WINDOWS: usize = 40_000_000;
-const WINDOWS_PER_TRIANGLE: usize = 200;
+const WINDOWS_PER_TRIANGLE: usize = 40;
+const WINDOWS_PER_POINT: usize = 10_000;
 const MIN_WINDOWS: usize = 500_000;
+
+/// Parts of a surface with more triangles than this for each point are marched over instead of covered by windows.
+const MARCHED_PER_POINT: usize = 400;
 
 /// Polygons with less of a triangle than this are rounding errors.
 const MIN_SHARE: f64 = 1e-12;
@@ -139,21 +144,57 @@ pub(crate) struct Cells {
     pub(crate) borders: BTreeMap<(u32, u32), Border>,
     /// The parts of the surface that no path leads to from any point.
     pub(crate) pieces: Vec<Piece>,
+    /// The surface in triangles with the point whose cell they are in, the first at its place, if that was asked for.
+    pub(crate) surface: Vec<(u32, [DVec3; 3])>,
 }
 
 impl Cells {
     /// The cells of `places` on `topology`. On a surface that is too rough nothing is in a cell.
     pub(crate) fn new(topology: &Topology, places: &[SurfacePlace]) -> Self {
+        Self::made(topology, places, MARCHED_PER_POINT, None)
+    }
+
+    /// The same with [`Self::surface`].
+    pub(crate) fn with_surface(topology: &Topology, places: &[SurfacePlace]) -> Self {
+        Self::made(topology, places, MARCHED_PER_POINT, Some(Parts::default()))
+    }
+
+    /// The same by windows alone, which are exact.
+    #[cfg(test)]
+    fn in_windows(topology: &Topology, places: &[SurfacePlace]) -> Self {
+        Self::made(topology, places, usize::MAX, None)
+    }
+
+    /// Parts with more than `marched_per_point` triangles for each point are marched over.
+    fn made(
+        topology: &Topology,
+        places: &[SurfacePlace],
+        marched_per_point: usize,
+        mut parts_of_cells: Option<Parts>,
+    ) -> Self {
         let positions: Vec<DVec3> = places.iter().map(|place| place.position(topology)).collect();
         let first = first_of_place(topology, places, &positions);
         let is_first = |&point: &usize| first[point] as usize == point;
         let starts: Vec<usize> = (0..places.len()).filter(is_first).collect();
-        let mut cells = Self { areas: vec![0.0; places.len()], first, borders: BTreeMap::new(), pieces: Vec::new() };
+        let mut cells = Self {
+            areas: vec![0.0; places.len()],
+            first,
+            borders: BTreeMap::new(),
+            pieces: Vec::new(),
+            surface: Vec::new(),
+        };
+        let is_fine = fine_parts(topology, starts.iter().map(|&start| places[start].triangle), marched_per_point);
+        let is_fine = |triangle: u32| is_fine[topology.part[triangle as usize] as usize];
         let spacing = Spacing::of(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
         let most = CUTS_PER_TRIANGLE * topology.triangles.len() + CUTS_PER_POINT * starts.len();
-        let refined = refine(topology, EDGE_SHARE * spacing.least_m, |p| spacing.edge_at(p), most);
+        let refined = refine(topology, spacing.shortest_edge(), |p| spacing.edge_at(p), most);
         match refined {
-            None => cells.divide(topology, starts.iter().map(|&start| (start, places[start])).collect()),
+            None => {
+                let starts = starts.iter().map(|&start| (start, places[start])).collect();
+                cells.divide(topology, starts, is_fine, parts_of_cells.as_mut());
+                cells.surface =
+                    parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(topology, |triangle| triangle, topology));
+            }
             Some(refined) => {
                 let cut = Topology::new(&refined.positions, &refined.triangles);
                 let mut parts: Vec<Vec<u32>> = vec![Vec::new(); topology.triangles.len()];
@@ -167,7 +208,10 @@ impl Cells {
                     let part = parts.max_by(|a, b| depth(a).total_cmp(&depth(b)));
                     part.map(|&part| (start, SurfacePlace::in_triangle(&cut, part, at)))
                 };
-                cells.divide(&cut, starts.iter().filter_map(|&start| within(start)).collect());
+                let parent = |part: u32| refined.parent[cut.given[part as usize] as usize];
+                let starts = starts.iter().filter_map(|&start| within(start)).collect();
+                cells.divide(&cut, starts, |part| is_fine(parent(part)), parts_of_cells.as_mut());
+                cells.surface = parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(&cut, parent, topology));
             }
         }
         for point in 0..places.len() {
@@ -176,11 +220,23 @@ impl Cells {
         cells
     }
 
-    /// Divides `topology` among `starts`: points, each with its place.
-    fn divide(&mut self, topology: &Topology, starts: Vec<(usize, SurfacePlace)>) {
-        let most = (WINDOWS_PER_TRIANGLE * topology.triangles.len()).clamp(MIN_WINDOWS, MAX_WINDOWS);
+    /// Divides `topology` among `starts`: points, each with its place. Parts whose triangles are fine are marched over.
+    fn divide(
+        &mut self,
+        topology: &Topology,
+        starts: Vec<(usize, SurfacePlace)>,
+        is_fine: impl Fn(u32) -> bool,
+        mut parts: Option<&mut Parts>,
+    ) {
+        let most = WINDOWS_PER_TRIANGLE * topology.triangles.len() + WINDOWS_PER_POINT * starts.len();
+        let most = most.clamp(MIN_WINDOWS, MAX_WINDOWS);
         let mut waves = Waves::extending(topology, f64::INFINITY, most);
         let mut is_reached = vec![false; topology.parts()];
+        let mut marched = Marched::new(topology, &is_fine);
+        let mut is_marched = vec![false; topology.parts()];
+        for (triangle, &part) in (0..).zip(&topology.part) {
+            is_marched[part as usize] |= is_fine(triangle);
+        }
         // By triangle: the points in it, with the distances to its corners.
         let mut within: Vec<(u32, Candidate)> = Vec::new();
         for (point, place) in starts {
@@ -189,19 +245,28 @@ impl Cells {
                 let squared = wedge.corners.map(DVec2::length_squared);
                 within.push((wedge.triangle, Candidate { site: point as u32, squared }));
             }
-            is_reached[topology.part[place.triangle as usize] as usize] = true;
-            waves.add(&start, point as u32);
+            let part = topology.part[place.triangle as usize] as usize;
+            is_reached[part] = true;
+            if is_marched[part] {
+                for wedge in &start.wedges {
+                    marched.add(wedge.triangle, point as u32, wedge.corners.map(DVec2::length));
+                }
+            } else {
+                waves.add(&start, point as u32);
+            }
         }
         within.sort_by_key(|(triangle, candidate)| (*triangle, candidate.site));
+        marched.run();
         if !waves.run() {
-            is_reached.fill(false);
+            is_reached.iter_mut().zip(&is_marched).for_each(|(is_reached, is_marched)| *is_reached &= is_marched);
         }
         // Per edge the point that all of it belongs to on this side, if it is no border yet.
         let mut owner = vec![NONE; topology.across.len()];
         let (mut candidates, mut polygon, mut spare) = (Vec::new(), Vec::new(), Vec::new());
         let mut from = 0;
         for triangle in 0..topology.triangles.len() as u32 {
-            if !is_reached[topology.part[triangle as usize] as usize] {
+            let part = topology.part[triangle as usize] as usize;
+            if !is_reached[part] {
                 self.pieces.push(Piece::of(topology.corners(triangle)));
                 continue;
             }
@@ -209,7 +274,11 @@ impl Cells {
             let own = within[from..].iter().take_while(|(other, _)| *other == triangle);
             candidates.clear();
             candidates.extend(own.map(|(_, candidate)| *candidate));
-            reaching(&waves, triangle, &mut candidates);
+            if is_marched[part] {
+                marched.reaching(triangle, &mut candidates);
+            } else {
+                reaching(&waves, triangle, &mut candidates);
+            }
             let corners = topology.corners(triangle);
             let area = area_vector(corners).length() / 2.0;
             if candidates.is_empty() {
@@ -219,6 +288,9 @@ impl Cells {
             }
             if let [candidate] = candidates[..] {
                 self.areas[candidate.site as usize] += area;
+                if let Some(parts) = parts.as_deref_mut() {
+                    parts.add_whole(triangle, candidate.site);
+                }
                 (0..3).for_each(|side| owner[3 * triangle as usize + side] = candidate.site);
                 continue;
             }
@@ -227,6 +299,9 @@ impl Cells {
                 let share = share(&polygon);
                 if share > MIN_SHARE {
                     self.areas[own.site as usize] += share * area;
+                    if let Some(parts) = parts.as_deref_mut() {
+                        parts.add_polygon(triangle, own.site, &polygon);
+                    }
                     self.take_borders(own, corners, &polygon);
                     for (index, side) in polygon.iter().enumerate().filter(|(_, side)| side.beyond.is_none()) {
                         if let Some(edge) = whole_side(side.from, polygon[(index + 1) % polygon.len()].from) {
@@ -236,12 +311,15 @@ impl Cells {
                 }
             }
         }
-        self.take_borders_along_edges(&waves, &owner);
+        let least_m = |edge: u32, vertex: u32| match is_marched[topology.part[edge as usize / 3] as usize] {
+            true => marched.least_m(vertex),
+            false => waves.arrivals[vertex as usize].distance_m,
+        };
+        self.take_borders_along_edges(topology, &owner, least_m);
     }
 
     /// Takes the borders that are edges of the surface.
-    fn take_borders_along_edges(&mut self, waves: &Waves<'_>, owner: &[u32]) {
-        let topology = waves.topology;
+    fn take_borders_along_edges(&mut self, topology: &Topology, owner: &[u32], least_m: impl Fn(u32, u32) -> f64) {
         for (edge, &beyond) in (0..).zip(&topology.across) {
             if beyond == NONE || edge > beyond {
                 continue;
@@ -252,7 +330,7 @@ impl Cells {
             }
             let (from, to) = topology.ends(edge);
             let [p, q] = [from, to].map(|vertex| topology.positions[vertex as usize]);
-            let nearest_m = [from, to].map(|vertex| waves.arrivals[vertex as usize].distance_m);
+            let nearest_m = [from, to].map(|vertex| least_m(edge, vertex));
             self.add_border((a.min(b), a.max(b)), p.distance(q), 2.0 * nearest_m[0].min(nearest_m[1]));
         }
     }
@@ -267,7 +345,7 @@ impl Cells {
     fn take_borders(&mut self, own: &Candidate, corners: [DVec3; 3], polygon: &[Side]) {
         let [a, b, c] = corners;
         let sides = DVec3::new(b.distance_squared(c), c.distance_squared(a), a.distance_squared(b));
-        let at = |weights: DVec3| a * weights.x + b * weights.y + c * weights.z;
+        let at = |weights: DVec3| corner_at(corners, weights);
         for (index, side) in polygon.iter().enumerate() {
             let Some(beyond) = side.beyond.filter(|&beyond| beyond > own.site) else { continue };
             let end = polygon[(index + 1) % polygon.len()].from;
@@ -315,6 +393,14 @@ fn reaching(waves: &Waves<'_>, triangle: u32, candidates: &mut Vec<Candidate>) {
     }
 }
 
+/// Per part of `topology`, whether it has more than `most` triangles for each of the points, which are in the triangles `points`.
+fn fine_parts(topology: &Topology, points: impl Iterator<Item = u32>, most: usize) -> Vec<bool> {
+    let mut counts = vec![(0_usize, 0_usize); topology.parts()];
+    topology.part.iter().for_each(|&part| counts[part as usize].0 += 1);
+    points.for_each(|triangle| counts[topology.part[triangle as usize] as usize].1 += 1);
+    counts.into_iter().map(|(triangles, points)| points > 0 && triangles / points.max(1) > most).collect()
+}
+
 /// Per place the first one at the same point of the same part of the surface.
 fn first_of_place(topology: &Topology, places: &[SurfacePlace], positions: &[DVec3]) -> Vec<u32> {
     let tree = point_tree(positions.iter().copied());
@@ -333,43 +419,6 @@ fn depth([a, b, c]: [DVec3; 3], p: DVec3) -> f64 {
     let normal = (b - a).cross(c - a);
     let part = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from));
     part(b, c).min(part(c, a)).min(part(a, b)) / normal.length_squared()
-}
-
-/// How far points are from each other.
-struct Spacing {
-    tree: PointTree,
-    /// Per point the distance to the nearest other, m.
-    nearest_m: Vec<f64>,
-    /// The least of them, m.
-    least_m: f64,
-}
-
-impl Spacing {
-    fn of(positions: &[DVec3]) -> Self {
-        let tree = point_tree(positions.iter().copied());
-        let nearest = |(index, at): (usize, &DVec3)| {
-            let mut others = tree.nearest_neighbor_iter_with_distance_2(at.to_array());
-            let other = others.find(|&(spot, squared)| spot.data != index && squared > COINCIDENT_M * COINCIDENT_M);
-            other.map_or(f64::INFINITY, |(_, squared)| squared.sqrt())
-        };
-        let nearest_m: Vec<f64> = positions.iter().enumerate().map(nearest).collect();
-        let least_m = nearest_m.iter().copied().fold(f64::INFINITY, f64::min);
-        Self { tree, nearest_m, least_m }
-    }
-
-    /// Maximum length of an edge around `p`, m. It changes by no more than `EDGE_SHARE` a metre: where it leapt, an edge that is cut
-    /// beside a longer one that is not would come back as the new edge, again and again.
-    fn edge_at(&self, p: DVec3) -> f64 {
-        let mut least_m = f64::INFINITY;
-        for (spot, squared) in self.tree.nearest_neighbor_iter_with_distance_2(p.to_array()) {
-            let away_m = squared.sqrt();
-            if away_m >= least_m {
-                break;
-            }
-            least_m = least_m.min(self.nearest_m[spot.data].max(away_m));
-        }
-        EDGE_SHARE * least_m
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,9 @@ use glam::DVec3;
 
 use crate::body::Topology;
 
+/// Rounds of cuts, each of which halves edges: more than any surface needs.
+const MOST_ROUNDS: usize = 40;
+
 /// A surface whose long edges are cut.
 pub(super) struct Refined {
     pub(super) positions: Vec<DVec3>,
@@ -31,7 +34,10 @@ pub(super) fn refine(
         is_new: vec![true; topology.triangles.len()],
     };
     let mut is_cut = false;
-    while refined.triangles.len() < most && refined.cut(shortest, &wanted) {
+    for _ in 0..MOST_ROUNDS {
+        if refined.triangles.len() >= most || !refined.cut(shortest, &wanted) {
+            break;
+        }
         is_cut = true;
     }
     is_cut.then_some(refined)

@@ -210,3 +210,74 @@ fn the_least_of_a_parabola() {
     assert!((of(|t| (t + 1.0).powi(2)) - 1.0).abs() < 1e-12);
     assert!((of(|t| 1.0 - t * t)).abs() < 1e-12);
 }
+
+#[test]
+fn marching_over_fine_triangles_finds_the_cells_and_borders_of_exact_ways() {
+    // A plane whose triangles are of all shapes, and a sphere: with many triangles for each point, and by windows.
+    let scatter =
+        |p: DVec2| DVec2::new(p.x + 0.004 * (37.0 * p.y).sin() * (1.0 - p.x) * p.x, p.y * p.y * (3.0 - 2.0 * p.y));
+    let plane = sheet(110, 90, |p| scatter(p).extend(0.0));
+    let flat: Vec<DVec3> = scattered(40).map(|p| p.extend(0.0)).collect();
+    let round: Vec<DVec3> = scattered(40)
+        .map(|p| {
+            let (z, turn) = (2.0 * p.y - 1.0, TAU * p.x);
+            DVec3::new(turn.cos() * (1.0 - z * z).sqrt(), turn.sin() * (1.0 - z * z).sqrt(), z)
+        })
+        .collect();
+    for (topology, points) in [(plane, flat), (sphere(6), round)] {
+        assert!(topology.triangles.len() > MARCHED_PER_POINT * points.len());
+        let marched = Cells::new(&topology, &places(&topology, &points));
+        let exact = Cells::in_windows(&topology, &places(&topology, &points));
+        let total: f64 = exact.areas.iter().sum();
+        assert!((marched.areas.iter().sum::<f64>() / total - 1.0).abs() < 1e-9 && marched.pieces.is_empty());
+        let mut worst = 0.0_f64;
+        for (area, wanted) in marched.areas.iter().zip(&exact.areas) {
+            worst = worst.max((area / wanted - 1.0).abs());
+        }
+        assert!(worst < 0.02, "{worst}");
+        let long = |cells: &Cells| -> Vec<(u32, u32)> {
+            cells.borders.iter().filter(|(_, border)| border.length_m > 0.02).map(|(&pair, _)| pair).collect()
+        };
+        let mut compared = 0;
+        for (one, other) in [(&marched, &exact), (&exact, &marched)] {
+            for pair in long(one) {
+                let [a, b] = [one, other].map(|cells| cells.borders[&pair]);
+                assert!((a.path_m / b.path_m - 1.0).abs() < 0.04, "{pair:?} {a:?} {b:?}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 150, "{compared}");
+    }
+}
+
+#[test]
+fn the_surface_in_triangles_is_that_of_the_cells() {
+    // Triangles larger than cells, which are cut beforehand, and smaller ones.
+    for columns in [2, 60] {
+        let topology = sheet(columns, columns, |p| p.extend(0.1 * p.x * p.x));
+        let places: Vec<SurfacePlace> = scattered(150)
+            .map(|p| {
+                let at = p.extend(0.1 * p.x * p.x);
+                let triangles = 0..topology.triangles.len() as u32;
+                let nearest = triangles.map(|t| SurfacePlace::in_triangle(&topology, t, at));
+                let far = |place: &SurfacePlace| place.position(&topology).distance(at);
+                nearest.min_by(|a, b| far(a).total_cmp(&far(b))).unwrap()
+            })
+            .collect();
+        let cells = Cells::with_surface(&topology, &places);
+        let mut areas = vec![0.0; places.len()];
+        for &(point, corners) in &cells.surface {
+            areas[point as usize] += area_vector(corners).length() / 2.0;
+            let middle = corners.iter().sum::<DVec3>() / 3.0;
+            let away = |place: &SurfacePlace| place.position(&topology).distance(middle);
+            let least = places.iter().map(away).fold(f64::INFINITY, f64::min);
+            assert!(away(&places[point as usize]) < least + 0.01, "nearly flat: along the surface as in space");
+        }
+        let differ = areas.iter().zip(&cells.areas).filter(|(a, b)| (*a - *b).abs() > 1e-9).count();
+        assert_eq!(differ, 0);
+        // Triangles inside one cell stay whole.
+        let most = topology.triangles.len() + 12 * places.len() * (if columns == 2 { 12 } else { 4 });
+        assert!(cells.surface.len() < most, "{} of {most}", cells.surface.len());
+        assert!(Cells::new(&topology, &places).surface.is_empty());
+    }
+}

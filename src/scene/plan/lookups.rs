@@ -3,7 +3,9 @@
 use super::super::stages::Stages;
 use super::super::{Arithmetic, Knobs};
 use super::{Plan, PlanField};
-use crate::percept::Outputs;
+use crate::error::{Error, Result};
+use crate::percept::{Outputs, TouchOutputs};
+use crate::signal::Receptor;
 use crate::stage::calibrate::Table;
 use crate::stage::{Sums, layout};
 
@@ -25,6 +27,25 @@ impl Plan {
     /// How many taxels' pressures percepts keep.
     pub(crate) fn kept_pressures(&self) -> usize {
         if self.stages().pressures { self.slots() } else { 0 }
+    }
+
+    /// What is given of touches of the whole body; `None` where none are looked for.
+    #[must_use]
+    pub fn touch_outputs(&self) -> Option<TouchOutputs> {
+        self.touch_outputs
+    }
+
+    /// Keeps the pressures that touches of the whole body are found in: those of the first letter `sustained`.
+    pub(super) fn find_touches(&mut self, first_slots: &[u32]) -> Result<()> {
+        let mut letters = self.letters.iter().zip(first_slots);
+        let Some((_, &first)) = letters.find(|(letter, _)| letter.receptor == Receptor::Sustained) else {
+            return Err(Error::usage(
+                "touches are found in pressures: ask for letter `sustained` too, or for no touches",
+            ));
+        };
+        self.touched_from = Some(first as usize);
+        self.stages.pressures = true;
+        Ok(())
     }
 
     /// What a device gives back: the outputs, and what tells the host of which touches one taxel is nearly all.

@@ -12,11 +12,9 @@ use arrow_array::{ArrayRef, DictionaryArray, RecordBatch, StringArray};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use sha2::{Digest as _, Sha256};
 
-use super::{
-    Row, TableColumn, TableType, ValueOf, percept_columns, rows, self_contact_columns, self_contact_rows,
-    touch_columns, touch_rows,
-};
-use crate::percept::{ContactKind, Flags, Percepts};
+use super::row::{OfTouch, Row, TableColumn, TableType, ValueOf, Words};
+use super::{percept_columns, rows, self_contact_columns, self_contact_rows, touch_columns, touch_rows};
+use crate::percept::{ContactKind, Percepts};
 use crate::sink::{FieldNames, Session};
 
 /// Makes record batches of percepts: a row per frame and field in contact, or per separate touch.
@@ -41,12 +39,6 @@ pub enum TableKind {
     SelfContacts,
 }
 
-/// The words of the columns of words, and of flags.
-struct Words {
-    names: Vec<FieldNames>,
-    flags: Vec<(Flags, String)>,
-}
-
 /// The values of a column, of which no batch is made yet.
 enum Builder {
     F64(Float64Builder),
@@ -67,7 +59,7 @@ impl ArrowTable {
             TableKind::SelfContacts => self_contact_columns(session),
             TableKind::Touched | TableKind::AllFields => percept_columns(session),
         };
-        let flags = Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect();
+        let words = Words::new(session);
         let field = |column: &TableColumn| {
             let about =
                 HashMap::from([("unit".to_owned(), column.unit.clone()), ("help".to_owned(), column.help.clone())]);
@@ -75,13 +67,13 @@ impl ArrowTable {
         };
         let fields: Vec<Field> = columns.iter().map(field).collect();
         let columns = columns.into_iter().map(|column| {
-            let builder = Builder::new(&column, &session.names);
+            let builder = Builder::new(&column, &words);
             (column, builder)
         });
         Self {
             schema: Arc::new(Schema::new_with_metadata(fields, metadata(session))),
             columns: columns.collect(),
-            words: Words { names: session.names.clone(), flags },
+            words,
             kind,
             rows: 0,
         }
@@ -172,7 +164,8 @@ fn arrow_type(kind: TableType) -> DataType {
 }
 
 impl Builder {
-    fn new(column: &TableColumn, names: &[FieldNames]) -> Self {
+    fn new(column: &TableColumn, words_of: &Words) -> Self {
+        let names = &words_of.names;
         match column.kind {
             TableType::F64 => Self::F64(Float64Builder::new()),
             TableType::F32 => Self::F32(Float32Builder::new()),
@@ -188,7 +181,14 @@ impl Builder {
                     ValueOf::Signal => name.signal.clone(),
                     _ => None,
                 };
+                let skin = words_of.skin.as_ref();
                 let others: Vec<&str> = match column.value {
+                    ValueOf::OnSkin(OfTouch::Kind) => ContactKind::ALL.map(ContactKind::name).to_vec(),
+                    ValueOf::OnSkin(of) => {
+                        let links = skin.into_iter().flat_map(|skin| skin.links.iter().map(String::as_str));
+                        let world = skin.filter(|_| of == OfTouch::In).map(|skin| skin.world.as_str());
+                        links.chain(world).collect()
+                    }
                     ValueOf::Link => names.first().map(|name| name.world.as_str()).into_iter().collect(),
                     ValueOf::Output(..) | ValueOf::TouchFit(..) => ContactKind::ALL.map(ContactKind::name).to_vec(),
                     _ => Vec::new(),
@@ -213,12 +213,11 @@ impl Builder {
             Self::U32(values) => values.append_option(row.whole(value).map(|number| number as u32)),
             Self::Bool(values) => values.append_value(row.is_touched()),
             Self::Word { keys, key_of, .. } => {
-                let word = row.word(value, &words.names);
+                let word = row.word(value, words);
                 keys.append_option(word.and_then(|word| key_of.get(word).copied()));
             }
             Self::Words(lists) => {
-                let own = row.flags();
-                for (_, name) in words.flags.iter().filter(|(flag, _)| own.contains(*flag)) {
+                for name in row.list(value, words) {
                     lists.values().append_value(name);
                 }
                 lists.append(true);

@@ -7,13 +7,13 @@ use std::io::{self, ErrorKind};
 use csv::{QuoteStyle, Writer, WriterBuilder};
 use serde::Serialize;
 
+use super::row::{Row, TableColumn, TableType, ValueOf, Words};
 use super::{
-    Row, TableColumn, TableType, ValueOf, output_columns, percept_columns, rows, self_contact_columns,
-    self_contact_rows, touch_columns, touch_rows,
+    output_columns, percept_columns, rows, self_contact_columns, self_contact_rows, touch_columns, touch_rows,
 };
 use crate::error::{Error, Result, failed};
 use crate::output::{OutputFile, OutputPath};
-use crate::percept::{Flags, Percepts};
+use crate::percept::Percepts;
 use crate::sink::{FieldNames, Flow, Session, Sink};
 
 /// Between the words of a list.
@@ -25,8 +25,7 @@ pub struct CsvSink {
     touches: Option<CsvFile>,
     self_contacts: Option<CsvFile>,
     rows: Rows,
-    names: Vec<FieldNames>,
-    flags: Vec<(Flags, String)>,
+    words: Words,
     closed: bool,
 }
 
@@ -58,8 +57,6 @@ impl CsvSink {
         wide: bool,
         session: &Session<'_>,
     ) -> Result<Self> {
-        let flags = Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect();
-        let names = session.names.clone();
         let mut sink = Self {
             percepts: output.map(|output| CsvFile::begin(output, percept_columns(session))).transpose()?,
             touches: touches.map(|output| CsvFile::begin(output, touch_columns(session))).transpose()?,
@@ -67,8 +64,7 @@ impl CsvSink {
                 .map(|output| CsvFile::begin(output, self_contact_columns(session)))
                 .transpose()?,
             rows: Rows::PerField { all_fields: session.all_fields },
-            names,
-            flags,
+            words: Words::new(session),
             closed: false,
         };
         let titles_of = |file: &CsvFile| file.columns.iter().map(TableColumn::title).collect::<Vec<_>>();
@@ -81,7 +77,7 @@ impl CsvSink {
                 let head = head_of(name);
                 columns.iter().map(|column| format!("{head} {}", column.title())).collect::<Vec<_>>()
             };
-            let titles: Vec<String> = titles.chain(sink.names.iter().flat_map(of_field)).collect();
+            let titles: Vec<String> = titles.chain(sink.words.names.iter().flat_map(of_field)).collect();
             sink.rows = Rows::PerFrame(columns);
             percepts.record(titles)?;
         } else if let Some(percepts) = &mut sink.percepts {
@@ -104,26 +100,26 @@ impl CsvSink {
     }
 
     fn write_all(&mut self, percepts: &Percepts) -> Result<(), csv::Error> {
-        let Self { percepts: file, touches, self_contacts, rows: how, names, flags, .. } = self;
+        let Self { percepts: file, touches, self_contacts, rows: how, words, .. } = self;
         for frame in 0..percepts.frames() {
             match (how as &Rows, file.as_mut()) {
                 (_, None) => {}
                 (Rows::PerField { all_fields }, Some(file)) => {
                     for row in rows(percepts, frame, *all_fields) {
                         for column in 0..file.columns.len() {
-                            file.field(&row, file.columns[column].kind, file.columns[column].value, names, flags)?;
+                            file.field(&row, file.columns[column].kind, file.columns[column].value, words)?;
                         }
                         file.writer.write_record(None::<&[u8]>)?;
                     }
                 }
                 (Rows::PerFrame(columns), Some(file)) => {
-                    let first = Row { percepts, frame, field: 0, touch: None, contact: None };
+                    let first = Row { percepts, frame, field: 0, touch: None, on_skin: None, contact: None };
                     for column in 0..file.columns.len() {
-                        file.field(&first, file.columns[column].kind, file.columns[column].value, names, flags)?;
+                        file.field(&first, file.columns[column].kind, file.columns[column].value, words)?;
                     }
                     for row in rows(percepts, frame, true) {
                         for column in columns {
-                            file.field(&row, column.kind, column.value, names, flags)?;
+                            file.field(&row, column.kind, column.value, words)?;
                         }
                     }
                     file.writer.write_record(None::<&[u8]>)?;
@@ -131,12 +127,12 @@ impl CsvSink {
             }
             if let Some(touches) = touches {
                 for row in touch_rows(percepts, frame) {
-                    touches.row(&row, names, flags)?;
+                    touches.row(&row, words)?;
                 }
             }
             if let Some(self_contacts) = self_contacts {
                 for row in self_contact_rows(percepts, frame) {
-                    self_contacts.row(&row, names, flags)?;
+                    self_contacts.row(&row, words)?;
                 }
             }
         }
@@ -174,23 +170,16 @@ impl CsvFile {
     }
 
     /// Writes a row in all of its columns.
-    fn row(&mut self, row: &Row<'_>, names: &[FieldNames], flags: &[(Flags, String)]) -> Result<(), csv::Error> {
+    fn row(&mut self, row: &Row<'_>, words: &Words) -> Result<(), csv::Error> {
         for column in 0..self.columns.len() {
             let TableColumn { kind, value, .. } = self.columns[column];
-            self.field(row, kind, value, names, flags)?;
+            self.field(row, kind, value, words)?;
         }
         self.writer.write_record(None::<&[u8]>)
     }
 
     /// Writes the value of a row in a column.
-    fn field(
-        &mut self,
-        row: &Row<'_>,
-        kind: TableType,
-        value: ValueOf,
-        names: &[FieldNames],
-        flags: &[(Flags, String)],
-    ) -> Result<(), csv::Error> {
+    fn field(&mut self, row: &Row<'_>, kind: TableType, value: ValueOf, words: &Words) -> Result<(), csv::Error> {
         let text = &mut self.text;
         text.clear();
         match (kind, value) {
@@ -198,14 +187,13 @@ impl CsvFile {
             (TableType::F32, _) => print(text, row.float(value).map(|number| number as f32).as_ref()),
             (TableType::U64 | TableType::U32, _) => print(text, row.whole(value).as_ref()),
             (_, ValueOf::Contact) => print(text, Some(&row.is_touched())),
-            (_, ValueOf::Flags) => {
-                let own = row.flags();
-                for (index, (_, name)) in flags.iter().filter(|(flag, _)| own.contains(*flag)).enumerate() {
+            (TableType::Words, _) => {
+                for (index, name) in row.list(value, words).iter().enumerate() {
                     text.extend_from_slice(if index == 0 { b"" } else { BETWEEN_WORDS.as_bytes() });
                     text.extend_from_slice(name.as_bytes());
                 }
             }
-            _ => return self.writer.write_field(row.word(value, names).unwrap_or_default()),
+            _ => return self.writer.write_field(row.word(value, words).unwrap_or_default()),
         }
         self.writer.write_field(&self.text)
     }
@@ -243,7 +231,7 @@ fn flow_of(written: io::Result<()>, name: &str) -> Result<Flow> {
 
 impl Sink for CsvSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
-        assert_eq!(percepts.fields(), self.names.len(), "a sink is told the name of every field");
+        assert_eq!(percepts.fields(), self.words.names.len(), "a sink is told the name of every field");
         if self.closed {
             return Ok(Flow::Closed);
         }

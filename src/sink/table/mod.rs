@@ -5,9 +5,12 @@
 #[cfg(feature = "arrow")]
 mod arrow_table;
 mod csv_sink;
+mod names;
+mod on_skin;
 #[cfg(feature = "parquet")]
 mod parquet_sink;
 mod path_beside;
+mod row;
 
 #[cfg(feature = "arrow")]
 pub use arrow_table::{ArrowTable, TableKind};
@@ -15,121 +18,12 @@ pub use csv_sink::CsvSink;
 #[cfg(feature = "parquet")]
 pub use parquet_sink::ParquetSink;
 pub(super) use path_beside::path_beside;
+pub use row::{TableColumn, TableType};
 
+use self::names::{U_AND_V, X_Y_AND_Z, suffixes, unit_of};
+use self::row::{Row, ValueOf};
 use super::{FieldNames, Session};
-use crate::percept::{Column, ContactKind, Flags, Outputs, Percepts, SelfContact, Touch, Unit};
-
-/// A column of a table.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct TableColumn {
-    /// Its name, such as `centroid_u`.
-    pub name: String,
-    /// What it is measured in, such as `m`; empty where that has no meaning.
-    pub unit: String,
-    /// The type of its values.
-    pub kind: TableType,
-    /// Whether a value may be absent.
-    pub is_nullable: bool,
-    /// What it is, in a line.
-    pub help: String,
-    value: ValueOf,
-}
-
-/// The type of a column's values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TableType {
-    /// Double precision.
-    F64,
-    /// Single precision.
-    F32,
-    /// A whole number up to 2⁶⁴.
-    U64,
-    /// A whole number up to 2³².
-    U32,
-    /// True or false.
-    Bool,
-    /// One of few words: a dictionary.
-    Word,
-    /// A list of words.
-    Words,
-}
-
-impl TableType {
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::F64 => "f64",
-            Self::F32 => "f32",
-            Self::U64 => "u64",
-            Self::U32 => "u32",
-            Self::Bool => "bool",
-            Self::Word => "dictionary of text",
-            Self::Words => "list of text",
-        }
-    }
-}
-
-/// Where a column's values are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum ValueOf {
-    Time,
-    Frame,
-    Field,
-    Link,
-    Letter,
-    Signal,
-    Contact,
-    Output(&'static Column, usize),
-    Flags,
-    TouchId,
-    TouchTotal,
-    TouchActive,
-    TouchCentroid(usize),
-    TouchPosition(usize),
-    TouchFit(&'static Column, usize),
-    ContactId,
-    ContactPosition(usize),
-    ContactDistance,
-    ContactAngle,
-    SideField(usize),
-    SideLink(usize),
-    SideTouch(usize),
-    SideTotal(usize),
-}
-
-impl TableColumn {
-    fn new(name: &str, unit: &str, kind: TableType, help: &str, value: ValueOf) -> Self {
-        let (name, unit, help) = (name.to_owned(), unit.to_owned(), help.to_owned());
-        Self { name, unit, kind, is_nullable: false, help, value }
-    }
-
-    /// Its name with its unit, as in the header of a CSV: `total [P]`.
-    #[must_use]
-    pub fn title(&self) -> String {
-        match self.unit.as_str() {
-            "" | "1" => self.name.clone(),
-            unit => format!("{} [{unit}]", self.name),
-        }
-    }
-
-    fn or_absent(self) -> Self {
-        Self { is_nullable: true, ..self }
-    }
-}
-
-const U_AND_V: [&str; 2] = ["u", "v"];
-const X_Y_AND_Z: [&str; 3] = ["x", "y", "z"];
-
-/// What the components of an output are called.
-fn suffixes(components: usize) -> &'static [&'static str] {
-    match components {
-        1 => &[""],
-        2 => &U_AND_V,
-        _ => &X_Y_AND_Z,
-    }
-}
+use crate::percept::{Column, Outputs, Percepts, Unit};
 
 /// Time, frame and field, with which every row of either table begins.
 fn keys(names: &[FieldNames]) -> Vec<TableColumn> {
@@ -204,9 +98,12 @@ fn kind_of(column: &Column, session: &Session<'_>) -> TableType {
     }
 }
 
-/// The columns of a session's separate touches, one row each.
+/// The columns of a session's touches, one row each: of the whole body where they are looked for, else of fields.
 #[must_use]
 pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
+    if let Some(skin) = session.skin() {
+        return on_skin::columns(skin.outputs, session);
+    }
     let p = unit_of(Unit::P, session);
     let mut columns = keys(&session.names);
     let id = "Lasts from onset to release, and is never used again for the field.";
@@ -268,100 +165,27 @@ pub fn self_contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
     columns
 }
 
-fn unit_of(unit: Unit, session: &Session<'_>) -> String {
-    match unit {
-        Unit::Force if session.p_unit == "Pa" => "N".to_owned(),
-        Unit::P | Unit::Force if !session.p_unit.is_empty() => session.p_unit.to_owned(),
-        unit => unit.symbol().to_owned(),
-    }
-}
-
-/// A row of any of the tables.
-#[derive(Clone, Copy)]
-struct Row<'a> {
-    percepts: &'a Percepts,
-    frame: usize,
-    field: usize,
-    /// In the table of touches.
-    touch: Option<&'a Touch>,
-    /// In the table of self-contacts.
-    contact: Option<&'a SelfContact>,
-}
-
-/// A number of a row, in double precision or as a whole number.
-impl Row<'_> {
-    fn link<'n>(&self, names: &'n [FieldNames]) -> &'n str {
-        match self.percepts.in_world(self.frame, self.field) {
-            true => &names[self.field].world,
-            false => &names[self.field].link,
-        }
-    }
-
-    fn float(&self, value: ValueOf) -> Option<f64> {
-        match value {
-            ValueOf::Time => Some(self.percepts.t_s(self.frame)),
-            ValueOf::Output(column, component) => {
-                self.percepts.value(self.frame, self.field, column).map(|components| components[component])
-            }
-            ValueOf::TouchTotal => self.touch.map(|touch| touch.total),
-            ValueOf::TouchCentroid(component) => self.touch?.centroid.map(|centroid| centroid[component]),
-            ValueOf::TouchPosition(component) => self.touch?.position.map(|position| position[component]),
-            ValueOf::TouchFit(column, component) => Some(self.touch?.value(column)?[component]),
-            ValueOf::ContactPosition(component) => self.contact.map(|contact| contact.position[component]),
-            ValueOf::ContactDistance => self.contact.map(|contact| contact.distance),
-            ValueOf::ContactAngle => self.contact?.angle,
-            ValueOf::SideTotal(side) => self.contact.map(|contact| contact.sides[side].total),
-            _ => None,
-        }
-    }
-
-    fn whole(&self, value: ValueOf) -> Option<u64> {
-        match value {
-            ValueOf::Frame => Some(self.percepts.frame_number(self.frame)),
-            ValueOf::TouchId => self.touch.map(|touch| touch.id),
-            ValueOf::ContactId => self.contact.map(|contact| contact.id),
-            ValueOf::SideTouch(side) => self.contact.map(|contact| contact.sides[side].touch),
-            ValueOf::TouchActive => self.touch.map(|touch| touch.active.into()),
-            ValueOf::Output(..) => self.float(value).map(|number| number as u64),
-            _ => None,
-        }
-    }
-
-    /// The word in a column of words; none where it is absent.
-    fn word<'n>(&self, value: ValueOf, names: &'n [FieldNames]) -> Option<&'n str> {
-        let name = &names[self.field];
-        match value {
-            ValueOf::Field => Some(&name.field),
-            ValueOf::Link => Some(self.link(names)),
-            ValueOf::Letter => name.letter.as_deref(),
-            ValueOf::Signal => name.signal.as_deref(),
-            ValueOf::SideField(side) => Some(&names[self.contact?.sides[side].field].field),
-            ValueOf::SideLink(side) => Some(&names[self.contact?.sides[side].field].link),
-            _ => self.float(value).and_then(|kind| ContactKind::ALL.get(kind as usize)).map(|kind| kind.name()),
-        }
-    }
-
-    /// Those of the touch in a table of touches.
-    fn flags(&self) -> Flags {
-        self.touch.map_or_else(|| self.percepts.flags(self.frame, self.field), |touch| touch.flags)
-    }
-
-    fn is_touched(&self) -> bool {
-        self.percepts.in_contact(self.frame, self.field)
-    }
-}
-
 /// The rows of a frame: its fields in contact, or all.
 fn rows(percepts: &Percepts, frame: usize, all_fields: bool) -> impl Iterator<Item = Row<'_>> {
     let listed = move |&field: &usize| all_fields || percepts.in_contact(frame, field);
-    (0..percepts.fields()).filter(listed).map(move |field| Row { percepts, frame, field, touch: None, contact: None })
+    (0..percepts.fields()).filter(listed).map(move |field| Row {
+        percepts,
+        frame,
+        field,
+        touch: None,
+        on_skin: None,
+        contact: None,
+    })
 }
 
-/// The rows of a frame's separate touches.
+/// The rows of a frame's touches: of the whole body where they are looked for, else of fields.
 fn touch_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>> {
-    rows(percepts, frame, false).flat_map(move |row| {
-        percepts.touches(frame, row.field).iter().map(move |touch| Row { touch: Some(touch), ..row })
-    })
+    let on_skin = on_skin::rows(percepts, frame);
+    let of_body = on_skin.is_some();
+    let of_fields = rows(percepts, frame, false).filter(move |_| !of_body).flat_map(move |row| {
+        percepts.field_touches(frame, row.field).iter().map(move |touch| Row { touch: Some(touch), ..row })
+    });
+    on_skin.into_iter().flatten().chain(of_fields)
 }
 
 /// The rows of a frame's self-contacts.
@@ -372,6 +196,7 @@ fn self_contact_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = 
         frame,
         field: contact.sides[0].field,
         touch: None,
+        on_skin: None,
         contact: Some(contact),
     })
 }

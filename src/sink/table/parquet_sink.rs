@@ -7,7 +7,8 @@ use parquet::basic::{Compression, Encoding, GzipLevel};
 use parquet::file::properties::WriterProperties;
 use parquet::schema::types::ColumnPath;
 
-use super::{ArrowTable, TableKind, TableType, ValueOf};
+use super::row::{TableType, ValueOf};
+use super::{ArrowTable, TableKind};
 use crate::error::{Error, Result, failed};
 use crate::output::{OutputFile, OutputPath};
 use crate::percept::Percepts;

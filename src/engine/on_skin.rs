@@ -1,0 +1,233 @@
+//! Touches of the whole body: what they are found in, frame by frame, and where their links are then.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::links::Links;
+use super::skin_fits::SkinFits;
+use crate::backend::RawBatch;
+use crate::body::Body;
+use crate::field::TaxelGraph;
+use crate::percept::{Flags, LinkShare, Percepts, TouchFlags, TouchFrame, TouchOutputs};
+use crate::scene::{Plan, PlanField, Scene};
+use crate::signal::{Frame, LayerResponse, Quantity, RawValue, Response, TaxelCalibration};
+use crate::stage::fit::STEPS;
+use crate::stage::{calibrate, force};
+use crate::touch::{Input, Reading, Skin, TouchState, Touches};
+
+/// Flags of a field that holds a taxel without a value, or with one of which something is to be said.
+const OF_VALUES: Flags =
+    Flags::INCOMPLETE.union(Flags::FAULTY_INPUT).union(Flags::OUT_OF_RANGE).union(Flags::SATURATED).union(Flags::STALE);
+
+/// Raw values or gains beyond this may make a P that is not believed.
+const LARGE: f64 = (1_u64 << 29) as f64;
+
+/// Finds the touches of the whole body. The plan's channels are the skin's nodes: both are all pressure taxels by ascending id.
+pub(super) struct OnSkin {
+    touches: Touches,
+    /// The slot of the first channel.
+    first_slot: usize,
+    /// Whether each channel is in a field, whose flags say what is wrong with its value.
+    all_in_fields: bool,
+    /// Why the edges that the body's file holds are not used.
+    note: Option<String>,
+    /// Where fits are asked for.
+    fits: Option<SkinFits>,
+    /// Memory for a frame.
+    without_value: Vec<u32>,
+    notes: Vec<(u32, TouchFlags)>,
+    poses: Vec<Option<DAffine3>>,
+}
+
+impl OnSkin {
+    /// `None` where touches of the whole body are not asked for.
+    pub(super) fn new(body: &Body, plan: &Plan, scene: &Scene, layer: Option<LayerResponse>) -> Option<Self> {
+        let (mut options, first_slot) = scene.touches.zip(plan.touched_from)?;
+        let (graph, note) = TaxelGraph::of(body);
+        let mut skin = Skin::new(body, &graph, |taxel| {
+            let channel = plan.body_taxels.binary_search(&taxel);
+            channel.map_or(Reading::default(), |channel| reading(plan, channel))
+        });
+        let fields: Vec<Vec<u32>> = plan.fields.iter().map(|field| nodes_of(plan, field, first_slot)).collect();
+        let in_fields: BTreeSet<u32> = fields.iter().flatten().copied().collect();
+        skin.set_fields(&fields);
+        let fits = options.outputs.intersects(TouchOutputs::FIT).then(|| {
+            // Which taxels are fitted.
+            options.outputs |= TouchOutputs::TAXELS;
+            SkinFits::new(layer, scene.knobs.orientation_by.steps().unwrap_or(STEPS))
+        });
+        Some(Self {
+            touches: Touches::new(Arc::new(skin), options),
+            first_slot,
+            fits,
+            all_in_fields: in_fields.len() == plan.channels(),
+            note,
+            without_value: Vec::new(),
+            notes: Vec::new(),
+            poses: Vec::new(),
+        })
+    }
+
+    /// The skin that touches are found on.
+    pub(super) fn skin(&self) -> &Skin {
+        self.touches.skin()
+    }
+
+    /// Why the edges that the body's file holds are not used.
+    pub(super) fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    pub(super) fn state(&self) -> TouchState {
+        self.touches.state()
+    }
+
+    pub(super) fn restore(&mut self, state: &TouchState) {
+        self.touches.restore(state);
+    }
+
+    /// What presses on each link in the last frame, as [`Touches::on_links`] has it.
+    pub(super) fn on_links(&self, out: &mut Vec<LinkShare>) {
+        self.touches.on_links(out);
+    }
+
+    /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `stale` has the taxels of the
+    /// body that are stale, by frame of the call.
+    pub(super) fn find(
+        &mut self,
+        (plan, links): (&Plan, &Links),
+        frames: &[Frame],
+        raw: &RawBatch<'_>,
+        stale: &[Vec<usize>],
+        percepts: &mut Percepts,
+    ) {
+        for (offset, frame) in frames.iter().enumerate() {
+            let index = raw.first + offset;
+            let stale = stale.get(index).map_or(&[][..], Vec::as_slice);
+            self.look_at_values(plan, raw, offset, stale, percepts);
+            let mut found = percepts.take_touch_frame(index);
+            let slots = plan.slots();
+            let pressures = &percepts.pressures[index * slots..][..slots][self.first_slot..][..plan.channels()];
+            let input = Input {
+                t_s: frame.t_s,
+                restarts: raw.steps[offset].restarts(),
+                pressures,
+                without_value: &self.without_value,
+                notes: &self.notes,
+            };
+            self.touches.step(input, &mut found);
+            self.poses.clear();
+            if !found.touches.is_empty() && links.may_pose(frame) {
+                links.poses_into(frame, &mut self.poses);
+                put_in_world(&self.poses, &mut found);
+            }
+            if let Some(fits) = &mut self.fits {
+                fits.take((plan, self.touches.skin()), raw, offset, &self.poses, &mut found);
+            }
+            percepts.put_touch_frame(index, found);
+        }
+        if let Some(fits) = &mut self.fits {
+            fits.finish(self.touches.skin(), percepts);
+        }
+    }
+
+    /// Notes which taxels have no value in a frame, and what is to be said of those that have one.
+    fn look_at_values(&mut self, plan: &Plan, raw: &RawBatch<'_>, offset: usize, stale: &[usize], percepts: &Percepts) {
+        self.without_value.clear();
+        self.notes.clear();
+        let fields = plan.fields.len();
+        let flags = &percepts.flags[(raw.first + offset) * fields..][..fields];
+        if self.all_in_fields && stale.is_empty() && !flags.iter().any(|flags| flags.intersects(OF_VALUES)) {
+            return;
+        }
+        let pressures = &percepts.pressures[(raw.first + offset) * plan.slots()..][self.first_slot..];
+        let calibrations = plan.calibrations.iter();
+        for (channel, (value, calibration)) in raw.rows.row(offset).zip(calibrations).enumerate() {
+            let node = channel as u32;
+            let has_value = has_value(value, calibration, || {
+                let response = plan.taxels[self.first_slot + channel].response;
+                calibrate::pressure(value, calibration, plan.curves.of(response)).is_some()
+            });
+            let mut note = TouchFlags::empty();
+            if !has_value {
+                self.without_value.push(node);
+                note |= if value.is_missing() { TouchFlags::INCOMPLETE } else { TouchFlags::FAULTY_INPUT };
+            } else if pressures[channel] > 0.0 {
+                let [low, high] = calibration.raw_range.map(f64::from);
+                if value.number().is_some_and(|value| !(low..=high).contains(&value)) {
+                    note |= TouchFlags::OUT_OF_RANGE;
+                }
+                if pressures[channel] > calibration.p_max {
+                    note |= TouchFlags::SATURATED;
+                }
+            }
+            if !note.is_empty() {
+                self.notes.push((node, note));
+            }
+        }
+        let channels = stale.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok());
+        self.notes.extend(channels.map(|channel| (channel as u32, TouchFlags::STALE)));
+    }
+}
+
+/// Whether a raw value counts; `is_believed` says whether its P does, where that may be too large.
+fn has_value(value: RawValue, calibration: &TaxelCalibration, is_believed: impl FnOnce() -> bool) -> bool {
+    let Some(number) = value.number() else { return false };
+    if calibration.mask {
+        return false;
+    }
+    let is_usual = number.abs() < LARGE && calibration.baseline.abs() < LARGE && calibration.gain.abs() < LARGE;
+    (is_usual && calibration.response == Response::Linear) || is_believed()
+}
+
+/// The channels of the members of a field that is read in the slots from `first_slot` on.
+fn nodes_of(plan: &Plan, field: &PlanField, first_slot: usize) -> Vec<u32> {
+    let slots = plan.members_of(field).iter().map(|member| member.slot as usize);
+    slots
+        .filter_map(|slot| slot.checked_sub(first_slot))
+        .filter(|&node| node < plan.channels())
+        .map(|node| node as u32)
+        .collect()
+}
+
+/// How the value of the taxel at `channel` counts in touches.
+fn reading(plan: &Plan, channel: usize) -> Reading {
+    let calibration = &plan.calibrations[channel];
+    Reading {
+        newton_at_one: force::newtons_per_p(calibration.quantity, plan.areas[channel]).unwrap_or(0.0),
+        weighs_by_cell: calibration.quantity != Quantity::Newton,
+        sigma: sigma(plan, channel),
+    }
+}
+
+/// The standard deviation of the noise of P, about: where it is not known, that of half a count, or a third of the dead band.
+fn sigma(plan: &Plan, channel: usize) -> f64 {
+    /// Noise of a raw value that is not known.
+    const HALF_A_COUNT: f64 = 0.5;
+    let calibration = &plan.calibrations[channel];
+    let slot = plan.touched_from.unwrap_or(0) + channel;
+    let knots = plan.curves.of(plan.taxels[slot].response).written;
+    let slope = match (knots.first(), knots.last()) {
+        (Some(first), Some(last)) if last[0] > first[0] => ((last[1] - first[1]) / (last[0] - first[0])).abs(),
+        _ => calibration.gain.abs(),
+    };
+    match calibration.noise {
+        Some(noise) => slope * noise,
+        None => (slope * HALF_A_COUNT).max(calibration.dead_band / 3.0),
+    }
+}
+
+/// Puts the touches whose links `poses` has into the world.
+fn put_in_world(poses: &[Option<DAffine3>], found: &mut TouchFrame) {
+    for touch in &mut found.touches {
+        let Some(world_from_link) = poses[touch.link as usize] else { continue };
+        let turn = |direction: &mut DVec3| *direction = world_from_link.transform_vector3(*direction);
+        touch.position = world_from_link.transform_point3(touch.position);
+        touch.centre = world_from_link.transform_point3(touch.centre);
+        turn(&mut touch.normal);
+        [&mut touch.principal_axis, &mut touch.orientation, &mut touch.velocity].into_iter().flatten().for_each(turn);
+        touch.in_world = true;
+    }
+}

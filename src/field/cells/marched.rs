@@ -1,0 +1,218 @@
+//! Distances to several points over parts of a surface whose triangles are small beside the cells.
+//!
+//! Exact windows there are many: some tens an edge, most of which end in the same cell. Here a corner gets its distance to a point
+//! from two that have theirs already, the nearest first: the point is where it is in the plane of their triangle, if the straight line
+//! goes through their edge, and else the way is along an edge (fast marching with spherical fronts: Novotni and Klein, 2002). On
+//! a plane that is exact where lines cross edges. Areas of cells are off by up to 2 %, lengths of paths by up to 4 %, where a cell has 400 triangles.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use super::polygon::Candidate;
+use crate::body::Topology;
+
+/// Points that a corner has the distance to: its own, and those beyond a border nearby.
+const KEPT: usize = 4;
+
+/// The points that are near a corner, the nearest first.
+#[derive(Clone, Copy, Debug, Default)]
+struct Near {
+    count: u8,
+    sites: [u32; KEPT],
+    distances_m: [f64; KEPT],
+}
+
+impl Near {
+    fn to(&self, site: u32) -> Option<f64> {
+        let known = self.sites[..self.count as usize].iter().position(|&known| known == site)?;
+        Some(self.distances_m[known])
+    }
+
+    /// Notes the distance to `site`, if that is less than what is noted; whether it may be. One for which there is no room is not noted.
+    fn lower(&mut self, site: u32, distance_m: f64) -> bool {
+        let count = self.count as usize;
+        match self.sites[..count].iter().position(|&known| known == site) {
+            Some(known) if self.distances_m[known] <= distance_m => return false,
+            Some(known) => self.distances_m[known] = distance_m,
+            None if count < KEPT => {
+                (self.sites[count], self.distances_m[count], self.count) = (site, distance_m, self.count + 1);
+            }
+            None => {}
+        }
+        true
+    }
+}
+
+/// An arrival at a corner that may be the first from its point.
+struct Coming {
+    distance_m: f64,
+    vertex: u32,
+    site: u32,
+}
+
+/// Distances of corners to points.
+pub(super) struct Marched<'a> {
+    topology: &'a Topology,
+    near: Vec<Near>,
+    /// Per vertex the least distances that are in the queue, of some points.
+    coming: Vec<Near>,
+    /// Per vertex where its half-edges begin in `leaving`.
+    first: Vec<u32>,
+    /// The half-edges that leave each vertex, one vertex after the other.
+    leaving: Vec<u32>,
+    /// Per vertex its longest edge, m.
+    longest_m: Vec<f64>,
+    queue: BinaryHeap<Coming>,
+}
+
+impl<'a> Marched<'a> {
+    /// On those triangles of `topology` for which `is_marched` is true.
+    pub(super) fn new(topology: &'a Topology, is_marched: impl Fn(u32) -> bool) -> Self {
+        let vertices = topology.positions.len();
+        let mut first = vec![0_u32; vertices + 1];
+        let edges = || (0..topology.triangles.len() as u32).filter(|&triangle| is_marched(triangle));
+        let edges = || edges().flat_map(|triangle| 3 * triangle..3 * triangle + 3);
+        let mut longest_m = vec![0.0_f64; vertices];
+        for edge in edges() {
+            let (from, to) = topology.ends(edge);
+            first[from as usize + 1] += 1;
+            let length_m = topology.positions[from as usize].distance(topology.positions[to as usize]);
+            for vertex in [from, to] {
+                longest_m[vertex as usize] = longest_m[vertex as usize].max(length_m);
+            }
+        }
+        (1..first.len()).for_each(|vertex| first[vertex] += first[vertex - 1]);
+        let mut next = first.clone();
+        let mut leaving = vec![0; first[vertices] as usize];
+        for edge in edges() {
+            let from = topology.ends(edge).0 as usize;
+            leaving[next[from] as usize] = edge;
+            next[from] += 1;
+        }
+        let near = if leaving.is_empty() { Vec::new() } else { vec![Near::default(); vertices] };
+        Self { topology, coming: near.clone(), near, first, leaving, longest_m, queue: BinaryHeap::new() }
+    }
+
+    /// Adds the point `site` in a triangle, with its distances to the corners.
+    pub(super) fn add(&mut self, triangle: u32, site: u32, distances_m: [f64; 3]) {
+        let corners = self.topology.triangles[triangle as usize];
+        self.queue.extend(corners.into_iter().zip(distances_m).map(|(vertex, distance_m)| Coming {
+            distance_m,
+            vertex,
+            site,
+        }));
+    }
+
+    /// Finds all distances.
+    pub(super) fn run(&mut self) {
+        while let Some(Coming { distance_m, vertex, site }) = self.queue.pop() {
+            if !self.arrive(vertex, site, distance_m) {
+                continue;
+            }
+            let [from, to] = [0, 1].map(|step| self.first[vertex as usize + step] as usize);
+            for at in from..to {
+                let triangle = self.leaving[at] / 3;
+                let corners = self.topology.triangles[triangle as usize];
+                let own = corners.into_iter().position(|corner| corner == vertex).unwrap_or(0);
+                let [one, other] = [1, 2].map(|step| (own + step) % 3);
+                for (to, via) in [(one, other), (other, one)] {
+                    if self.near[corners[to] as usize].to(site).is_none() {
+                        let distance_m = self.by_corners(triangle, site, to, [own, via]);
+                        if self.coming[corners[to] as usize].lower(site, distance_m) {
+                            self.queue.push(Coming { distance_m, vertex: corners[to], site });
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether `site` is the first from there at `vertex`, and near enough to count.
+    fn arrive(&mut self, vertex: u32, site: u32, distance_m: f64) -> bool {
+        let reach_m = self.longest_m[vertex as usize];
+        let near = &mut self.near[vertex as usize];
+        let count = near.count as usize;
+        // Beyond the triangles at a border nothing is to be known of the point on the other side.
+        let is_far = count > 0 && distance_m > near.distances_m[0] + reach_m;
+        if count == KEPT || is_far || near.to(site).is_some() {
+            return false;
+        }
+        (near.sites[count], near.distances_m[count], near.count) = (site, distance_m, near.count + 1);
+        true
+    }
+
+    /// The distance to `site` of corner `to` of `triangle`, by those of the corners `from` that have one.
+    fn by_corners(&self, triangle: u32, site: u32, to: usize, from: [usize; 2]) -> f64 {
+        let vertices = self.topology.triangles[triangle as usize];
+        let at = |corner: usize| self.topology.positions[vertices[corner] as usize];
+        let known = from.map(|corner| self.near[vertices[corner] as usize].to(site));
+        let along = |which: usize| known[which].map_or(f64::INFINITY, |known| known + at(from[which]).distance(at(to)));
+        let along_m = along(0).min(along(1));
+        let [Some(a), Some(b)] = known else { return along_m };
+        // In the plane, the first at the origin and the second on the x-axis; the corner is above, the point below.
+        let (p, side) = (at(from[0]), at(from[1]) - at(from[0]));
+        let length = side.length();
+        let offset = at(to) - p;
+        let x = offset.dot(side) / length;
+        let y = (offset.length_squared() - x * x).max(0.0).sqrt();
+        let source_x = (a * a - b * b + length * length) / (2.0 * length);
+        let below = a * a - source_x * source_x;
+        if !(below > 0.0 && length > 0.0) {
+            return along_m;
+        }
+        let below = below.sqrt();
+        let crossing = source_x + (x - source_x) * below / (below + y);
+        if !(0.0..=length).contains(&crossing) {
+            return along_m;
+        }
+        libm::hypot(x - source_x, y + below).min(along_m)
+    }
+
+    /// The distance of `vertex` to its nearest point.
+    pub(super) fn least_m(&self, vertex: u32) -> f64 {
+        let near = &self.near[vertex as usize];
+        if near.count > 0 { near.distances_m[0] } else { f64::INFINITY }
+    }
+
+    /// Adds to `candidates` the points that are near the corners of `triangle`.
+    pub(super) fn reaching(&self, triangle: u32, candidates: &mut Vec<Candidate>) {
+        let vertices = self.topology.triangles[triangle as usize];
+        for vertex in vertices {
+            let near = self.near[vertex as usize];
+            for &site in &near.sites[..near.count as usize] {
+                if candidates.iter().any(|candidate| candidate.site == site) {
+                    continue;
+                }
+                let known = vertices.map(|vertex| self.near[vertex as usize].to(site));
+                let distance = |corner: usize| {
+                    known[corner].unwrap_or_else(|| {
+                        self.by_corners(triangle, site, corner, [(corner + 1) % 3, (corner + 2) % 3])
+                    })
+                };
+                candidates.push(Candidate { site, squared: [0, 1, 2].map(|corner| distance(corner).powi(2)) });
+            }
+        }
+    }
+}
+
+impl Ord for Coming {
+    fn cmp(&self, other: &Self) -> Ordering {
+        // The nearest first; of equally near ones those with the lower numbers, for one order.
+        let nearest = other.distance_m.total_cmp(&self.distance_m);
+        nearest.then(other.site.cmp(&self.site)).then(other.vertex.cmp(&self.vertex))
+    }
+}
+
+impl PartialOrd for Coming {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Coming {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Coming {}

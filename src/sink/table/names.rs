@@ -1,0 +1,25 @@
+//! What columns are called, and their units.
+
+use crate::percept::Unit;
+use crate::sink::Session;
+
+pub(super) const U_AND_V: [&str; 2] = ["u", "v"];
+pub(super) const X_Y_AND_Z: [&str; 3] = ["x", "y", "z"];
+
+/// What the components of an output are called.
+pub(super) fn suffixes(components: usize) -> &'static [&'static str] {
+    match components {
+        1 => &[""],
+        2 => &U_AND_V,
+        _ => &X_Y_AND_Z,
+    }
+}
+
+/// The unit of a column, as the session has it.
+pub(super) fn unit_of(unit: Unit, session: &Session<'_>) -> String {
+    match unit {
+        Unit::Force if session.p_unit == "Pa" => "N".to_owned(),
+        Unit::P | Unit::Force if !session.p_unit.is_empty() => session.p_unit.to_owned(),
+        unit => unit.symbol().to_owned(),
+    }
+}

@@ -1,0 +1,171 @@
+//! The definition of touches, written plainly and slowly: other code for the same equations, with the margins of its choices.
+//!
+//! A choice whose margin is less than `within` of what it compares is in doubt, and with it all touches that it may change. These
+//! are left out of comparisons, and counted. Where P may be off by more than rounding, `within` is that share.
+
+mod divided;
+mod measure;
+mod name;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use super::bound::Bound;
+use super::options::Options;
+use super::skin::Skin;
+use crate::percept::TouchFlags;
+
+/// A touch as it is right.
+#[derive(Clone, Debug)]
+pub(super) struct RightTouch {
+    pub(super) id: u64,
+    pub(super) age_s: f64,
+    pub(super) link: u32,
+    pub(super) nodes: BTreeSet<u32>,
+    pub(super) total: f64,
+    pub(super) force_newton: Option<f64>,
+    pub(super) position: DVec3,
+    pub(super) centre: DVec3,
+    pub(super) axis: Option<DVec3>,
+    pub(super) anisotropy: Option<f64>,
+    pub(super) spread_m: Option<[f64; 2]>,
+    pub(super) orientation: Option<DVec3>,
+    pub(super) velocity: Option<DVec3>,
+    pub(super) wrenches: BTreeMap<u32, [DVec3; 2]>,
+    /// Of the flags about form and identity.
+    pub(super) flags: TouchFlags,
+    /// Which taxels it has, or its identity, may be chosen otherwise.
+    pub(super) in_doubt: bool,
+    /// Its chart may have another base, which may change axis, anisotropy and spread.
+    pub(super) base_in_doubt: bool,
+    pub(super) link_in_doubt: bool,
+    /// How far it may be off.
+    pub(super) bound: Bound,
+}
+
+/// What is kept of a touch.
+#[derive(Clone, Debug)]
+pub(super) struct Past {
+    began_s: f64,
+    link: u32,
+    positions: Vec<(f64, DVec3)>,
+    pressures: BTreeMap<u32, f64>,
+}
+
+/// The definition, frame after frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Reference {
+    ids_given: u64,
+    touches: BTreeMap<u64, Past>,
+    two: BTreeSet<(u64, u64)>,
+}
+
+/// Some connected taxels.
+#[derive(Clone, Debug)]
+pub(super) struct Region {
+    peak: u32,
+    nodes: BTreeSet<u32>,
+    in_doubt: bool,
+}
+
+/// A frame for the reference.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub(super) t_s: f64,
+    pub(super) restarts: bool,
+    pub(super) pressures: Vec<f64>,
+    pub(super) without_value: BTreeSet<u32>,
+}
+
+/// What regions are found with.
+pub(super) struct Scene<'a> {
+    skin: &'a Skin,
+    options: &'a Options,
+    frame: &'a Frame,
+    beside: Vec<BTreeSet<u32>>,
+    within: f64,
+}
+
+impl Reference {
+    /// The touches of the next frame, the oldest first, and the identities that end.
+    pub(super) fn step(
+        &mut self,
+        skin: &Skin,
+        options: &Options,
+        frame: &Frame,
+        within: f64,
+    ) -> (Vec<RightTouch>, Vec<u64>) {
+        let before: Vec<u64> = self.touches.keys().copied().collect();
+        if frame.restarts {
+            self.touches.clear();
+            self.two.clear();
+        }
+        let scene = Scene { skin, options, frame, beside: neighbours(skin, &frame.without_value), within };
+        let (regions, pairs) = self.regions(&scene);
+        let named = self.name(&scene, &regions);
+        let mut right = Vec::new();
+        let mut kept = BTreeMap::new();
+        for (&id, named) in &named {
+            let region = &regions[named.region];
+            let (mut touch, mut past) = scene.measure(region);
+            touch.id = id;
+            touch.in_doubt = region.in_doubt || named.in_doubt;
+            if named.merged {
+                touch.flags |= TouchFlags::MERGED;
+            }
+            if let Some(then) = named.continues.map(|id| &self.touches[&id]) {
+                past.began_s = then.began_s;
+                if then.link == touch.link && !named.merged && !named.parted {
+                    past.positions = then.positions.clone();
+                }
+            }
+            touch.age_s = (frame.t_s - past.began_s).max(0.0);
+            touch.velocity = velocity(&mut past.positions, frame.t_s, touch.position, options.velocity_over_s);
+            if touch.velocity.is_none() {
+                touch.flags |= TouchFlags::YOUNG;
+            }
+            right.push(touch);
+            kept.insert(id, past);
+        }
+        let id_of = |peak: u32| named.iter().find(|(_, named)| regions[named.region].peak == peak).map(|(&id, _)| id);
+        for (a, b) in pairs {
+            if let (Some(a), Some(b)) = (id_of(a), id_of(b)) {
+                self.two.insert((a.min(b), a.max(b)));
+            }
+        }
+        self.two.retain(|(a, b)| kept.contains_key(a) && kept.contains_key(b));
+        self.touches = kept;
+        let released = before.into_iter().filter(|id| !self.touches.contains_key(id)).collect();
+        (right, released)
+    }
+
+    fn touch_before(&self, node: u32) -> Option<u64> {
+        self.touches.iter().find(|(_, past)| past.pressures.contains_key(&node)).map(|(&id, _)| id)
+    }
+}
+
+/// Per node its neighbours; taxels without a value are bridges.
+fn neighbours(skin: &Skin, without: &BTreeSet<u32>) -> Vec<BTreeSet<u32>> {
+    let mut beside: Vec<BTreeSet<u32>> =
+        (0..skin.nodes() as u32).map(|node| skin.beside(node).iter().copied().collect()).collect();
+    // One after the other: the neighbours of each become each other's, then it is gone.
+    for &gone in without {
+        let around: Vec<u32> = std::mem::take(&mut beside[gone as usize]).into_iter().collect();
+        for &a in &around {
+            beside[a as usize].remove(&gone);
+            beside[a as usize].extend(around.iter().filter(|&&b| b != a));
+        }
+    }
+    beside
+}
+
+/// The velocity over `over_s`, m/s; `positions` are those kept.
+fn velocity(positions: &mut Vec<(f64, DVec3)>, t_s: f64, position: DVec3, over_s: f64) -> Option<DVec3> {
+    let is_old = |then_s: f64, by_s: f64| t_s - then_s >= by_s * (1.0 - 1e-6);
+    let then = positions.iter().rev().find(|(then_s, _)| is_old(*then_s, over_s)).copied();
+    if positions.last().is_none_or(|&(last_s, _)| t_s > last_s && is_old(last_s, over_s / 16.0)) {
+        positions.push((t_s, position));
+    }
+    then.map(|(then_s, then)| (position - then) / (t_s - then_s))
+}

@@ -1,0 +1,4 @@
+mod common;
+mod compared;
+mod extremes;
+mod forms;

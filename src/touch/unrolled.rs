@@ -1,0 +1,56 @@
+//! Taxels around the base of a touch, laid out in its chart; and places of the chart on the skin again.
+
+use glam::{DQuat, DVec2, DVec3};
+
+use super::chart::{self, WRAPPED_COSINE};
+use super::skin::Skin;
+
+/// Some taxels in the chart of a touch.
+#[derive(Clone, Debug, Default)]
+pub struct Unrolled {
+    base: u32,
+    axes: [DVec3; 2],
+    /// The taxels, as ascending nodes.
+    pub nodes: Vec<u32>,
+    /// Their places (u, v), m.
+    pub places_m: Vec<DVec2>,
+}
+
+impl Skin {
+    /// The taxels `nodes` in the chart that is based at `base`, whose u is that of `link`; those on the other side of a limb, over 120°
+    /// from the base, are left out.
+    #[must_use]
+    pub fn unrolled(&self, base: u32, link: u32, nodes: impl IntoIterator<Item = u32>) -> Unrolled {
+        let origin = self.taxel(base);
+        let axes = chart::directions(origin.mean_normal, self.axes_of(link));
+        let mut unrolled = Unrolled { base, axes, ..Unrolled::default() };
+        for node in nodes {
+            let taxel = self.taxel(node);
+            if taxel.mean_normal.dot(origin.mean_normal) >= WRAPPED_COSINE {
+                let place = chart::place(taxel.position - origin.position, origin.mean_normal, taxel.mean_normal);
+                unrolled.nodes.push(node);
+                unrolled.places_m.push(DVec2::new(place.dot(axes[0]), place.dot(axes[1])));
+            }
+        }
+        unrolled
+    }
+}
+
+impl Unrolled {
+    /// Where `place_m` of the chart is on the skin, within the cells of the taxels, and the direction at `angle_rad` there; both on
+    /// the body at rest. It is laid down from the nearest of the taxels, so that little of the chart lies between.
+    #[must_use]
+    pub fn on_skin(&self, skin: &Skin, place_m: DVec2, angle_rad: Option<f64>) -> (DVec3, Option<DVec3>) {
+        let far = |place: &DVec2| place.distance_squared(place_m);
+        let nearest = (0..self.nodes.len()).min_by(|a, b| far(&self.places_m[*a]).total_cmp(&far(&self.places_m[*b])));
+        let (node, from) = nearest.map_or((self.base, DVec2::ZERO), |at| (self.nodes[at], self.places_m[at]));
+        let taxel = skin.taxel(node);
+        let turn = DQuat::from_rotation_arc(skin.taxel(self.base).mean_normal, taxel.mean_normal);
+        let in_space = |way: DVec2| turn * (self.axes[0] * way.x + self.axes[1] * way.y);
+        let place = taxel.position + in_space(place_m - from);
+        let cells = std::iter::once(node).chain(self.nodes.iter().copied().filter(|&other| other != node));
+        let on_surface = skin.surface().nearest(cells.map(|node| skin.cell_of(node)), place);
+        let along = angle_rad.map(|angle| in_space(DVec2::new(libm::cos(angle), libm::sin(angle))));
+        (on_surface.map_or(place, |nearest| nearest.position), along)
+    }
+}
