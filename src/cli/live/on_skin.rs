@@ -43,7 +43,7 @@ impl TouchTable {
         }
     }
 
-    /// Its lines, a heading and one a touch, in so many columns.
+    /// A heading and a line for each touch, at most `columns` wide.
     pub(super) fn lines(&mut self, columns: usize) -> Vec<String> {
         let width = self.links.iter().map(|link| console::measure_text_width(link)).max().unwrap_or(0);
         let width = width.clamp(4, MAX_LINK_WIDTH);

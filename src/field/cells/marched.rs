@@ -1,9 +1,10 @@
 //! Distances to several points over parts of a surface whose triangles are small beside the cells.
 //!
-//! Exact windows there are many: some tens an edge, most of which end in the same cell. Here a corner gets its distance to a point
-//! from two that have theirs already, the nearest first: the point is where it is in the plane of their triangle, if the straight line
-//! goes through their edge, and else the way is along an edge (fast marching with spherical fronts: Novotni and Klein, 2002). On
-//! a plane that is exact where lines cross edges. Areas of cells are off by up to 2 %, lengths of paths by up to 4 %, where a cell has 400 triangles.
+//! Exact windows would be tens on each edge there. Instead the corners of triangles get their distances to a point one after the other,
+//! the nearest first. In a triangle two of whose corners have theirs, these say where the point is in the triangle's plane. If the
+//! straight line from there to the third corner crosses the edge between the two, its length is the distance; else the path runs along an
+//! edge (fast marching with spherical fronts: Novotni and Klein, 2002). On a plane, lines that cross edges are exact. Where a cell has
+//! 400 triangles, areas are off by up to 2 %, lengths of paths by up to 4 %.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
