@@ -71,7 +71,7 @@ pub fn author_icub(files: &[impl AsRef<Path>]) -> Result<Authored> {
     notes.push("areas are unknown without a surface: put them on a mesh by `icub` in a recipe to have them".to_owned());
     let mut file = Original::from_bytes("icub.glb", &glb.to_bytes()?, None)?;
     let (mut body, _) = file.read()?;
-    store_edges(&mut file, &mut body, &mut notes);
+    store_edges(&mut file, &mut body, &mut notes, None);
     Ok(Authored { file, body, places, notes })
 }
 

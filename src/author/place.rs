@@ -10,7 +10,7 @@ use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack};
 use super::scatter::Pieces;
 use crate::body::point_tree;
 use crate::error::{Error, Result, failed};
-use crate::field::{CellPoint, cell_areas};
+use crate::field::{CellPoint, Divided};
 
 /// Samples per point.
 const OVERSAMPLING: usize = 5;
@@ -213,14 +213,14 @@ fn with_cells(positions: &[DVec3], triangles: &[[u32; 3]], mut placed: Vec<Place
 }
 
 /// Gives each of `placed` the area of its cell on the triangles that are skin or hold a point; `group_of` a vertex is the surface
-/// that it belongs to.
+/// that it belongs to. The cells, if there are any.
 pub(super) fn set_cell_areas(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     group_of: &dyn Fn(u32) -> u32,
     is_skin: &[bool],
     placed: &mut [Placed],
-) {
+) -> Option<Divided> {
     let mut counts = is_skin.to_vec();
     placed.iter().for_each(|placed| counts[placed.triangle] = true);
     let mut number = vec![0; triangles.len()];
@@ -231,8 +231,9 @@ pub(super) fn set_cell_areas(
     }
     let point = |placed: &Placed| CellPoint { triangle: number[placed.triangle], ..placed.cell_point() };
     let points: Vec<CellPoint> = placed.iter().map(point).collect();
-    let areas = cell_areas(positions, &skin, group_of, &points);
+    let (areas, divided) = Divided::with_areas(positions, &skin, group_of, &points);
     placed.iter_mut().zip(areas).for_each(|(placed, area)| placed.point.area = area);
+    divided
 }
 
 /// Per triangle whether a density over 0 in its middle makes it skin.

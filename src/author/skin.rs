@@ -14,9 +14,9 @@ use super::recipe::{PlaceSpec, Placement, Recipe, shown};
 use super::refresh::refresh;
 use super::region::Regions;
 use super::rest_surface::{MeshTaxel, RestSurface};
-use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Original, Skinning, Taxel, listed};
+use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Modality, Original, Skinning, Taxel, listed};
 use crate::error::{Error, Result, failed};
-use crate::field::{TaxelGraph, unions};
+use crate::field::{Divided, TaxelGraph, unions};
 
 /// Progress before and after placing taxels, and when they are in fields.
 const PROGRESS_OPENED: f64 = 0.05;
@@ -103,7 +103,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     }
     let keeps_fields = asks_nothing && !body.fields.is_empty();
     if keeps_fields {
-        store_edges(&mut file, &mut body, &mut notes);
+        store_edges(&mut file, &mut body, &mut notes, None);
         return Ok(Authored { file, body, places: Vec::new(), notes });
     }
     let rest_surface = RestSurface::new(&body, &details);
@@ -116,6 +116,9 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     let mut ids = UsedIds::default();
     ids.take(body.taxels.iter().map(|taxel| taxel.id), "the file", &Origin::default())?;
     let (mut reports, mut seated) = (Vec::new(), Vec::new());
+    // What a place over all of the surface divides it into is what the edges of its taxels are made of.
+    let is_alone = body.taxels.is_empty() && recipe.places.len() == 1;
+    let mut divided = None;
     for (index, place) in recipe.places.iter().enumerate() {
         let mut region = match &place.regions[..] {
             [] => vec![true; rest_surface.triangles.len()],
@@ -130,8 +133,8 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         }
         let share = (PROGRESS_PLACED - PROGRESS_OPENED) / recipe.places.len() as f64;
         let tick = &mut |done: f64| go_on(PROGRESS_OPENED + share * (index as f64 + done));
-        let filled = place_taxels(&rest_surface, &region, place, recipe.seed_of(place), &mut notes, tick);
-        let filled = filled.map_err(|e| place.at.put(e))?;
+        let placed = place_taxels(&rest_surface, &region, place, recipe.seed_of(place), &mut notes, tick);
+        let (filled, cells) = placed.map_err(|e| place.at.put(e))?;
         let last = u64::from(place.first_id) + filled.len() as u64;
         if last > u64::from(MAX_TAXEL_ID) + 1 {
             let what =
@@ -141,6 +144,8 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         let own: Vec<u32> = filled.iter().zip(place.first_id..).map(|(one, next)| one.id.unwrap_or(next)).collect();
         ids.take(own.iter().copied(), &format!("place `{}`", place.name), &place.at)?;
         notes.extend(without_area(place, &filled, &own));
+        let is_whole = is_alone && place.modality == Modality::Pressure && !region.contains(&false);
+        divided = cells.filter(|_| is_whole).map(|cells| (own.clone(), cells));
         let first = seated.len();
         let links = rest_surface.link.iter().zip(&region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();
         let seat = |(one, &id): (&Snapped, &u32)| rest_surface.mesh_taxel(&one.placed, id, place.modality, &links);
@@ -159,16 +164,26 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     add_fields(&mut file, &body, &details, &fields);
     report_progress(&mut go_on, PROGRESS_GROUPED)?;
     let (mut body, _) = file.read()?;
-    store_edges(&mut file, &mut body, &mut notes);
+    store_edges(&mut file, &mut body, &mut notes, divided.as_ref());
     Ok(Authored { file, body, places: reports, notes })
 }
 
-/// Writes the edges between the taxels of `body`, which is in `file`, unless the file has current ones.
-pub(super) fn store_edges(file: &mut Original, body: &mut Body, notes: &mut Vec<String>) {
+/// Writes the edges between the taxels of `body`, which is in `file`, unless the file has current ones. `divided` has all of the
+/// surface's cells, of the taxels with these ids, if they are known.
+pub(super) fn store_edges(
+    file: &mut Original,
+    body: &mut Body,
+    notes: &mut Vec<String>,
+    divided: Option<&(Vec<u32>, Divided)>,
+) {
     if body.taxels.is_empty() {
         return;
     }
-    let (graph, note) = TaxelGraph::of(body);
+    let known = divided.and_then(|(ids, divided)| {
+        let taxels: Option<Vec<usize>> = ids.iter().map(|&id| body.taxel_index(id)).collect();
+        Some(TaxelGraph::of_cells(body, &taxels?, divided))
+    });
+    let (graph, note) = known.map_or_else(|| TaxelGraph::of(body), |graph| (graph, None));
     notes.extend(note);
     let edges = graph.to_stored(body);
     file.set_edges(&edges);
@@ -182,17 +197,20 @@ fn place_taxels(
     seed: u64,
     notes: &mut Vec<String>,
     progress: Progress<'_>,
-) -> Result<Vec<Snapped>> {
+) -> Result<(Vec<Snapped>, Option<Divided>)> {
     let chosen: Vec<usize> = (0..region.len()).filter(|&triangle| region[triangle]).collect();
     let triangles: Vec<[u32; 3]> = chosen.iter().map(|&triangle| rest_surface.triangles[triangle]).collect();
     let positions = &rest_surface.positions;
-    let on_skin = |mut placed: Vec<Placed>, is_skin: &[bool]| {
-        set_cell_areas(positions, &triangles, &|vertex| rest_surface.group_of(vertex), is_skin, &mut placed);
+    let mut divided = None;
+    let mut on_skin = |mut placed: Vec<Placed>, is_skin: &[bool]| {
+        let group_of = |vertex| rest_surface.group_of(vertex);
+        let cells = set_cell_areas(positions, &triangles, &group_of, is_skin, &mut placed);
+        divided = cells.filter(|_| !is_skin.contains(&false));
         let onto_canvas = |p: Placed| Placed { triangle: chosen[p.triangle], ..p };
         placed.into_iter().map(|p| Snapped { placed: onto_canvas(p), id: None, moved_m: 0.0 }).collect()
     };
-    let sampled = |placed: Vec<Placed>| on_skin(placed, &vec![true; triangles.len()]);
-    Ok(match &place.how {
+    let mut sampled = |placed: Vec<Placed>| on_skin(placed, &vec![true; triangles.len()]);
+    let filled = match &place.how {
         Placement::Evenly { count, apart_m: None } => sampled(evenly(positions, &triangles, *count, seed, progress)?),
         Placement::Evenly { count, apart_m: Some(apart_m) } => {
             let area: f64 = chosen.iter().map(|&triangle| rest_surface.area(triangle)).sum();
@@ -256,7 +274,8 @@ fn place_taxels(
             let given = of_table(rest_surface, path)?;
             snap(rest_surface, region, &given, *within_m).map_err(|e| e.at(path.display()))?
         }
-    })
+    };
+    Ok((filled, divided))
 }
 
 /// Rejects a length wider than the triangles `chosen`, which was not meant in metres.

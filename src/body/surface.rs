@@ -1,12 +1,10 @@
 //! A body's triangles, with nearest-point and ray queries.
 
-use std::cell::RefCell;
-use std::collections::HashMap;
-use std::rc::Rc;
+use std::ops::Deref as _;
 
 use glam::{DAffine3, DVec3};
 use rstar::primitives::{CachedEnvelope, GeomWithData};
-use rstar::{AABB, PointDistance, RTree, RTreeObject};
+use rstar::{AABB, PointDistance, RTree, RTreeObject, SelectionFunction};
 
 use super::model::{Body, Home};
 
@@ -51,175 +49,6 @@ impl Body {
     }
 }
 
-/// Searches for nearest points in one link's frame before a search index of its triangles is made: that takes as long.
-const SEARCHES_WITHOUT_INDEX: u32 = 16;
-
-/// Triangles as the mesh has them, with their numbers and whether the link's frame mirrors them.
-type TriangleTree = RTree<GeomWithData<CachedEnvelope<Triangle>, (u32, bool)>>;
-
-/// The number of searches in a link's frame, and the index if there is one.
-type Searched = (u32, Option<Rc<TriangleTree>>);
-
-/// Finds the nearest points of a body's surface in any link's frame. The results do not depend on whether an index is there.
-#[derive(Debug)]
-pub(crate) struct Nearest<'a> {
-    body: &'a Body,
-    /// Per surface its longest edge, in mesh coordinates.
-    longest: Vec<f64>,
-    /// Per surface its lowest and highest coordinates, in its mesh.
-    bounds: Vec<[DVec3; 2]>,
-    /// Per link.
-    indices: RefCell<HashMap<usize, Searched>>,
-}
-
-impl<'a> Nearest<'a> {
-    pub(crate) fn new(body: &'a Body) -> Self {
-        let edges = |&[a, b, c]: &[u32; 3]| [(a, b), (b, c), (c, a)];
-        let longest = body.surfaces.iter().map(|surface| {
-            let at = |vertex: u32| surface.positions[vertex as usize];
-            let lengths = surface.triangles.iter().flat_map(edges).map(|(a, b)| at(a).distance_squared(at(b)));
-            lengths.fold(0.0, f64::max).sqrt()
-        });
-        let bounds = body.surfaces.iter().map(|surface| {
-            let ends = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-            surface.positions.iter().fold(ends, |[low, high], &p| [low.min(p), high.max(p)])
-        });
-        Self { body, longest: longest.collect(), bounds: bounds.collect(), indices: RefCell::default() }
-    }
-
-    pub(crate) fn body(&self) -> &'a Body {
-        self.body
-    }
-
-    /// A lower bound of the distance from `p` to surface `surface`, m.
-    fn bound(&self, surface: usize, link_from_mesh: &DAffine3, p: DVec3) -> f64 {
-        let [low, high] = self.bounds[surface];
-        if !(low.cmple(high).all() && low.is_finite() && high.is_finite()) {
-            return 0.0;
-        }
-        let corner = |k: u32| {
-            let side = |axis: u32, low: f64, high: f64| if k >> axis & 1 == 0 { low } else { high };
-            let corner = DVec3::new(side(0, low.x, high.x), side(1, low.y, high.y), side(2, low.z, high.z));
-            link_from_mesh.transform_point3(corner)
-        };
-        let ends = (0..8).map(corner).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        // Less what rounding may add.
-        p.distance(p.clamp(ends.0, ends.1)) * (1.0 - 1e-9)
-            - 1e-9 * (p.abs() + ends.0.abs() + ends.1.abs()).max_element()
-    }
-
-    /// The surface within about `radius` of `centre`, m, in the frame of `link`.
-    pub(crate) fn around(&self, link: usize, centre: DVec3, radius: f64) -> SurfaceIndex {
-        if let Some(index) = self.index(link) {
-            let reach = DVec3::splat(radius * (1.0 + 1e-9) + f64::MIN_POSITIVE);
-            let ends = AABB::from_corners((centre - reach).to_array(), (centre + reach).to_array());
-            let close = index.locate_in_envelope_intersecting(ends).map(|triangle| (triangle.data, **triangle.geom()));
-            let close = close.map(|((number, mirrored), Triangle([a, b, c]))| {
-                (number, Triangle(if mirrored { [a, c, b] } else { [a, b, c] }))
-            });
-            let mut near: Vec<(u32, Triangle)> =
-                close.filter(|(_, t)| t.box_distance_squared(centre) <= radius * radius).collect();
-            near.sort_unstable_by_key(|(number, _)| *number);
-            return SurfaceIndex::new(near.into_iter().map(|(_, triangle)| triangle).collect());
-        }
-        let mut near = Vec::new();
-        for (index, (surface, longest)) in self.body.surfaces.iter().zip(&self.longest).enumerate() {
-            let Some(link_from_mesh) = surface.link_from_mesh(self.body, link) else { continue };
-            if self.bound(index, &link_from_mesh, centre) > radius {
-                continue;
-            }
-            // One corner excludes most triangles.
-            let within = (radius + slack(&link_from_mesh, *longest)).powi(2);
-            let close = surface.corners_through(link_from_mesh);
-            let close = close.filter(|[a, ..]| a.distance_squared(centre) <= within).map(Triangle);
-            near.extend(close.filter(|t| t.box_distance_squared(centre) <= radius * radius));
-        }
-        SurfaceIndex::new(near)
-    }
-
-    /// The surface point nearest to `p`, in the frame of `link`; of several, that of the first triangle.
-    pub(crate) fn in_link(&self, link: usize, p: DVec3) -> Option<DVec3> {
-        match self.index(link) {
-            Some(index) => {
-                let near = index.nearest_neighbor(p.to_array())?;
-                let least = p.distance_squared(near.geom().nearest(p));
-                // Beyond the rounding of boxes and distances.
-                let within = index.locate_within_distance(p.to_array(), least * (1.0 + 1e-9) + f64::MIN_POSITIVE);
-                let points = within.map(|triangle| (triangle.geom().nearest(p), triangle.data.0));
-                let nearest = points
-                    .map(|(point, number)| (p.distance_squared(point), number, point))
-                    .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                nearest.map(|(.., point)| point)
-            }
-            None => self.in_link_one_by_one(link, p),
-        }
-    }
-
-    /// The search index of `link`, from a number of searches on.
-    fn index(&self, link: usize) -> Option<Rc<TriangleTree>> {
-        let mut indices = self.indices.borrow_mut();
-        let (searches, index) = indices.entry(link).or_default();
-        *searches += 1;
-        if *searches > SEARCHES_WITHOUT_INDEX && index.is_none() {
-            let seen = self.body.surfaces.iter();
-            let seen = seen.filter_map(|surface| Some((surface, surface.link_from_mesh(self.body, link)?)));
-            let triangles = seen.flat_map(|(surface, link_from_mesh)| {
-                let at = move |v: u32| link_from_mesh.transform_point3(surface.positions[v as usize]);
-                let mirrored = link_from_mesh.matrix3.determinant() < 0.0;
-                surface.triangles.iter().map(move |&[a, b, c]| (Triangle([at(a), at(b), at(c)]), mirrored))
-            });
-            let numbered = triangles.zip(0..).filter(|((triangle, _), _)| triangle.unit_normal().is_some());
-            let numbered = numbered.map(|((triangle, mirrored), number)| {
-                GeomWithData::new(CachedEnvelope::new(triangle), (number, mirrored))
-            });
-            *index = Some(Rc::new(RTree::bulk_load(numbered.collect())));
-        }
-        index.clone()
-    }
-
-    fn in_link_one_by_one(&self, link: usize, p: DVec3) -> Option<DVec3> {
-        let (mut nearest, mut least) = (None, f64::INFINITY);
-        let placed = self.body.surfaces.iter().enumerate();
-        let placed = placed.filter_map(|(i, surface)| Some((i, surface, surface.link_from_mesh(self.body, link)?)));
-        let mut placed: Vec<_> = placed.map(|(i, surface, way)| (self.bound(i, &way, p), i, surface, way)).collect();
-        placed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let mut of_surface = 0;
-        for (bound, index, surface, link_from_mesh) in placed {
-            if bound > 0.0 && bound * bound > least {
-                break;
-            }
-            let longest = &self.longest[index];
-            let slack = slack(&link_from_mesh, *longest);
-            let points: Vec<DVec3> = surface.positions.iter().map(|&p| link_from_mesh.transform_point3(p)).collect();
-            let mut within: f64 = (least.sqrt() + slack).powi(2);
-            for &[a, b, c] in &surface.triangles {
-                let corner = points[a as usize];
-                if corner.distance_squared(p) > within {
-                    continue;
-                }
-                let triangle = Triangle([corner, points[b as usize], points[c as usize]]);
-                if triangle.unit_normal().is_some() {
-                    let point = triangle.nearest(p);
-                    let distance = p.distance_squared(point);
-                    // Of equals that of the first surface.
-                    if distance < least || (distance == least && index < of_surface) {
-                        (nearest, least, of_surface) = (Some(point), distance, index);
-                        within = (least.sqrt() + slack).powi(2);
-                    }
-                }
-            }
-        }
-        nearest
-    }
-}
-
-/// Upper bound of the distance from a corner to the nearest point of its triangle's bounding box, for edges up to
-/// `longest` in the mesh.
-fn slack(link_from_mesh: &DAffine3, longest: f64) -> f64 {
-    let [x, y, z] = [0, 1, 2].map(|axis| link_from_mesh.matrix3.col(axis).length_squared());
-    (x + y + z).sqrt() * longest * 3.0_f64.sqrt() * (1.0 + 1e-9)
-}
-
 /// The outward normal of a triangle, of twice its area.
 pub(crate) fn area_vector([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
@@ -232,22 +61,22 @@ pub(crate) fn nearest_on_triangle(corners: [DVec3; 3], p: DVec3) -> DVec3 {
 
 /// Three corners, counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
-struct Triangle([DVec3; 3]);
+pub(crate) struct Triangle(pub(super) [DVec3; 3]);
 
 impl Triangle {
     /// The outward normal; `None` for a triangle without area.
-    fn unit_normal(&self) -> Option<DVec3> {
+    pub(super) fn unit_normal(&self) -> Option<DVec3> {
         area_vector(self.0).try_normalize()
     }
 
     /// Squared distance of `p` from the bounding box: a lower bound for the triangle.
-    fn box_distance_squared(&self, p: DVec3) -> f64 {
+    pub(super) fn box_distance_squared(&self, p: DVec3) -> f64 {
         let [a, b, c] = self.0;
         p.distance_squared(p.clamp(a.min(b).min(c), a.max(b).max(c)))
     }
 
     /// The point of the triangle that is nearest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
-    fn nearest(&self, p: DVec3) -> DVec3 {
+    pub(super) fn nearest(&self, p: DVec3) -> DVec3 {
         let [a, b, c] = self.0;
         let (ab, ac, ap) = (b - a, c - a, p - a);
         let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -334,7 +163,7 @@ pub struct SurfaceIndex {
 }
 
 impl SurfaceIndex {
-    fn new(triangles: Vec<Triangle>) -> Self {
+    pub(super) fn new(triangles: Vec<Triangle>) -> Self {
         let triangles = triangles
             .into_iter()
             .zip(0..)
@@ -399,14 +228,64 @@ impl SurfaceIndex {
     /// `reach` of `p` and with an outward normal along `direction`.
     #[must_use]
     pub fn along(&self, p: DVec3, direction: DVec3, reach: f64) -> Option<Hit> {
-        let ends = AABB::from_corners((p - direction * reach).to_array(), (p + direction * reach).to_array());
-        self.tree
-            .locate_in_envelope_intersecting(ends)
-            .filter(|triangle| triangle.data.0.dot(direction) > 0.0)
-            .filter_map(|triangle| Some((triangle.geom().pierced(p, direction)?, triangle.data)))
-            .filter(|(t, _)| t.abs() <= reach)
-            .min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
-            .map(|(t, (normal, number))| Hit { position: p + direction * t, normal, triangle: number as usize })
+        let line = Line { p, direction, reach };
+        let close = self.tree.locate_with_selection_function(line);
+        line.first(close.map(|triangle| (*triangle.geom().deref(), triangle.data.0, triangle.data.1)))
+    }
+}
+
+/// The part of a line within `reach` of `p`.
+#[derive(Clone, Copy)]
+pub(super) struct Line {
+    pub(super) p: DVec3,
+    pub(super) direction: DVec3,
+    pub(super) reach: f64,
+}
+
+impl Line {
+    /// Where it pierces one of `triangles`, which have their outward normals and numbers, nearest to `p` with the normal along its
+    /// direction; of equals that of the lowest number.
+    pub(super) fn first(&self, triangles: impl Iterator<Item = (Triangle, DVec3, u32)>) -> Option<Hit> {
+        let Self { p, direction, reach } = *self;
+        triangles
+            .filter(|(_, normal, _)| normal.dot(direction) > 0.0)
+            .filter_map(|(triangle, normal, number)| Some((triangle.pierced(p, direction)?, normal, number)))
+            .filter(|(t, ..)| t.abs() <= reach)
+            .min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()).then(a.2.cmp(&b.2)))
+            .map(|(t, normal, number)| Hit { position: p + direction * t, normal, triangle: number as usize })
+    }
+
+    /// Whether it may pierce what is in a box.
+    fn may_pierce(&self, ends: &AABB<[f64; 3]>) -> bool {
+        let [low, high] = [ends.lower(), ends.upper()].map(DVec3::from_array);
+        // Beyond the tolerance of a triangle's sides, and rounding.
+        let margin =
+            (high - low).max_element() * 1e-6 + low.abs().max(high.abs()).max(self.p.abs()).max_element() * 1e-12;
+        let (mut from, mut to) = (-self.reach - margin, self.reach + margin);
+        for axis in 0..3 {
+            let [a, b] = [low[axis] - margin - self.p[axis], high[axis] + margin - self.p[axis]];
+            let along = self.direction[axis];
+            if along == 0.0 {
+                if a > 0.0 || b < 0.0 {
+                    return false;
+                }
+                continue;
+            }
+            let (near, far) = if along > 0.0 { (a / along, b / along) } else { (b / along, a / along) };
+            from = from.max(near);
+            to = to.min(far);
+        }
+        from <= to
+    }
+}
+
+impl<T: RTreeObject<Envelope = AABB<[f64; 3]>>> SelectionFunction<T> for Line {
+    fn should_unpack_parent(&self, envelope: &AABB<[f64; 3]>) -> bool {
+        self.may_pierce(envelope)
+    }
+
+    fn should_unpack_leaf(&self, leaf: &T) -> bool {
+        self.may_pierce(&leaf.envelope())
     }
 }
 
@@ -417,34 +296,4 @@ pub(crate) type PointTree = RTree<GeomWithData<[f64; 3], usize>>;
 pub(crate) fn point_tree(points: impl IntoIterator<Item = DVec3>) -> PointTree {
     let numbered = points.into_iter().enumerate();
     RTree::bulk_load(numbered.map(|(index, p)| GeomWithData::new(p.to_array(), index)).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bundled;
-
-    #[test]
-    fn with_an_index_the_nearest_point_is_the_same_to_the_bit() {
-        for bytes in [bundled::HAND, bundled::HUMANOID] {
-            let body = Body::from_bytes("a.glb", bytes).unwrap();
-            let nearest = Nearest::new(&body);
-            let mut compared = 0;
-            for link in 0..body.links.len() {
-                // Corners and middles of edges are equally near to several triangles.
-                let triangles: Vec<[DVec3; 3]> = body.triangles_in_link(link).step_by(37).take(20).collect();
-                let places = triangles.iter().flat_map(|&[a, b, c]| [a, (a + b) / 2.0, (a + b + c) / 3.0, c * 1.1]);
-                for p in places {
-                    let one_by_one = nearest.in_link_one_by_one(link, p);
-                    assert_eq!(nearest.in_link(link, p), one_by_one, "{p} in link {link}");
-                    let (radius, fresh) = (0.01, Nearest::new(&body));
-                    let around =
-                        |nearest: &Nearest<'_>| nearest.around(link, p, radius).nearest(p + DVec3::splat(1e-3));
-                    assert_eq!(around(&nearest), around(&fresh), "around {p} in link {link}");
-                    compared += usize::from(nearest.indices.borrow()[&link].1.is_some());
-                }
-            }
-            assert!(compared > 100, "{compared} with an index");
-        }
-    }
 }

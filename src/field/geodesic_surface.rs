@@ -9,7 +9,7 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use super::set::{Field, anchor_from_link};
-use crate::body::{Body, SurfaceIndex};
+use crate::body::{Body, Near};
 
 const BLEND_MEMBERS: usize = 9;
 
@@ -32,13 +32,13 @@ struct MemberFrame {
 pub(super) struct GeodesicSurface<'a> {
     known: Vec<MemberFrame>,
     tree: RTree<GeomWithData<[f64; 2], usize>>,
-    surface: &'a SurfaceIndex,
+    surface: &'a Near,
     origin: DVec3,
     spacing_m: f64,
 }
 
 impl<'a> GeodesicSurface<'a> {
-    pub(super) fn new(body: &Body, field: &Field, default_u: DVec3, surface: &'a SurfaceIndex) -> Self {
+    pub(super) fn new(body: &Body, field: &Field, default_u: DVec3, surface: &'a Near) -> Self {
         let mut known: Vec<MemberFrame> = field
             .members
             .iter()

@@ -11,7 +11,7 @@ use rstar::primitives::GeomWithData;
 use super::chart::Chart;
 use super::geodesic_surface::GeodesicSurface;
 use super::set::{Field, anchor_from_link};
-use crate::body::{Body, ChartKind, Nearest, SurfaceIndex};
+use crate::body::{Body, ChartKind, Near, Nearest};
 
 /// Maximum number of a grid's nodes per side.
 const MAX_NODES: f64 = 96.0;
@@ -62,7 +62,7 @@ impl Lift {
         let (columns, rows) = (cells.x as usize + 1, cells.y as usize + 1);
 
         let reach = 2.0 * field.radius_m() + 1e-3;
-        let surface = nearest.around(anchor, field.origin_in_anchor, reach);
+        let surface = nearest.near(anchor, field.origin_in_anchor, reach);
         let uvs = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
         let uvs = uvs.map(|(column, row)| low + cell_m * DVec2::new(column as f64, row as f64));
         let nodes = match chart.kind {
@@ -174,7 +174,7 @@ struct Sampler<'a> {
     body: &'a Body,
     field: &'a Field,
     chart: &'a Chart,
-    surface: SurfaceIndex,
+    surface: Near,
     reach: f64,
     members: RTree<GeomWithData<[f64; 2], usize>>,
 }

@@ -16,7 +16,7 @@ pub fn author_sheets(name: &str, sheets_of: &[Sheet]) -> Result<Authored> {
     let mut file = Original::from_bytes(name, &sheets(sheets_of)?.to_bytes()?, None)?;
     let (mut body, _) = file.read()?;
     let mut notes = Vec::new();
-    store_edges(&mut file, &mut body, &mut notes);
+    store_edges(&mut file, &mut body, &mut notes, None);
     let places = sheets_of.iter().map(|sheet| report(&body, sheet)).collect();
     Ok(Authored { file, body, places, notes })
 }

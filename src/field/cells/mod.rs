@@ -3,6 +3,7 @@
 //! Windows run from all points at once, so that each ends soon beyond its own cell. In each triangle that several points
 //! reach, their distances to its corners give the borders (`polygon.rs`). Long edges are cut beforehand (`refine.rs`).
 
+mod divided;
 mod marched;
 mod parts;
 mod polygon;
@@ -13,6 +14,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
+pub(crate) use self::divided::{CellPoint, Divided};
 use self::marched::Marched;
 use self::parts::{Parts, corner_at};
 use self::polygon::{Candidate, Side, nearest_part, share, squared_at};
@@ -20,7 +22,7 @@ use self::refine::refine;
 pub(crate) use self::spacing::COINCIDENT_M;
 use self::spacing::Spacing;
 use super::geodesic::{Start, SurfacePlace, Waves};
-use crate::body::{NONE, SurfaceIndex, Topology, area_vector, point_tree};
+use crate::body::{NONE, Topology, area_vector, point_tree};
 
 /// The largest number of triangles after cutting: per triangle before, and per point.
 const CUTS_PER_TRIANGLE: usize = 4;
@@ -37,77 +39,6 @@ const MARCHED_PER_POINT: usize = 400;
 
 /// Polygons with less of a triangle than this are rounding errors.
 const MIN_SHARE: f64 = 1e-12;
-
-/// cos 90° with a tolerance for rounding: the two faces at a box's edge are on one side, those of a sharper edge are not.
-const MIN_NORMAL_COSINE: f64 = -1e-9;
-
-/// A point on a surface.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CellPoint {
-    /// Its position, m.
-    pub(crate) position: DVec3,
-    /// Outward unit normal.
-    pub(crate) normal: DVec3,
-    /// Index of its triangle.
-    pub(crate) triangle: usize,
-}
-
-/// Per point the area of its cell on `triangles` over `positions`, m²; points at one place share theirs. Together they have the
-/// surface's area: pieces without a point belong to the nearest on their side, in a straight line. Vertices of different
-/// groups are never connected.
-pub(crate) fn cell_areas(
-    positions: &[DVec3],
-    triangles: &[[u32; 3]],
-    group_of: &dyn Fn(u32) -> u32,
-    points: &[CellPoint],
-) -> Vec<f64> {
-    let topology = Topology::of_groups(positions, triangles, group_of);
-    let mut sound = vec![NONE; triangles.len()];
-    (0..).zip(&topology.given).for_each(|(index, &given)| sound[given as usize] = index);
-    let mut index = None;
-    let mut place = |point: &CellPoint| {
-        let triangle = match sound[point.triangle] {
-            // It is degenerate, or a duplicate.
-            NONE => {
-                let all = || (0..topology.triangles.len() as u32).map(|triangle| topology.corners(triangle));
-                let index = index.get_or_insert_with(|| SurfaceIndex::of_triangles(all()));
-                index.nearest(point.position)?.triangle as u32
-            }
-            triangle => triangle,
-        };
-        Some(SurfacePlace::in_triangle(&topology, triangle, point.position))
-    };
-    let places: Option<Vec<SurfacePlace>> = points.iter().map(&mut place).collect();
-    let Some(Cells { mut areas, first, mut pieces, .. }) = places.map(|places| Cells::new(&topology, &places)) else {
-        return vec![0.0; points.len()];
-    };
-    let left_out = (0..triangles.len()).filter(|&triangle| sound[triangle] == NONE);
-    let corners = |triangle: usize| triangles[triangle].map(|v| positions.get(v as usize).copied());
-    let corners = left_out.filter_map(|triangle| match corners(triangle) {
-        [Some(a), Some(b), Some(c)] => Some([a, b, c]),
-        _ => None,
-    });
-    pieces.extend(corners.map(Piece::of).filter(|piece| piece.area > 0.0));
-    give_away(&pieces, points, |owner, area| areas[first[owner] as usize] += area);
-    let mut sharing = vec![0_u32; points.len()];
-    first.iter().for_each(|&first| sharing[first as usize] += 1);
-    first.iter().map(|&first| areas[first as usize] / f64::from(sharing[first as usize])).collect()
-}
-
-/// Gives each piece to the nearest of `points` that is on its side, else to the nearest.
-fn give_away(pieces: &[Piece], points: &[CellPoint], mut give: impl FnMut(usize, f64)) {
-    if pieces.is_empty() {
-        return;
-    }
-    let tree = point_tree(points.iter().map(|point| point.position));
-    for piece in pieces {
-        let nearest = || tree.nearest_neighbor_iter(piece.middle.to_array()).map(|spot| spot.data);
-        let facing = nearest().find(|&point| points[point].normal.dot(piece.normal) > MIN_NORMAL_COSINE);
-        if let Some(owner) = facing.or_else(|| nearest().next()) {
-            give(owner, piece.area);
-        }
-    }
-}
 
 /// A triangle in nobody's cell.
 #[derive(Clone, Copy, Debug)]

@@ -3,6 +3,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3};
 
 use super::*;
+use crate::body::SurfaceIndex;
 
 /// Points of [0, 1)² that lie irregularly, but not at random (Roberts's sequence).
 fn scattered(count: u32) -> impl Iterator<Item = DVec2> {
@@ -190,7 +191,7 @@ fn points_at_one_place_share_its_cell_and_parts_without_points_are_left() {
         CellPoint { triangle: topology.given[triangle as usize] as usize, ..point(x, y) }
     };
     // Two of the three are at one place; the sheet behind has none, and is given to the nearest.
-    let areas = cell_areas(&positions, &triangles, &|_| 0, &[on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)]);
+    let areas = Divided::with_areas(&positions, &triangles, &|_| 0, &[on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)]).0;
     assert!((areas.iter().sum::<f64>() - 2.0).abs() < 1e-9, "{areas:?}");
     assert!((areas[1] - 0.46).abs() < 0.05 && areas[1] == areas[2], "{areas:?}");
     let cells =

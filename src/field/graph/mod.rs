@@ -13,6 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use self::nodes::nodes;
+use super::cells::Divided;
 use crate::body::{Body, EdgeRow, StoredEdges, listed};
 
 /// Stored sums of lengths are rounded to whole parts of this many a metre.
@@ -46,10 +47,12 @@ impl TaxelGraph {
     /// The edges of `body`'s surface and places.
     #[must_use]
     pub fn made(body: &Body) -> Self {
-        let mut pairs = surface::edges(body);
-        pairs.sort_unstable();
-        pairs.dedup();
-        Self::from_edges(body.taxels.len(), pairs)
+        Self::from_edges(body.taxels.len(), surface::edges(body))
+    }
+
+    /// The edges of `body`, whose surface is all divided among its pressure `taxels`.
+    pub(crate) fn of_cells(body: &Body, taxels: &[usize], divided: &Divided) -> Self {
+        Self::from_edges(body.taxels.len(), surface::edges_of_cells(body, taxels, divided))
     }
 
     /// The edges `stored`, or why they are not those of `body`.
@@ -81,7 +84,10 @@ impl TaxelGraph {
         if moved.is_empty() { Ok(graph) } else { Err(format!("{} or their neighbours have moved", ids(moved))) }
     }
 
-    fn from_edges(taxels: usize, pairs: Vec<(u32, u32)>) -> Self {
+    /// The lower index first; some of `pairs` may appear twice.
+    fn from_edges(taxels: usize, mut pairs: Vec<(u32, u32)>) -> Self {
+        pairs.sort_unstable();
+        pairs.dedup();
         let mut neighbours = vec![Vec::new(); taxels];
         for (a, b) in pairs {
             neighbours[a as usize].push(b);

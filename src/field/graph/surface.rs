@@ -6,10 +6,9 @@ use glam::DVec3;
 
 use super::nodes::nodes;
 use super::points::{self, LENGTH_PER_ROOT, LinkPoint};
-use crate::body::{Body, point_tree};
-use crate::field::cells::{COINCIDENT_M, Cells};
+use crate::body::{Body, Topology, point_tree};
+use crate::field::cells::{COINCIDENT_M, Cells, Divided};
 use crate::field::geodesic::{LogMap, SurfacePlace};
-use crate::field::link_surface::LinkSurface;
 use crate::field::seats::{Group, Seat, seat};
 
 /// Cells share a border that is longer than this share of the root of the smaller one; others meet in a point.
@@ -22,48 +21,78 @@ pub(super) fn edges(body: &Body) -> Vec<(u32, u32)> {
     for taxel in nodes(body) {
         seats.extend(seat(body, &groups, &body.taxels[taxel]).map(|seat| (taxel, seat)));
     }
-    let mut found = Vec::new();
-    // Per taxel its cell and its part of the surface, and the taxel that stands for all at its place.
-    let mut cells: BTreeMap<usize, (f64, (u32, u32))> = BTreeMap::new();
-    let mut leader: BTreeMap<usize, usize> = BTreeMap::new();
-    for (index, group) in groups.iter().enumerate() {
-        let here = seats.iter().filter(|(_, seat)| seat.group == index);
+    let mut edges = Edges::default();
+    for (index, group) in (0..).zip(&groups) {
+        let here = seats.iter().filter(|(_, seat)| seat.group == index as usize);
         let (taxels, places): (Vec<usize>, Vec<SurfacePlace>) = here.map(|(&taxel, seat)| (taxel, seat.place)).unzip();
         let topology = &group.surface.topology;
-        let divided = Cells::new(topology, &places);
+        edges.add((index, topology), (&taxels, &places), &Cells::new(topology, &places));
+    }
+    edges.finish(body)
+}
+
+/// The same, of a surface that is all divided among its pressure `taxels`.
+pub(super) fn edges_of_cells(body: &Body, taxels: &[usize], divided: &Divided) -> Vec<(u32, u32)> {
+    let mut edges = Edges::default();
+    edges.add((0, &divided.topology), (taxels, &divided.places), &divided.cells);
+    edges.finish(body)
+}
+
+/// Edges that are found, surface by surface.
+#[derive(Default)]
+struct Edges {
+    found: Vec<(u32, u32)>,
+    /// Per taxel its cell and its part of the surface.
+    cells: BTreeMap<usize, (f64, (u32, u32))>,
+    /// Per taxel the one that stands for all at its place.
+    leader: BTreeMap<usize, usize>,
+}
+
+impl Edges {
+    /// Adds those between `taxels` at `places` of surface `index`, which is divided into their `cells`.
+    fn add(
+        &mut self,
+        (index, topology): (u32, &Topology),
+        (taxels, places): (&[usize], &[SurfacePlace]),
+        cells: &Cells,
+    ) {
         for (point, &taxel) in taxels.iter().enumerate() {
             // Where the surface is too rough there are no cells.
-            if divided.areas[point] > 0.0 {
+            if cells.areas[point] > 0.0 {
                 let part = topology.part[places[point].triangle as usize];
-                cells.insert(taxel, (divided.areas[point], (index as u32, part)));
-                leader.insert(taxel, taxels[divided.first[point] as usize]);
+                self.cells.insert(taxel, (cells.areas[point], (index, part)));
+                self.leader.insert(taxel, taxels[cells.first[point] as usize]);
             }
         }
-        let mut ways = Ways { surface: &group.surface, places: &places, map: None };
-        for (&(a, b), border) in &divided.borders {
+        let mut ways = Ways { topology, places, map: None };
+        for (&(a, b), border) in &cells.borders {
             let (a, b) = (a as usize, b as usize);
-            let [of_a, of_b] = [a, b].map(|point| divided.areas[point]);
+            let [of_a, of_b] = [a, b].map(|point| cells.areas[point]);
             let limit_m = LENGTH_PER_ROOT * of_a.max(of_b).sqrt() * (1.0 + 1e-6);
             let is_border = border.length_m > MIN_BORDER * of_a.min(of_b).sqrt();
             if is_border && (border.path_m <= limit_m || ways.is_within(a, b, limit_m)) {
-                found.push((taxels[a] as u32, taxels[b] as u32));
+                self.found.push((taxels[a] as u32, taxels[b] as u32));
             }
         }
     }
-    let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    nodes(body).for_each(|taxel| by_link.entry(body.taxels[taxel].link).or_default().push(taxel));
-    for taxels in by_link.values() {
-        found.extend(between_parts(body, taxels, &cells, &mut leader));
+
+    /// All, with those between parts of surfaces.
+    fn finish(self, body: &Body) -> Vec<(u32, u32)> {
+        let Self { mut found, cells, mut leader } = self;
+        let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        nodes(body).for_each(|taxel| by_link.entry(body.taxels[taxel].link).or_default().push(taxel));
+        for taxels in by_link.values() {
+            found.extend(between_parts(body, taxels, &cells, &mut leader));
+        }
+        let shared = leader.iter().filter(|(taxel, leader)| taxel != leader);
+        found.extend(shared.map(|(&taxel, &leader)| (leader as u32, taxel as u32)));
+        found
     }
-    found.extend(
-        leader.iter().filter(|(taxel, leader)| taxel != leader).map(|(&taxel, &leader)| (leader as u32, taxel as u32)),
-    );
-    found
 }
 
 /// Lengths of shortest paths between places of a surface.
 struct Ways<'a> {
-    surface: &'a LinkSurface,
+    topology: &'a Topology,
     places: &'a [SurfacePlace],
     /// The last start and limit, and its paths.
     map: Option<(usize, f64, LogMap<'a>)>,
@@ -72,8 +101,7 @@ struct Ways<'a> {
 impl Ways<'_> {
     /// Whether the shortest path from place `a` to `b` is at most `limit_m` long.
     fn is_within(&mut self, a: usize, b: usize, limit_m: f64) -> bool {
-        let surface = self.surface;
-        let topology = &surface.topology;
+        let topology = self.topology;
         let [from, to] = [a, b].map(|point| self.places[point]);
         if from.position(topology).distance(to.position(topology)) > limit_m {
             return false;
