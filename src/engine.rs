@@ -26,7 +26,6 @@ use self::input::Input;
 use self::links::Links;
 use self::on_skin::OnSkin;
 use self::post::PostState;
-use self::self_contacts::SelfContacts;
 pub use self::state::EngineState;
 use crate::backend::agreement::{Agreement, ComparedColumn, compare, compare_columns};
 use crate::backend::{self, Backend, BackendKind, Picks, Step};
@@ -115,8 +114,6 @@ pub struct Engine {
     links: Links,
     /// Memory for the pressed taxels of a field, empty between calls.
     pressed: Vec<Pressed>,
-    /// Where self-contacts are asked for.
-    self_contacts: Option<SelfContacts>,
     /// Where touches of the whole body are asked for.
     on_skin: Option<OnSkin>,
     /// Fields that could not have the kind of chart that is asked for.
@@ -189,7 +186,6 @@ impl Engine {
             pressed: Vec::with_capacity(
                 plan.fields.iter().map(|field| plan.members_of(field).len()).max().unwrap_or(0),
             ),
-            self_contacts: SelfContacts::new(body, &plan, &scene),
             on_skin: OnSkin::new(body, &plan, &scene, layer),
             kept_charts: recharted.kept,
             plan,

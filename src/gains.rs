@@ -23,10 +23,11 @@ use crate::backend::cpu::fit::fit_each;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result, failed};
-use crate::percept::Outputs;
+use crate::percept::{self, Outputs, Percepts};
 use crate::scene::{Knobs, Plan, Scene};
 use crate::signal::{Calibration, Frame, Letter};
 use crate::stage::fit::{Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
+use crate::touch;
 
 /// Gains are taken to differ by about this share.
 const SPREAD: f64 = 0.2;
@@ -95,7 +96,8 @@ impl GainsSurvey {
     /// No field has a chart; the calibration or the ids are for another body; no taxel has an area.
     pub fn new(body: &Body, calibration: Calibration, fields: &[String], ids: &[u32]) -> Result<Self> {
         let scene = Scene {
-            outputs: Outputs::CENTROID | Outputs::TOUCHES,
+            outputs: Outputs::CENTROID,
+            touches: Some(touch::Options::default()),
             fields: fields.to_vec(),
             letters: vec![Letter::default()],
             knobs: Knobs::default(),
@@ -129,7 +131,7 @@ impl GainsSurvey {
         let percepts = self.engine.process(frames)?.clone();
         for (index, frame) in frames.iter().enumerate() {
             for field in 0..percepts.fields() {
-                if percepts.field_touches(index, field).len() != 1 || self.engine.plan().fields[field].divided {
+                if touches_on(&percepts, index, field) != 1 || self.engine.plan().fields[field].divided {
                     continue;
                 }
                 self.seen += 1;
@@ -158,6 +160,13 @@ impl GainsSurvey {
     pub fn finish(self, progress: &mut dyn FnMut(f64) -> bool) -> Result<GainsEstimate> {
         estimate(&self.touches, self.taxels, START * self.spacing_m, progress)
     }
+}
+
+/// How many touches lie on `field` in frame `frame`.
+fn touches_on(percepts: &Percepts, frame: usize, field: usize) -> usize {
+    let Some(found) = percepts.touches(frame) else { return 0 };
+    let is_on = |touch: &&percept::Touch| found.fields(touch).iter().any(|share| share.field as usize == field);
+    found.touches.iter().filter(is_on).count()
 }
 
 /// The touch on `field`, as fits take it; `None` where it cannot be used.

@@ -113,7 +113,7 @@ pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{
-    COLUMNS, Column, ContactKind, FieldTouch, Fit, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact,
+    COLUMNS, Column, ContactKind, Fit, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact,
     SelfContactSide, TOUCH_COLUMNS, Touch, TouchColumn, TouchFlags, TouchFrame, TouchOutputs,
 };
 pub use scene::{Plan, Scene};

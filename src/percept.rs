@@ -61,34 +61,3 @@ pub enum Precision {
     /// IEEE 754 binary64: backend `reference`.
     F64,
 }
-
-/// One of a field's separate touches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldTouch {
-    /// Lasts from onset to release, and is never used again for the field.
-    pub id: u64,
-    /// Σ wᵢPᵢ over its taxels.
-    pub total: f64,
-    /// Number of its taxels.
-    pub active: u32,
-    /// Its centroid (u, v), m; absent where the field has no chart.
-    pub centroid: Option<[f64; 2]>,
-    /// The same point on the surface, as [`Percept::position`] and in the same frame, m; absent where that is a field over
-    /// several links, and the frame does not say where this touch's link is ([`Flags::NO_POSE`]).
-    pub position: Option<[f64; 3]>,
-    /// What presses, where an output of the fit was asked for and it has one.
-    pub fit: Option<Fit>,
-    /// Why the fit, or a part of it, is absent.
-    pub flags: Flags,
-}
-
-impl FieldTouch {
-    /// The quantity of `column`, an output of the fit, its components first, if it is present.
-    #[must_use]
-    pub fn value(&self, column: &Column) -> Option<[f64; 3]> {
-        match column.store {
-            Store::Host(host) => self.fit?.components(host),
-            _ => None,
-        }
-    }
-}

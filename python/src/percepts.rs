@@ -200,10 +200,10 @@ impl PyPercepts {
         })
     }
 
-    /// The separate touches, with output `touches`.
+    /// The touches, with output `touches`.
     #[getter]
     fn touches(&self, py: Python<'_>) -> PyResult<PyTouches> {
-        if !self.inner.outputs().contains(Outputs::TOUCHES) {
+        if self.run.plan.touch_outputs().is_none() {
             return Err(usage(py, "`touches` were not asked for; add them to the scene's outputs"));
         }
         Ok(PyTouches { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })

@@ -259,12 +259,13 @@ impl PyScene {
         let Keys { letters, signal, accuracy, .. } = &self.keys;
         let has_unit =
             |calibration: &Calibration| calibration.taxels.iter().any(|taxel| taxel.quantity != Quantity::Count);
-        let asked = self.keys.outputs.iter().copied().reduce(|a, b| a | b);
-        let outputs = match asked.map(|asked| asked.of_fields) {
-            Some(outputs) => outputs,
-            None if calibration.is_some_and(has_unit) => Outputs::USUAL | Outputs::FORCE,
-            None => Outputs::USUAL,
-        };
+        let asked = AskedOutputs::all_of(&self.keys.outputs);
+        let are_usual = self.keys.outputs.is_empty();
+        let force = if are_usual && calibration.is_some_and(has_unit) { Outputs::FORCE } else { Outputs::empty() };
+        let outputs = asked.of_fields | force;
+        // Nobody has asked for touches, and there are no pressures to find them in.
+        let in_vain = are_usual && !letters.is_empty() && !letters.contains(&Receptor::Sustained);
+        let touches = asked.of_touches.filter(|_| !in_vain);
         let letters = if letters.is_empty() { &[Receptor::Sustained][..] } else { letters };
         let usual = Scene::default();
         let knobs = Knobs::default()
@@ -282,11 +283,7 @@ impl PyScene {
             .filter(self.keys.filter()?)
             .knobs(knobs)
             .contact_tolerance_m(self.keys.contact_tolerance_m)
-            .touches(
-                asked
-                    .and_then(AskedOutputs::of_body)
-                    .map(|outputs| self.keys.touch.unwrap_or_default().options(outputs)),
-            )
+            .touches(touches.map(|outputs| self.keys.touch.unwrap_or_default().options(outputs)))
             .relative_to(self.keys.relative_to.clone())
             .coordinates(self.keys.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()

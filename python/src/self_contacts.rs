@@ -68,13 +68,13 @@ impl PySelfContacts {
         self.column(py, 1, |(_, contact), to| to.push(contact.id))
     }
 
-    /// The field on either side, int64 [self-contacts, 2]: indices into `Percepts.fields`.
+    /// The link on either side, int64 [contacts, 2]: an index into the body's links.
     #[getter]
-    fn field(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.column(py, 2, |(_, contact), to| to.extend(contact.sides.map(|side| side.field as i64)))
+    fn link(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.column(py, 2, |(_, contact), to| to.extend(contact.sides.map(|side| i64::from(side.link))))
     }
 
-    /// The touch on either side, uint64 [self-contacts, 2]: its `id` among those of its field.
+    /// The touch on either side, uint64 [self-contacts, 2]: its `id` among `Percepts.touches`.
     #[getter]
     fn touch(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.column(py, 2, |(_, contact), to| to.extend(contact.sides.map(|side| side.touch)))
@@ -98,10 +98,10 @@ impl PySelfContacts {
         self.column(py, 1, |(_, contact), to| to.push(contact.distance))
     }
 
-    /// The angle between the normals there, float64 [self-contacts], in radians; NaN where a field has no chart.
+    /// The angle between the normals there, float64 [self-contacts], in radians.
     #[getter]
     fn angle(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.column(py, 1, |(_, contact), to| to.push(contact.angle.unwrap_or(f64::NAN)))
+        self.column(py, 1, |(_, contact), to| to.push(contact.angle))
     }
 
     /// Arrow's C stream of the table that docs/tables.md describes.

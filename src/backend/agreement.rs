@@ -6,7 +6,7 @@ use std::fmt;
 use glam::{DVec2, DVec3};
 
 use super::bounds::CellBound;
-use crate::percept::{COLUMNS, Column, FieldTouch, Flags, Measure, Outputs, Percept, Percepts};
+use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Percepts};
 use crate::stage::POSE_ROUNDING;
 use crate::stage::angle::{between_directions, between_lines};
 use crate::stage::limit::Limit;
@@ -16,8 +16,7 @@ use crate::stage::limit::Limit;
 pub struct Agreement {
     /// Percepts (a field in a frame) looked at.
     pub percepts: u64,
-    /// Per quantity, what came of comparing it: every output under its name, `flags` and `contact`, and of separate touches
-    /// `touches` (each one's identity and number of taxels), `touches.total`, `touches.centroid` and `touches.position`.
+    /// Per quantity, what came of comparing it: every output under its name, `flags` and `contact`.
     pub quantities: BTreeMap<String, Comparison>,
     /// Percepts in which a value differs.
     pub failed: u64,
@@ -137,7 +136,6 @@ pub(crate) fn compare(
             let bound = &bounds[frame * names.len() + field];
             let mut cell = Cell { quantities: &mut agreement.quantities, failure: None };
             cell.compare(&reference.get(frame, field), bound, &candidate.get(frame, field));
-            cell.compare_touches(reference.field_touches(frame, field), bound, candidate.field_touches(frame, field));
             let failure = cell.failure;
             agreement.percepts += 1;
             if let Some(what) = failure {
@@ -305,26 +303,6 @@ impl Cell<'_> {
         }
     }
 
-    fn compare_touches(&mut self, right: &[FieldTouch], bound: &CellBound, got: &[FieldTouch]) {
-        let touches = name(Outputs::TOUCHES);
-        for index in 0..right.len().max(got.len()) {
-            let (right, got) = (right.get(index), got.get(index));
-            let same = |a: &(u64, u32), b: &(u64, u32)| if a == b { 0.0 } else { f64::INFINITY };
-            let limit = bound.touch;
-            let identity = |touch: &FieldTouch| (touch.id, touch.active);
-            self.quantity(&touches, right.map(identity), got.map(identity), limit.map(|_| 0.0), same);
-            let of = |touch: &FieldTouch| touch.total;
-            let total = limit.map(|limit| limit.total * right.map_or(0.0, of));
-            self.quantity(&format!("{touches}.total"), right.map(of), got.map(of), total, distance);
-            let of = |touch: &FieldTouch| touch.centroid;
-            let place = limit.map(|limit| [limit.place; 2]);
-            self.place(&format!("{touches}.centroid"), right.and_then(of), got.and_then(of), place);
-            let of = |touch: &FieldTouch| touch.position;
-            let limit = far(limit.map(|limit| limit.position), right.and_then(of));
-            self.quantity(&format!("{touches}.position"), right.and_then(of), got.and_then(of), limit, apart_in_space);
-        }
-    }
-
     /// A choice, which every percept has: whether it is `equal`.
     fn choice(&mut self, name: &str, limit: Limit<()>, equal: bool) {
         let comparison = self.quantities.entry(name.to_owned()).or_default();
@@ -413,7 +391,6 @@ fn name(output: Outputs) -> String {
 mod tests {
     use super::*;
     use crate::percept::{Component, Components, Precision, Values};
-    use crate::stage::touches::TouchBound;
 
     const NAMES: [&str; 1] = ["field"];
 
@@ -480,27 +457,6 @@ mod tests {
         for (name, change) in changes {
             let agreement = against(bound(), change);
             assert!(!agreement.holds() && agreement.failures[0].contains(name), "{name}: {agreement}");
-        }
-    }
-
-    #[test]
-    fn a_touch_that_is_not_there_fails() {
-        let touch = FieldTouch {
-            id: 1,
-            total: 10.0,
-            active: 3,
-            centroid: Some([0.1, 0.2]),
-            position: Some([0.0; 3]),
-            fit: None,
-            flags: Flags::empty(),
-        };
-        let touched = |touches: &[FieldTouch]| percepts(|p, _| p.push_touches(touches.iter().copied()));
-        let right = touched(&[touch]);
-        let limit =
-            CellBound { touch: Limit::Within(TouchBound { total: 1e-6, place: 1e-6, position: 1e-6 }), ..bound() };
-        assert!(compare(&right, &[limit], &touched(&[touch]), &NAMES).holds());
-        for touches in [vec![], vec![FieldTouch { centroid: None, ..touch }], vec![touch, touch]] {
-            assert!(!compare(&right, &[limit], &touched(&touches), &NAMES).holds(), "{touches:?}");
         }
     }
 

@@ -9,7 +9,6 @@ use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Plan, PlanField};
 use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
-use crate::stage::touches::TouchBound;
 use crate::stage::{
     Given, GivenLimit, Pressed, U, centroid, contact, difference, filter, force, hysteresis, motion, orientation,
     principal_axis, touches,
@@ -23,8 +22,6 @@ pub(crate) struct CellBound {
     pub(super) limits: [Limit; Outputs::all().bits().ilog2() as usize + 1],
     /// Per coordinate, m.
     pub(crate) centroid: Limit<[f64; 2]>,
-    /// Each touch's; lengths in m.
-    pub(crate) touch: Limit<TouchBound>,
     /// What the other may remember otherwise from now on.
     pub(crate) may_remember: MayRemember,
 }
@@ -46,7 +43,6 @@ impl Default for CellBound {
             in_doubt: Flags::empty(),
             limits: std::array::from_fn(|_| Limit::default()),
             centroid: Limit::default(),
-            touch: Limit::default(),
             may_remember: MayRemember::default(),
         }
     }
@@ -59,12 +55,11 @@ impl CellBound {
             in_doubt: (Flags::all() - INPUT) | flags,
             limits: [Limit::TooClose; _],
             centroid: Limit::TooClose,
-            touch: Limit::TooClose,
             may_remember: MayRemember { contact: true, touches: true, filter: true },
         }
     }
 
-    /// That of one output but the centroid and touches.
+    /// That of one output but the centroid.
     pub(crate) fn limit(&self, output: Outputs) -> Limit {
         self.limits[output.bits().ilog2() as usize]
     }
@@ -241,8 +236,8 @@ impl BoundedReference {
                 moved(&mut bound, field, cell, (touched, doubt.place), before);
             }
         }
-        if plan.stages().touches {
-            self.touches(&mut bound, &pressed, cell, &mut doubt.touches);
+        if plan.stages().fit {
+            self.touches(&mut bound, cell, &mut doubt.touches);
         }
         if field.charted && plan.stages().filter && cell.advances {
             let clock = filter::Clock::new(cell.step.dt_s, cell.step.flags);
@@ -280,7 +275,7 @@ impl BoundedReference {
         }
     }
 
-    fn touches(&self, bound: &mut CellBound, pressed: &[Pressed], cell: &Cell<'_>, doubt: &mut touches::Doubt) {
+    fn touches(&self, bound: &mut CellBound, cell: &Cell<'_>, doubt: &mut touches::Doubt) {
         let field = &self.reference.plan.fields[cell.index];
         let pulls = |member: usize, slot: u32, weight: f32| {
             let pressure = cell.pressures[slot as usize];
@@ -295,21 +290,7 @@ impl BoundedReference {
         if cell.step.restarts() {
             doubt.release();
         }
-        let in_doubt = cell.advances && doubt.follow(&field.skin(), &pulls, off);
-        bound.may_remember.touches = in_doubt;
-        if in_doubt {
-            bound.touch = Limit::TooClose;
-            return;
-        }
-        let lost = pressed.iter().map(|taxel| taxel.pull_excess() / taxel.pull()).fold(0.0, f64::max);
-        let limit = touches::bound(lost);
-        let place = limit.place * f64::from(field.unit_m);
-        // A place has two coordinates on a chart, and three without one.
-        let position = match &field.surface {
-            Some(surface) => surface.bound(2.0_f64.sqrt() * place).0,
-            None => 3.0_f64.sqrt() * place + U * U * field.origin_in_anchor.length(),
-        };
-        bound.touch = Limit::Within(TouchBound { place, position, ..limit });
+        bound.may_remember.touches = cell.advances && doubt.follow(&field.skin(), &pulls, off);
     }
 }
 

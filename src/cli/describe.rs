@@ -25,8 +25,8 @@ pub(super) fn describe(sinks: &[SinkSpec], session: &Session<'_>, wide: bool) ->
     }
     .to_owned();
     text += &table(&percept_columns(session));
-    if session.outputs.contains(Outputs::TOUCHES) {
-        text += "\nin a second file, one row per frame, field in contact and separate touch\n";
+    if session.skin().is_some() {
+        text += "\nin a second file, one row per frame and touch of the whole body\n";
         text += &table(&touch_columns(session));
     }
     if session.outputs.contains(Outputs::SELF_CONTACTS) {

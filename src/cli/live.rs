@@ -197,7 +197,6 @@ impl Progress {
 struct FieldRow {
     name: String,
     latest: Option<Percept>,
-    touches: usize,
     touched_at: Option<Instant>,
     frames_touched: u64,
     largest: Option<(f64, f64)>,
@@ -227,7 +226,6 @@ impl Table {
         let row = |field: usize| FieldRow {
             name: plain::line(&plan.label(field)).into_owned(),
             latest: None,
-            touches: 0,
             touched_at: None,
             frames_touched: 0,
             largest: None,
@@ -258,7 +256,6 @@ impl Table {
                 row.frames_touched += 1;
                 row.touched_at = Some(now);
                 row.latest = Some(percept);
-                row.touches = percepts.field_touches(frame, percept.field).len();
                 self.in_world |= percept.in_world;
                 if let Some(total) = percept.total {
                     self.largest_total = self.largest_total.max(total);
@@ -304,7 +301,7 @@ impl Table {
         let room = rows.saturating_sub(lines.len());
         let fits = if visible.len() > room { room.saturating_sub(1) } else { visible.len() };
         for row in visible.iter().take(fits) {
-            let scale = Scale { largest_total: self.largest_total, unit: self.unit, touches: row.touches };
+            let scale = Scale { largest_total: self.largest_total, unit: self.unit };
             lines.push(format!("  {}", layout.row(&row.name, row.latest.as_ref(), scale)));
         }
         if fits < visible.len() {

@@ -87,10 +87,6 @@ fn plot_outputs_help() -> String {
 
 pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
     let wanted = arguments.outputs.iter().fold(Outputs::empty(), |all, &one| all | one);
-    if wanted.contains(Outputs::TOUCHES) {
-        return Err(Error::usage("touches have no line over time; take them from `somatic run --sink csv:FILE`")
-            .at("--outputs"));
-    }
     if arguments.sources.len() > MAX_RECORDINGS {
         return Err(Error::usage(format!("at most {MAX_RECORDINGS} recordings have room side by side")));
     }

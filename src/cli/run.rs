@@ -81,7 +81,7 @@ pub(super) struct Arguments {
     #[arg(long, help_heading = "Output")]
     wide: bool,
 
-    /// The table that csv:- puts on standard output: fields, touches or self_contacts [default: touches if they are computed, else
+    /// The table that csv:- puts on standard output: fields, touches or self_contacts [default: fields; touches where nothing is asked of fields;
     /// fields].
     #[arg(long, value_name = "TABLE", help_heading = "Output")]
     table: Option<TableName>,
@@ -103,7 +103,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
-    let table = TableWish::new(asked.outputs(), arguments.wide).on_stdout(arguments.table)?;
+    let table =
+        TableWish::new(asked.outputs(), asked.touches().is_some(), arguments.wide).on_stdout(arguments.table)?;
     if arguments.table.is_some() && !sinks.iter().any(SinkSpec::is_table_on_stdout) {
         return Err(Error::usage("--table is for a table on standard output; add --sink csv:-"));
     }

@@ -378,8 +378,7 @@ impl RunOptions {
     }
 
     pub(super) fn outputs(&self) -> Outputs {
-        let of_fields: Vec<Outputs> = self.outputs.iter().map(|asked| asked.of_fields).collect();
-        outputs_or_usual(&of_fields).with_needed()
+        AskedOutputs::all_of(&self.outputs).of_fields
     }
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.

@@ -174,13 +174,7 @@ impl Engine {
             cadence.look(&raw, frames);
         }
         self.backend.run(&raw, &mut self.percepts)?;
-        let post = Post {
-            plan: &self.plan,
-            links: &self.links,
-            self_contacts: self.self_contacts.as_ref(),
-            cadence: self.cadence.as_ref(),
-            kept,
-        };
+        let post = Post { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref(), kept };
         post.flag_restart(&raw, 0, &mut self.percepts);
         orient_again(&self.plan, &raw, &mut self.percepts, &mut self.pressed);
         let first_bound = check.as_ref().map_or(0, |check| check.bounds.len());

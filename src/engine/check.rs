@@ -149,11 +149,10 @@ mod tests {
     use crate::backend::agreement::{Agreement, compare};
     use crate::body::Body;
     use crate::engine::{Engine, Options};
-    use crate::percept::{COLUMNS, Column, FieldTouch, Flags, Measure, Outputs, Percept, Store, Values};
+    use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Store, Values};
     use crate::scene::Scene;
     use crate::signal::{Pose, RawValue};
     use crate::stage::limit::Limit;
-    use crate::stage::touches::TouchBound;
 
     /// What a backend said of some frames, and what is right.
     struct Compared {
@@ -186,7 +185,7 @@ mod tests {
             };
             let frames: Vec<Frame> = (0..8).map(frame).collect();
             let (_, agreement) = engine.process_and_compare(&frames).unwrap();
-            assert!(agreement.holds() && agreement.quantities.len() == 30, "{backend:?}: {agreement}");
+            assert!(agreement.holds() && agreement.quantities.len() == 26, "{backend:?}: {agreement}");
             let check = engine.check.take().unwrap();
             Some(Self { engine, check })
         }
@@ -199,29 +198,25 @@ mod tests {
         /// The last percept for which `right` and `limit` give a value and a bound over 0.
         fn find(
             &self,
-            right: impl Fn(&Percept, Option<&FieldTouch>) -> Option<f64>,
-            limit: impl Fn(&CellBound, &(Percept, Option<FieldTouch>)) -> Limit,
+            right: impl Fn(&Percept) -> Option<f64>,
+            limit: impl Fn(&CellBound) -> Limit,
         ) -> (usize, f64, f64) {
-            let right_of = |cell: usize| self.right(cell).and_then(|(percept, touch)| right(&percept, touch.as_ref()));
+            let right_of = |cell: usize| right(&self.right(cell));
             let mut cells = (0..self.check.bounds.len()).rev();
-            let found = cells.find_map(|cell| match limit(&self.check.bounds[cell], &self.right(cell)?) {
+            let found = cells.find_map(|cell| match limit(&self.check.bounds[cell]) {
                 Limit::Within(bound) if bound > 0.0 => Some((cell, right_of(cell)?, bound)),
                 _ => None,
             });
             found.expect("a value that is compared")
         }
 
-        fn right(&self, cell: usize) -> Option<(Percept, Option<FieldTouch>)> {
+        fn right(&self, cell: usize) -> Percept {
             let (frame, field) = (cell / self.check.right.fields(), cell % self.check.right.fields());
-            Some((self.check.right.get(frame, field), self.check.right.field_touches(frame, field).first().copied()))
+            self.check.right.get(frame, field)
         }
     }
 
     type Change = fn(&mut Percepts);
-    /// Its name, what is right, how far off it may be, and how to put another.
-    type OfTouch =
-        (&'static str, fn(&FieldTouch) -> Option<f64>, fn(TouchBound, &FieldTouch) -> f64, fn(&mut FieldTouch, f64));
-
     /// Puts `value` into component `component` of `column`; whether that is kept in single precision.
     fn put(percepts: &mut Percepts, cell: usize, column: &Column, component: usize, value: f64) -> bool {
         match column.store {
@@ -254,26 +249,6 @@ mod tests {
 
     #[test]
     fn an_error_just_over_the_bound_is_a_disagreement_and_one_just_under_it_is_not() {
-        let of_touches: [OfTouch; 3] = [
-            (
-                "touches.total",
-                |touch| Some(touch.total),
-                |bound, touch| bound.total * touch.total,
-                |touch, value| touch.total = value,
-            ),
-            (
-                "touches.centroid",
-                |touch| Some(touch.centroid?[1]),
-                |bound, _| bound.place,
-                |touch, value| touch.centroid = touch.centroid.map(|[u, _]| [u, value]),
-            ),
-            (
-                "touches.position",
-                |touch| Some(touch.position?[0]),
-                |bound, _| bound.position,
-                |touch, value| touch.position.as_mut().unwrap()[0] = value,
-            ),
-        ];
         let mut backends = 0;
         for backend in [BackendKind::Cpu, BackendKind::Gpu] {
             let Some(compared) = Compared::on(backend) else { continue };
@@ -301,8 +276,7 @@ mod tests {
                         (Measure::Place, _) => Limit::TooClose,
                         _ => bound.limit(column.output),
                     };
-                    let (cell, right, bound) =
-                        compared.find(|percept, _| Some(percept.value(column)?[component]), |bound, _| limit(bound));
+                    let (cell, right, bound) = compared.find(|percept| Some(percept.value(column)?[component]), limit);
                     let single = matches!(column.store, Store::Backend(_));
                     let [under, over] = around(right, bound, single);
                     // Of a vector the other parts are off by something of their own.
@@ -312,25 +286,11 @@ mod tests {
                     });
                 }
             }
-            for (name, right, limit, put) in of_touches {
-                let of = |bound: &CellBound, (_, touch): &(Percept, Option<FieldTouch>)| match (bound.touch, touch) {
-                    (Limit::Within(bound), Some(touch)) => Limit::Within(limit(bound, touch)),
-                    _ => Limit::TooClose,
-                };
-                let (cell, right, bound) = compared.find(|_, touch| right(touch?), of);
-                let [under, over] = around(right, bound, false);
-                let under = if name == "touches.position" { right + 0.5 * bound } else { under };
-                hold(name, [under, over], &|percepts, value| {
-                    put(&mut percepts.touches_mut(cell)[0], value);
-                });
-            }
             // What has no bound differs by the least that it can.
-            let choices: [(&str, Change); 5] = [
+            let choices: [(&str, Change); 3] = [
                 ("active", |p| p.active[0] += 1),
                 ("flags", |p| p.flags[0] ^= Flags::SATURATED),
                 ("contact", |p| p.flags[0] ^= Flags::NO_CONTACT),
-                ("touches", |p| p.touches_mut(0)[0].id += 1),
-                ("touches", |p| p.touches_mut(0)[0].active += 1),
             ];
             for (name, change) in choices {
                 let mut percepts = compared.engine.percepts.clone();

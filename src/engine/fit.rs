@@ -68,13 +68,12 @@ impl Waiting {
         Self { field, cell, offset, touches }
     }
 
-    /// Its touches as the fit takes them, with the members beside them, of those taxels that can be used; only the one with the most
-    /// pressure unless `all` are asked for.
-    fn ready(&self, plan: &Plan, raw: &RawBatch<'_>, all: bool, room: &mut Room) -> Vec<Ready> {
+    /// Its touch with the most pressure as the fit takes it, with the members beside it, of those taxels that can be used.
+    fn ready(&self, plan: &Plan, raw: &RawBatch<'_>, room: &mut Room) -> Vec<Ready> {
         let field = &plan.fields[self.field];
         let Ok(layer) = &field.layer else { return Vec::new() };
         let Room { near, is_near, taxels } = room;
-        let mut ready = Vec::with_capacity(if all { self.touches.len() } else { 1 });
+        let mut ready = Vec::with_capacity(1);
         for (index, (_, members)) in self.touches.iter().enumerate() {
             near.clone_from(members);
             is_near.clear();
@@ -90,10 +89,8 @@ impl Waiting {
             }));
             let total = taxels.iter().map(|taxel| taxel.pressure).sum();
             // The first of those that are equal.
-            if total > 0.0 && (all || ready.last().is_none_or(|strongest: &Ready| total > strongest.total)) {
-                if !all {
-                    ready.clear();
-                }
+            if total > 0.0 && ready.last().is_none_or(|strongest: &Ready| total > strongest.total) {
+                ready.clear();
                 ready.push(Ready { index, total, touch: Touch::new(taxels, layer) });
             }
         }
@@ -101,8 +98,7 @@ impl Waiting {
     }
 }
 
-/// Fits the touches that wait, all of them where separate touches are asked for; puts what comes of the one with the most pressure
-/// into its cell, and of each into the table of touches.
+/// Fits the touches that wait, and puts what comes of the one with the most pressure into its cell.
 ///
 /// # Errors
 /// The device does not answer.
@@ -117,13 +113,12 @@ pub(super) fn all(
         return Ok(());
     }
     let waiting = std::mem::take(&mut state.waiting);
-    let every = plan.outputs.contains(Outputs::TOUCHES);
     let mut ready: Vec<Vec<Ready>> = waiting.iter().map(|_| Vec::new()).collect();
     let cells = waiting.chunks(CELLS).zip(ready.chunks_mut(CELLS));
     parallel::for_each(parallel::threads().min(cells.len()), cells, |(waiting, ready)| {
         let mut room = Room::default();
         for (waiting, ready) in waiting.iter().zip(ready) {
-            *ready = waiting.ready(plan, raw, every, &mut room);
+            *ready = waiting.ready(plan, raw, &mut room);
         }
     });
     let touches: Vec<&Touch> = ready.iter().flatten().map(|ready| &ready.touch).collect();
@@ -133,9 +128,6 @@ pub(super) fn all(
         for (Ready { index, total, .. }, (fit, flags)) in ready.iter().zip(&mut fitted) {
             if strongest.is_none_or(|(most, ..)| *total > most) {
                 strongest = Some((*total, *index, fit, flags));
-            }
-            if let Some(touch) = percepts.touches_mut(waiting.cell).get_mut(*index) {
-                (touch.fit, touch.flags) = (fit, flags);
             }
         }
         let Some((_, index, fit, flags)) = strongest else { continue };
@@ -178,7 +170,7 @@ fn put_motion(plan: &Plan, (waiting, touch): (&Waiting, u64), fit: &Fit, trail: 
 }
 
 fn put(plan: &Plan, fit: &Fit, cell: usize, percepts: &mut Percepts) {
-    for column in plan.outputs.of_each_touch().columns() {
+    for column in (plan.outputs & Outputs::FIT).difference(Outputs::FIT_MOTION).columns() {
         let &Column { output, components: count, store: Store::Host(host), .. } = column else { continue };
         if let Some(components) = fit.components(host) {
             percepts.add_present(cell, output);

@@ -110,10 +110,4 @@ impl Links {
             }
         }
     }
-
-    /// At rest, the transform from a field's anchor (`None` is the world) to `link`.
-    pub(super) fn link_from_anchor(&self, link: usize, anchor: Option<usize>) -> DAffine3 {
-        let world_from_anchor = anchor.map_or(DAffine3::IDENTITY, |anchor| self.world_from_link[anchor]);
-        self.world_from_link[link].inverse() * world_from_anchor
-    }
 }

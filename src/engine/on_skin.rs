@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::links::Links;
+use super::self_contacts::SelfContacts;
 use super::skin_fits::SkinFits;
 use crate::backend::RawBatch;
 use crate::body::Body;
@@ -14,6 +15,7 @@ use crate::percept::{Flags, LinkShare, Percepts, TouchFlags, TouchFrame, TouchOu
 use crate::scene::{Plan, PlanField, Scene};
 use crate::signal::{Frame, LayerResponse, Quantity, RawValue, Response, TaxelCalibration};
 use crate::stage::fit::STEPS;
+use crate::stage::self_contacts::Memory;
 use crate::stage::{calibrate, force};
 use crate::touch::{Input, Reading, Skin, TouchState, Touches};
 
@@ -35,16 +37,25 @@ pub(super) struct OnSkin {
     note: Option<String>,
     /// Where fits are asked for.
     fits: Option<SkinFits>,
+    /// Where self-contacts are asked for.
+    self_contacts: Option<SelfContacts>,
     /// Memory for a frame.
     without_value: Vec<u32>,
     notes: Vec<(u32, TouchFlags)>,
     poses: Vec<Option<DAffine3>>,
 }
 
+/// What the next touches depend on beside the next frames.
+#[derive(Clone, Debug)]
+pub(super) struct OnSkinState {
+    touches: TouchState,
+    self_contacts: Option<Memory>,
+}
+
 impl OnSkin {
     /// `None` where touches of the whole body are not asked for.
     pub(super) fn new(body: &Body, plan: &Plan, scene: &Scene, layer: Option<LayerResponse>) -> Option<Self> {
-        let (mut options, first_slot) = scene.touches.zip(plan.touched_from)?;
+        let (mut options, first_slot) = scene.asked_touches().zip(plan.touched_from)?;
         let (graph, note) = TaxelGraph::of(body);
         let mut skin = Skin::new(body, &graph, |taxel| {
             let channel = plan.body_taxels.binary_search(&taxel);
@@ -62,6 +73,7 @@ impl OnSkin {
             touches: Touches::new(Arc::new(skin), options),
             first_slot,
             fits,
+            self_contacts: SelfContacts::new(body, plan, scene),
             all_in_fields: in_fields.len() == plan.channels(),
             note,
             without_value: Vec::new(),
@@ -80,12 +92,18 @@ impl OnSkin {
         self.note.as_deref()
     }
 
-    pub(super) fn state(&self) -> TouchState {
-        self.touches.state()
+    pub(super) fn state(&self) -> OnSkinState {
+        OnSkinState {
+            touches: self.touches.state(),
+            self_contacts: self.self_contacts.as_ref().map(SelfContacts::state),
+        }
     }
 
-    pub(super) fn restore(&mut self, state: &TouchState) {
-        self.touches.restore(state);
+    pub(super) fn restore(&mut self, state: &OnSkinState) {
+        self.touches.restore(&state.touches);
+        if let Some((self_contacts, state)) = self.self_contacts.as_mut().zip(state.self_contacts.as_ref()) {
+            self_contacts.restore(state);
+        }
     }
 
     /// What presses on each link in the last frame, as [`Touches::on_links`] has it.
@@ -118,10 +136,15 @@ impl OnSkin {
                 notes: &self.notes,
             };
             self.touches.step(input, &mut found);
+            flag_several(&found, &mut percepts.flags[index * plan.fields.len()..][..plan.fields.len()]);
             self.poses.clear();
             if !found.touches.is_empty() && links.may_pose(frame) {
                 links.poses_into(frame, &mut self.poses);
                 put_in_world(&self.poses, &mut found);
+            }
+            if let Some(self_contacts) = &mut self.self_contacts {
+                let (contacts, are_known) = self_contacts.find(&found, input.restarts);
+                percepts.push_self_contacts(contacts, are_known);
             }
             if let Some(fits) = &mut self.fits {
                 fits.take((plan, self.touches.skin()), raw, offset, &self.poses, &mut found);
@@ -169,6 +192,20 @@ impl OnSkin {
         }
         let channels = stale.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok());
         self.notes.extend(channels.map(|channel| (channel as u32, TouchFlags::STALE)));
+    }
+}
+
+/// Flags the fields that hold parts of several of the touches `found`.
+fn flag_several(found: &TouchFrame, flags: &mut [Flags]) {
+    if found.touches.len() < 2 {
+        return;
+    }
+    let mut is_held = vec![false; flags.len()];
+    for share in found.touches.iter().flat_map(|touch| found.fields(touch)) {
+        let field = share.field as usize;
+        if std::mem::replace(&mut is_held[field], true) {
+            flags[field] |= Flags::SEVERAL;
+        }
     }
 }
 

@@ -1,20 +1,19 @@
 //! Post-processing, the same for every backend: places on the surface and in the world, separate touches, filtered motion.
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 use super::cadence::{self, OnChange};
 use super::fit::{self, On};
 use super::links::Links;
 use super::place;
-use super::self_contacts::SelfContacts;
-use super::spread::{self, Frames, Now};
+use super::spread::{Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::error::Result;
-use crate::percept::{FieldTouch, Flags, Host, Outputs, Percepts, Precision, Values};
+use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::{difference, filter, force, motion, self_contacts, touches, world_motion};
+use crate::stage::{difference, filter, force, motion, touches, world_motion};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -23,7 +22,6 @@ pub(super) struct PostState {
     /// The percepts of the last frame, where cadence `on-change` may keep some.
     pub(super) last: Option<Percepts>,
     pub(super) fits: fit::FitState,
-    pub(super) self_contacts: self_contacts::Memory,
     /// The raw values of the last frame by channel, where changes say where fields on several links are touched.
     pub(super) raw_before: Vec<RawValue>,
 }
@@ -50,7 +48,6 @@ impl PostState {
             fields: vec![PostFieldState::default(); fields],
             last: None,
             fits: fit::FitState::initial(fields),
-            self_contacts: self_contacts::Memory::default(),
             raw_before: Vec::new(),
         }
     }
@@ -60,7 +57,6 @@ impl PostState {
 pub(super) struct Post<'a> {
     pub(super) plan: &'a Plan,
     pub(super) links: &'a Links,
-    pub(super) self_contacts: Option<&'a SelfContacts>,
     /// Which fields changed, where the others keep their percepts.
     pub(super) cadence: Option<&'a OnChange>,
     /// By field, whether it was in contact before the batch, where time starts again with that.
@@ -168,27 +164,18 @@ impl Post<'_> {
             let before = &mut state.fields[number];
             if !contact && !before.contact {
                 // Most of a skin, most of the time.
-                if stages.touches {
-                    percepts.push_touches([]);
-                }
                 continue;
             }
             before.contact = contact;
             if step.restarts() {
                 before.touches.release();
             }
-            if stages.touches {
-                let poses = (!field.parts.is_empty() && self.links.may_pose(frame))
-                    .then(|| self.of(alone, raw, offset, &state.raw_before).poses(0, &mut now));
-                let at = Touched { field, frame, poses };
-                let found = self.touches(at, index, cell, percepts, &mut before.touches);
+            if stages.fit {
+                let found = self.touches(field, index, cell, percepts, &mut before.touches);
                 match &field.layer {
-                    _ if !stages.fit || found.is_empty() => {}
+                    _ if found.is_empty() => {}
                     Ok(_) => state.fits.waiting.push(fit::Waiting::new((number, cell, offset), found)),
-                    Err(reason) => {
-                        percepts.flags[cell] |= *reason;
-                        percepts.touches_mut(cell).iter_mut().for_each(|touch| touch.flags |= *reason);
-                    }
+                    Err(reason) => percepts.flags[cell] |= *reason,
                 }
             }
             if stages.filter && field.charted {
@@ -201,16 +188,6 @@ impl Post<'_> {
             if stages.sigma && contact {
                 self.sigmas(field, raw, offset, cell, percepts);
             }
-        }
-        if let Some(self_contacts) = self.self_contacts {
-            self_contacts.find(
-                self.plan,
-                self.links,
-                (frame, step.restarts()),
-                index,
-                percepts,
-                &mut state.self_contacts,
-            );
         }
     }
 
@@ -250,10 +227,6 @@ impl Post<'_> {
     fn keep(&self, field: usize, index: usize, last: Option<&Percepts>, percepts: &mut Percepts) {
         let (of, from) = if index > 0 { (None, index - 1) } else { (last, 0) };
         percepts.keep(of, from, index, field);
-        if self.plan.stages().touches {
-            let touches = percepts.kept_touches(of, from, field);
-            percepts.push_touches(touches);
-        }
     }
 
     /// Filters a cell's motion.
@@ -348,7 +321,7 @@ impl Post<'_> {
     /// Finds a cell's separate touches.
     fn touches<'m>(
         &self,
-        Touched { field, frame: of, poses }: Touched<'_>,
+        field: &PlanField,
         frame: usize,
         cell: usize,
         percepts: &mut Percepts,
@@ -356,7 +329,6 @@ impl Post<'_> {
     ) -> &'m [touches::Found] {
         if percepts.flags[cell].contains(Flags::NO_CONTACT) {
             memory.release();
-            percepts.push_touches([]);
             return &[];
         }
         let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
@@ -367,44 +339,12 @@ impl Post<'_> {
         };
         let pull = |(index, member): (usize, &Member)| weight(index, member) * pressures[member.slot as usize];
         let pulls: Vec<f64> = members.iter().enumerate().map(pull).collect();
-        let unit_m = f64::from(field.unit_m);
         let found = memory.follow(&field.skin(), &pulls);
-        let several = found.len() > 1;
-        let world = self.links.world_from_anchor(field, of);
-        let on_skin = |touch: &touches::Found, place: DVec3| match poses {
-            Some(poses) => spread::of_touch(self.links, field, poses, touch, place),
-            None => {
-                let (position, normal) = place::on_skin(field, place);
-                Some(world.map_or(position, |world| place::in_world(&world, position, normal).0))
-            }
-        };
-        percepts.push_touches(found.iter().map(|touch| {
-            let place = touch.place * unit_m;
-            FieldTouch {
-                id: touch.id,
-                total: touch.total,
-                active: touch.active,
-                centroid: field.charted.then(|| place.truncate().to_array()),
-                position: on_skin(touch, place).map(|place| place.to_array()),
-                fit: None,
-                flags: Flags::empty(),
-            }
-        }));
-        percepts.add_present(cell, Outputs::TOUCHES & self.plan.outputs);
-        if several {
+        if found.len() > 1 {
             percepts.flags[cell] |= Flags::SEVERAL;
         }
         found
     }
-}
-
-/// A field whose touches are put into the world.
-#[derive(Clone, Copy)]
-struct Touched<'a> {
-    field: &'a PlanField,
-    frame: &'a Frame,
-    /// By link, world_from_link, where members lie on several links and the frame says where any is.
-    poses: Option<&'a [Option<DAffine3>]>,
 }
 
 /// A cell's centroid as the backend has it, m.

@@ -9,11 +9,10 @@ use glam::{DAffine3, DVec3};
 use super::links::Links;
 use crate::backend::{RawBatch, Step};
 use crate::percept::Flags;
-use crate::scene::{LinkPart, Plan, PlanField};
+use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, RawValue};
 use crate::stage::calibrate;
 use crate::stage::change::{self, Heard};
-use crate::stage::touches::Found;
 
 /// The frames of a batch, whose raw values fields are placed by.
 #[derive(Clone, Copy)]
@@ -105,20 +104,4 @@ impl Frames<'_> {
             };
         }
     }
-}
-
-/// The position of `touch` at `place` (m, from the origin of `field`, whose members lie on several links) in the world, where
-/// `poses` has its link; separate touches lie on one link each.
-pub(super) fn of_touch(
-    links: &Links,
-    field: &PlanField,
-    poses: &[Option<DAffine3>],
-    touch: &Found,
-    place: DVec3,
-) -> Option<DVec3> {
-    let first = touch.members().next()?;
-    let holds = |part: &&LinkPart| part.members.binary_search_by_key(&first, |&(member, _)| member).is_ok();
-    let link = field.parts.iter().find(holds)?.link;
-    let world_from_anchor = poses[link]? * links.link_from_anchor(link, field.anchor);
-    Some(world_from_anchor.transform_point3(field.origin_in_anchor + place))
 }

@@ -6,7 +6,7 @@ use super::readings::{Reading, Readings};
 use super::scale::Scale;
 use super::scene::PageScene;
 use super::snapshot::Snapshot;
-use crate::percept::{Column, FieldTouch, Percept, SelfContact};
+use crate::percept::{Column, Percept, SelfContact, Touch};
 
 /// The newest frame, read when the first viewer wants it.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub(super) struct Current {
     /// Of the last frame that was read.
     percepts: Vec<Percept>,
     percept_changes: u64,
-    touches: Vec<(u32, FieldTouch)>,
+    touches: Vec<(u32, Touch)>,
     /// 0 where there never was any.
     touch_changes: u64,
     self_contacts: Vec<SelfContact>,

@@ -9,7 +9,7 @@ use super::log::{Event, EventKind};
 use super::scene::PageScene;
 use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
-use crate::percept::{Flags, Outputs, Percepts};
+use crate::percept::{Flags, Percepts};
 use crate::scene::Plan;
 use crate::signal::{BoardHealth, Frame, Pose, RawValue};
 
@@ -127,12 +127,6 @@ impl Publisher {
         snapshot.percepts.clear();
         snapshot.percepts.extend(percepts.touched(last));
         snapshot.touches.clear();
-        if percepts.outputs().contains(Outputs::TOUCHES) {
-            for percept in &snapshot.percepts {
-                let touches = percepts.field_touches(last, percept.field).iter();
-                snapshot.touches.extend(touches.map(|touch| (percept.field as u32, *touch)));
-            }
-        }
         let self_contacts = percepts.self_contacts(last);
         snapshot.self_contacts_are_known = self_contacts.is_some();
         snapshot.self_contacts.clear();

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::percept::{FieldTouch, Percept, SelfContact};
+use crate::percept::{Percept, SelfContact, Touch};
 use crate::scene::Plan;
 use crate::signal::{Pose, RawValue};
 
@@ -29,7 +29,7 @@ pub(super) struct Snapshot {
     /// Of the fields in contact, in their order.
     pub(super) percepts: Vec<Percept>,
     /// Of these fields, in their order.
-    pub(super) touches: Vec<(u32, FieldTouch)>,
+    pub(super) touches: Vec<(u32, Touch)>,
     /// Between links, where they are asked for and known.
     pub(super) self_contacts: Vec<SelfContact>,
     pub(super) self_contacts_are_known: bool,

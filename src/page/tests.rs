@@ -191,7 +191,7 @@ impl Book {
 const ALL_LETTERS: [Receptor; 2] = [Receptor::Sustained, Receptor::Change];
 
 fn book() -> Book {
-    let outputs = Outputs::USUAL | Outputs::TOUCHES | Outputs::SELF_CONTACTS;
+    let outputs = Outputs::USUAL | Outputs::SELF_CONTACTS;
     let mut bench = Bench::new(outputs, &ALL_LETTERS, "[all]\np_max = 100\n[taxel.9]\nmask = true");
     let mut viewer = Viewer::new(0);
     let mut book = Book::default();

@@ -282,8 +282,8 @@ fn write_touches(to: &mut Writer, current: &Current) {
         to.u32(touch.id as u32);
         to.f32(touch.total as f32);
         to.u32(touch.active);
-        touch.centroid.map_or([f32::NAN; 2], |uv| uv.map(|x| x as f32)).into_iter().for_each(|x| to.f32(x));
-        let position = touch.position.unwrap_or([f64::NAN; 3]);
+        [f32::NAN; 2].into_iter().for_each(|x| to.f32(x));
+        let position = touch.position.to_array();
         (0..3).for_each(|i| to.f32((position[i] - from[i]) as f32));
     }
     to.pad();
@@ -295,13 +295,13 @@ fn write_self_contacts(to: &mut Writer, current: &Current) {
     for contact in self_contacts {
         to.u32(contact.id as u32);
         for side in &contact.sides {
-            to.u32(side.field as u32);
+            to.u32(side.link);
             to.u32(side.touch as u32);
             to.f32(side.total as f32);
         }
         (0..3).for_each(|i| to.f32((contact.position[i] - current.origin()[i]) as f32));
         to.f32(contact.distance as f32);
-        to.f32(contact.angle.map_or(f32::NAN, |angle| angle as f32));
+        to.f32(contact.angle as f32);
     }
     to.pad();
 }

@@ -1,10 +1,9 @@
 //! A batch of percepts, in columns.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use super::columns::{Column, Component, Host, Store};
-use super::{FieldTouch, Flags, Outputs, Percept, Precision, SelfContact, Touch, TouchFrame};
+use super::{Flags, Outputs, Percept, Precision, SelfContact, Touch, TouchFrame};
 
 /// Backends' numbers in one precision, part by part, each a value per cell; a cell is `frame · fields + field`.
 ///
@@ -68,9 +67,6 @@ pub struct Percepts {
     pub(super) host: [Vec<f64>; Host::COUNT],
     /// P, frame by frame, each taxel by taxel.
     pub(crate) pressures: Vec<f64>,
-    touches: Vec<FieldTouch>,
-    /// Per cell, the end of its touches.
-    touch_ends: Vec<u32>,
     self_contacts: Vec<SelfContact>,
     /// Per frame, the end of its self-contacts, and whether they are known.
     self_contact_ends: Vec<(u32, bool)>,
@@ -102,8 +98,6 @@ impl Percepts {
             },
             host: std::array::from_fn(|_| Vec::new()),
             pressures: Vec::new(),
-            touches: Vec::new(),
-            touch_ends: Vec::new(),
             self_contacts: Vec::new(),
             self_contact_ends: Vec::new(),
             touch_frames: None,
@@ -175,8 +169,6 @@ impl Percepts {
             }
         }
         refill(&mut self.pressures, frames * self.slots, 0.0);
-        self.touches.clear();
-        self.touch_ends.clear();
         self.self_contacts.clear();
         self.self_contact_ends.clear();
         if let Some(touch_frames) = &mut self.touch_frames {
@@ -313,37 +305,8 @@ impl Percepts {
         }
     }
 
-    /// The separate touches of field `field` in the batch's frame `frame`, the oldest first; none unless
-    /// [`Outputs::TOUCHES`] was asked for.
-    #[must_use]
-    pub fn field_touches(&self, frame: usize, field: usize) -> &[FieldTouch] {
-        &self.touches[self.touches_of(frame * self.fields + field)]
-    }
-
-    /// Where the touches of a cell stand; none have been added for a later one.
-    fn touches_of(&self, cell: usize) -> Range<usize> {
-        let Some(&end) = self.touch_ends.get(cell) else { return 0..0 };
-        let start = if cell == 0 { 0 } else { self.touch_ends[cell - 1] };
-        start as usize..end as usize
-    }
-
-    /// Adds the touches of the next cell, if they are asked for; cells are filled in their order.
-    pub(crate) fn push_touches(&mut self, touches: impl IntoIterator<Item = FieldTouch>) {
-        if !self.outputs.contains(Outputs::TOUCHES) {
-            return;
-        }
-        self.touches.extend(touches);
-        self.touch_ends.push(self.touches.len() as u32);
-    }
-
-    /// The touches of a cell that have been added.
-    pub(crate) fn touches_mut(&mut self, cell: usize) -> &mut [FieldTouch] {
-        let of_cell = self.touches_of(cell);
-        &mut self.touches[of_cell]
-    }
-
     /// The self-contacts of the batch's frame `frame`: touches of two links at one place in the world. `None` where it is touched and
-    /// no touched field's place in the world is known ([`Flags::NO_POSE`]), and unless [`Outputs::SELF_CONTACTS`] was asked for.
+    /// no touch's place in the world is known, and unless [`Outputs::SELF_CONTACTS`] was asked for.
     #[must_use]
     pub fn self_contacts(&self, frame: usize) -> Option<&[SelfContact]> {
         let &(end, is_known) = self.self_contact_ends.get(frame)?;

@@ -116,10 +116,8 @@ macro_rules! columns {
             #[repr(transparent)]
             pub struct Outputs: u64 {
                 $(#[doc = $help] const $output = 1 << $bit;)*
-                /// The separate touches of the field, each with an identity; only on request.
-                const TOUCHES = 1 << 16;
-                /// Touches of two links at one place in the world, each with an identity; only on request, and with
-                /// [`Outputs::TOUCHES`].
+                /// Touches of two links at one place in the world, each with an identity; only on request. With them touches are
+                /// looked for.
                 const SELF_CONTACTS = 1 << 37;
             }
         }
@@ -229,7 +227,7 @@ macro_rules! columns {
             };)*
         }
 
-        /// Every output but [`Outputs::TOUCHES`] and [`Outputs::SELF_CONTACTS`], which are tables of their own.
+        /// Every output but [`Outputs::SELF_CONTACTS`], which are a table of their own.
         pub const COLUMNS: &[Column] = &[$(Column::$output),*];
     };
 }
@@ -320,11 +318,11 @@ columns! {
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: all but [`Outputs::TOUCHES`], [`Outputs::SELF_CONTACTS`], [`Outputs::FILTERED`],
+    /// What is given unless something else is asked for: all but [`Outputs::SELF_CONTACTS`], [`Outputs::FILTERED`],
     /// [`Outputs::SIGMAS`], [`Outputs::FIT`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the
     /// calibration.
     pub const USUAL: Self = Self::all()
-        .difference(Self::TOUCHES.union(Self::SELF_CONTACTS))
+        .difference(Self::SELF_CONTACTS)
         .difference(Self::FILTERED)
         .difference(Self::SIGMAS)
         .difference(Self::FIT)
@@ -367,18 +365,6 @@ impl Outputs {
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         (name == name.to_lowercase()).then(|| Self::from_name(&name.to_uppercase())).flatten()
-    }
-
-    /// These, and those that they refer to: self-contacts name touches.
-    #[must_use]
-    pub const fn with_needed(self) -> Self {
-        if self.contains(Self::SELF_CONTACTS) { self.union(Self::TOUCHES) } else { self }
-    }
-
-    /// Those that each separate touch has for itself.
-    #[must_use]
-    pub const fn of_each_touch(self) -> Self {
-        self.intersection(Self::FIT).difference(Self::FIT_MOTION)
     }
 
     /// The columns of these outputs, in the table's order.

@@ -1,12 +1,11 @@
 //! Percepts that stay what they were.
 
+use super::Percepts;
 use super::batch::{Components, Values};
 use super::columns::{Component, Host};
-use super::{FieldTouch, Percepts};
 
 impl Percepts {
-    /// Makes the percept of field `field` in frame `to` that of frame `from` of `of`, or of these where that is `None`; but for
-    /// the separate touches.
+    /// Makes the percept of field `field` in frame `to` that of frame `from` of `of`, or of these where that is `None`.
     pub(crate) fn keep(&mut self, of: Option<&Self>, from: usize, to: usize, field: usize) {
         let fields = self.fields();
         let (from_cell, cell) = (from * fields + field, to * fields + field);
@@ -40,13 +39,7 @@ impl Percepts {
         self.reset(1);
         for field in 0..self.fields() {
             self.keep(Some(of), from, 0, field);
-            self.push_touches(of.field_touches(from, field).iter().copied());
         }
-    }
-
-    /// The separate touches of field `field` in frame `from` of `of`, or of these.
-    pub(crate) fn kept_touches(&self, of: Option<&Self>, from: usize, field: usize) -> Vec<FieldTouch> {
-        of.unwrap_or(self).field_touches(from, field).to_vec()
     }
 
     pub(crate) fn scale_speeds(&mut self, cell: usize, by: f64) {

@@ -6,14 +6,14 @@
 pub struct SelfContact {
     /// Lasts as long as both touches do, and is never used again.
     pub id: u64,
-    /// The touch on either link, the one whose field comes first in the plan first.
+    /// The touch on either link, the older one first.
     pub sides: [SelfContactSide; 2],
     /// Halfway between the places of both touches, in the world, m.
     pub position: [f64; 3],
     /// How far these places are apart, m.
     pub distance: f64,
-    /// The angle between the outward normals there, rad in [0, π]: π where they oppose. Absent where a field has no chart.
-    pub angle: Option<f64>,
+    /// The angle between the outward normals there, rad in [0, π]: π where they oppose.
+    pub angle: f64,
 }
 
 impl SelfContact {
@@ -23,7 +23,7 @@ impl SelfContact {
         sides: [SelfContactSide; 2],
         position: [f64; 3],
         distance: f64,
-        angle: Option<f64>,
+        angle: f64,
     ) -> Self {
         Self { id, sides, position, distance, angle }
     }
@@ -32,10 +32,10 @@ impl SelfContact {
 /// One side of a [`SelfContact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SelfContactSide {
-    /// Index of the field, as [`crate::Percept::field`] counts.
-    pub field: usize,
-    /// The touch, as [`crate::FieldTouch::id`] has it.
+    /// Index of the link with most of the touch.
+    pub link: u32,
+    /// The touch, as [`crate::Touch::id`] has it.
     pub touch: u64,
-    /// Σ wᵢPᵢ of the touch, in the unit of P.
+    /// ΣP of the touch, in the unit of P.
     pub total: f64,
 }

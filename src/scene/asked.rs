@@ -12,28 +12,33 @@ use crate::percept::{Outputs, TouchOutputs};
 pub struct AskedOutputs {
     /// Of fields.
     pub of_fields: Outputs,
-    /// Of touches.
+    /// Of touches of the whole body; `None` looks for none.
     pub of_touches: Option<TouchOutputs>,
 }
 
 impl AskedOutputs {
-    /// All names that there are.
-    pub fn names() -> impl Iterator<Item = String> {
-        Outputs::all().names().chain(TouchOutputs::all().names().map(|name| format!("touches.{name}")))
+    /// What is given unless something else is asked for: the usual quantities of fields and of touches.
+    pub const USUAL: Self = Self { of_fields: Outputs::USUAL, of_touches: Some(TouchOutputs::USUAL) };
+
+    /// What `named` ask for together, or the usual quantities where none are named.
+    #[must_use]
+    pub fn all_of(named: &[Self]) -> Self {
+        named.iter().copied().reduce(|a, b| a | b).unwrap_or(Self::USUAL)
     }
 
-    /// What is asked of touches of the whole body. Fits and self-contacts are of fields' own touches: where these are asked for, so are
-    /// all touches.
-    #[must_use]
-    pub fn of_body(self) -> Option<TouchOutputs> {
-        let are_of_fields = self.of_fields.intersects(Outputs::FIT.union(Outputs::SELF_CONTACTS));
-        self.of_touches.filter(|_| !are_of_fields)
+    /// All names that there are.
+    pub fn names() -> impl Iterator<Item = String> {
+        let of_fields = Outputs::all().names().chain([TOUCHES.to_owned()]);
+        of_fields.chain(TouchOutputs::all().names().map(|name| format!("{TOUCHES}.{name}")))
     }
 }
 
+/// The name that asks for the usual quantities of touches.
+const TOUCHES: &str = "touches";
+
 impl From<Outputs> for AskedOutputs {
     fn from(of_fields: Outputs) -> Self {
-        Self { of_fields, of_touches: of_fields.contains(Outputs::TOUCHES).then_some(TouchOutputs::USUAL) }
+        Self { of_fields, of_touches: None }
     }
 }
 
@@ -50,10 +55,15 @@ impl FromStr for AskedOutputs {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        let of_touches = name.strip_prefix("touches.").and_then(TouchOutputs::named);
-        let of_touches = of_touches
-            .map(|output| Self { of_fields: Outputs::TOUCHES, of_touches: Some(TouchOutputs::USUAL | output) });
-        of_touches.or_else(|| Outputs::named(name).map(Self::from)).ok_or_else(|| {
+        let of_touches = match name.strip_prefix(TOUCHES) {
+            Some("") => Some(TouchOutputs::USUAL),
+            Some(rest) => rest.strip_prefix('.').and_then(TouchOutputs::named).map(|one| TouchOutputs::USUAL | one),
+            None => None,
+        };
+        if of_touches.is_some() {
+            return Ok(Self { of_fields: Outputs::empty(), of_touches });
+        }
+        Outputs::named(name).map(Self::from).ok_or_else(|| {
             let names: Vec<String> = Self::names().collect();
             Error::usage(unknown("output", name, names.iter().map(String::as_str)))
         })
@@ -67,14 +77,17 @@ mod tests {
     #[test]
     fn names_ask_for_quantities_of_fields_and_of_touches() {
         let asked = |names: &[&str]| {
-            names.iter().map(|name| name.parse::<AskedOutputs>().unwrap()).reduce(|a, b| a | b).unwrap()
+            let named: Vec<AskedOutputs> = names.iter().map(|name| name.parse().unwrap()).collect();
+            AskedOutputs::all_of(&named)
         };
+        assert_eq!(asked(&[]), AskedOutputs::USUAL);
         assert_eq!(asked(&["total", "peak"]), (Outputs::TOTAL | Outputs::PEAK).into());
-        assert_eq!(asked(&["touches"]).of_body(), Some(TouchOutputs::USUAL));
+        let usual = Some(TouchOutputs::USUAL);
+        assert_eq!(asked(&["touches"]), AskedOutputs { of_fields: Outputs::empty(), of_touches: usual });
         let more = asked(&["touches.wrench", "total"]);
-        assert_eq!(more.of_body(), Some(TouchOutputs::USUAL | TouchOutputs::WRENCH));
-        assert_eq!(more.of_fields, Outputs::TOUCHES | Outputs::TOTAL);
-        assert_eq!(asked(&["touches", "fit_place"]).of_body(), None);
+        assert_eq!(more.of_touches, Some(TouchOutputs::USUAL | TouchOutputs::WRENCH));
+        assert_eq!(more.of_fields, Outputs::TOTAL);
+        assert_eq!(asked(&["touches", "fit_place"]).of_touches, usual);
         for name in AskedOutputs::names() {
             assert!(name.parse::<AskedOutputs>().is_ok(), "{name}");
         }

@@ -113,7 +113,7 @@ impl Plan {
             ("motion", stages.motion, found_charted, ""),
             ("position", stages.position, found, ""),
             ("world_motion", stages.world_motion, found, ""),
-            ("touches", stages.touches, of(&all), ""),
+            ("touches", self.touched_from.is_some(), (self.channels(), 0), ""),
             ("self_contacts", stages.self_contacts, found, ""),
             ("force", stages.force, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
@@ -122,7 +122,6 @@ impl Plan {
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = match name {
-                "touches" => Outputs::TOUCHES,
                 "self_contacts" => Outputs::SELF_CONTACTS,
                 _ => Outputs::of_stage(name),
             };
@@ -156,7 +155,7 @@ impl Plan {
             "contact" => "says which fields are touched",
             "hysteresis" => "the calibration has thresholds",
             "centroid" | "position" => "later stages need it",
-            "touches" => "a fit is one touch's",
+            "touches" => "of the whole body",
             _ => "others need it",
         }
     }
@@ -179,7 +178,7 @@ impl Plan {
         let own = numbers().filter(|(by, wanted_for)| *by == stage && self.read_back().intersects(*wanted_for));
         let numbers = own.count();
         let status = usize::from(stage == "contact");
-        let keeps = if self.stages().touches { "touches" } else { "force" };
+        let keeps = if self.touched_from.is_some() { "touches" } else { "force" };
         let kept = if stage == keeps { self.kept_pressures() } else { 0 };
         (self.fields.len() * (status + numbers) + kept) * size_of::<f32>()
     }
@@ -231,8 +230,8 @@ mod tests {
         assert_eq!(running(&plan(Outputs::TOTAL, &[])), ["calibrate", "contact"]);
         assert_eq!(running(&plan(Outputs::CENTROID, &[])), ["calibrate", "contact", "centroid"]);
         assert_eq!(running(&plan(Outputs::SPEED, &[])), ["calibrate", "contact", "centroid", "motion"]);
-        let touches = ["calibrate", "contact", "centroid", "position", "touches"];
-        assert_eq!(running(&plan(Outputs::TOUCHES, &[])), touches);
+        let self_contacts = ["calibrate", "contact", "touches", "self_contacts"];
+        assert_eq!(running(&plan(Outputs::SELF_CONTACTS, &[])), self_contacts);
         let explained = plan(Outputs::ORIENTATION, &[]).explain();
         let why = |name: &str| explained.iter().find(|stage| stage.name == name).unwrap().why.clone();
         assert_eq!(why("orientation"), "asked for: orientation");
@@ -255,7 +254,7 @@ mod tests {
 
     #[test]
     fn what_stages_move_adds_up_to_what_a_frame_moves() {
-        for outputs in [Outputs::TOTAL, Outputs::POSITION, Outputs::SPEED, Outputs::TOUCHES, Outputs::all()] {
+        for outputs in [Outputs::TOTAL, Outputs::POSITION, Outputs::SPEED, Outputs::SELF_CONTACTS, Outputs::all()] {
             let plan = plan(outputs, &[]);
             let stages = plan.explain();
             let sum = |bytes: fn(&PlannedStage) -> usize| stages.iter().map(bytes).sum::<usize>();

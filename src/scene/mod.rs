@@ -20,7 +20,6 @@ pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
 pub(crate) use layer::REACH;
-pub(crate) use members::LinkPart;
 pub use plan::Plan;
 pub(crate) use plan::PlanField;
 pub(crate) use stages::Stages;
@@ -93,6 +92,12 @@ setters!(Scene {
 });
 
 impl Scene {
+    /// What is asked of touches: self-contacts are made of them.
+    pub(crate) fn asked_touches(&self) -> Option<touch::Options> {
+        let needed = self.outputs.contains(Outputs::SELF_CONTACTS).then(touch::Options::default);
+        self.touches.or(needed)
+    }
+
     /// The link that stands for the world, which `body` must have.
     fn checked_link(&self, body: &Body) -> Result<Option<String>> {
         let Some(link) = &self.relative_to else { return Ok(None) };

@@ -172,15 +172,16 @@ impl Plan {
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let left_out = LeftOut::of(body, &chosen, fields);
         let chosen = left_out.feeling(body, chosen, fields)?;
+        let touches = scene.asked_touches();
         let read: BTreeSet<usize> = chosen
             .iter()
             .flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel))
-            .chain((0..body.taxels.len()).filter(|_| scene.touches.is_some()))
+            .chain((0..body.taxels.len()).filter(|_| touches.is_some()))
             .filter(|&taxel| is_pressure(body, taxel))
             .collect();
         let body_taxels: Vec<usize> = read.into_iter().collect();
         let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
-        let outputs = scene.knobs.orientation_by.applied(scene.outputs).with_needed();
+        let outputs = scene.knobs.orientation_by.applied(scene.outputs);
         let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibration.taxels[taxel]));
         let mut plan = Self {
             outputs,
@@ -199,7 +200,7 @@ impl Plan {
             curves: Curves::default(),
             feels_from: Vec::new(),
             touched_from: None,
-            touch_outputs: scene.touches.map(|touches| touches.outputs),
+            touch_outputs: touches.map(|touches| touches.outputs),
             spread_slots: Vec::new(),
             heaviest: Vec::new(),
             left_out,
@@ -208,12 +209,12 @@ impl Plan {
             body_taxels: Vec::new(),
         };
         let first_slots = plan.lay_out_slots(calibration)?;
-        if scene.touches.is_some() {
+        if touches.is_some() {
             plan.find_touches(&first_slots)?;
         }
         plan.note_what_is_felt();
         let nearest = Nearest::new(body);
-        let around = plan.stages().touches.then(|| neighbours(body));
+        let around = plan.stages().fit.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
         let (mut plan_fields, mut members) =
             (Vec::<PlanField>::with_capacity(chosen.len()), Vec::<layout::Member>::new());

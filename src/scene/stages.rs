@@ -12,7 +12,6 @@ pub(crate) struct Stages {
     pub(crate) motion: bool,
     pub(crate) position: bool,
     pub(crate) world_motion: bool,
-    pub(crate) touches: bool,
     pub(crate) self_contacts: bool,
     pub(crate) force: bool,
     /// Whether percepts keep the taxels' pressures, for stages on the host.
@@ -27,13 +26,12 @@ impl Stages {
     pub(super) fn of(outputs: Outputs) -> Self {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
         let fit = wants("fit");
-        let touches = outputs.contains(Outputs::TOUCHES) || fit;
         let world_motion = wants("world_motion");
-        let position = wants("position") || touches || world_motion;
+        let position = wants("position") || world_motion;
         let [orientation, principal_axis, motion, filter, force, sigma] =
             ["orientation", "principal_axis", "motion", "filter", "force", "sigma"].map(wants);
-        let centroid = wants("centroid") || position || orientation || principal_axis || motion || filter;
-        let pressures = touches || force;
+        let centroid = wants("centroid") || position || orientation || principal_axis || motion || filter || fit;
+        let pressures = fit || force;
         Self {
             centroid,
             orientation,
@@ -42,7 +40,6 @@ impl Stages {
             motion,
             position,
             world_motion,
-            touches,
             self_contacts: outputs.contains(Outputs::SELF_CONTACTS),
             force,
             pressures,

@@ -3,9 +3,7 @@
 use super::FieldNames;
 use super::json::{key, print};
 use super::touch_line::{SkinNames, TouchWriter};
-use crate::percept::{
-    COLUMNS, FieldTouch, Flags, Outputs, Percept, Percepts, Precision, SelfContact, Store, TouchFrame, Unit,
-};
+use crate::percept::{COLUMNS, Flags, Percept, Percepts, Precision, SelfContact, Store, TouchFrame, Unit};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -22,9 +20,6 @@ struct Head {
     in_world: String,
     /// As JSON.
     field: String,
-    link: String,
-    /// Letter and signal where they are named, as keys and values behind a comma.
-    letters: String,
 }
 
 impl Head {
@@ -35,13 +30,7 @@ impl Head {
         let letters: String = named.collect();
         let begin =
             |link: &str| format!("{{\"field\":{},\"link\":{}{letters},\"contact\":", text(&names.field), text(link));
-        Self {
-            in_anchor: begin(&names.link),
-            in_world: begin(&names.world),
-            field: text(&names.field),
-            link: text(&names.link),
-            letters,
-        }
+        Self { in_anchor: begin(&names.link), in_world: begin(&names.world), field: text(&names.field) }
     }
 }
 
@@ -97,50 +86,15 @@ impl LineWriter {
             print_quantities(line, &percept, percepts.precision());
             if let Some((_, found)) = on_skin {
                 write_parts(found, percept.field, line);
-            } else if percepts.outputs().contains(Outputs::TOUCHES) && percept.contact {
-                self.write_touches(percepts.field_touches(frame, percept.field), percepts.outputs(), line);
             }
             self.write_flags(percept.flags, line);
             line.push(b'}');
         }
         line.push(b']');
-        if let Some(self_contacts) = percepts.self_contacts(frame) {
-            self.write_self_contacts(self_contacts, line);
+        if let Some((touches, self_contacts)) = self.touches.as_ref().zip(percepts.self_contacts(frame)) {
+            write_self_contacts(touches, self_contacts, line);
         }
         line.push(b'}');
-    }
-
-    fn write_self_contacts(&self, self_contacts: &[SelfContact], line: &mut Vec<u8>) {
-        key(line, "self_contacts");
-        line.push(b'[');
-        for (index, contact) in self_contacts.iter().enumerate() {
-            line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
-            print(line, &contact.id);
-            // Both sides are of one letter.
-            line.extend_from_slice(self.heads[contact.sides[0].field].letters.as_bytes());
-            for (name, of) in [("fields", true), ("links", false)] {
-                let [a, b] = contact.sides.map(|side| {
-                    let head = &self.heads[side.field];
-                    if of { &head.field } else { &head.link }
-                });
-                key(line, name);
-                line.extend_from_slice(format!("[{a},{b}]").as_bytes());
-            }
-            key(line, "touches");
-            print(line, &contact.sides.map(|side| side.touch));
-            key(line, "totals");
-            print(line, &contact.sides.map(|side| side.total));
-            key(line, "position");
-            print(line, &contact.position);
-            key(line, "distance");
-            print(line, &contact.distance);
-            if let Some(angle) = contact.angle {
-                key(line, "angle");
-                print(line, &angle);
-            }
-            line.push(b'}');
-        }
-        line.push(b']');
     }
 
     fn write_flags(&self, own: Flags, line: &mut Vec<u8>) {
@@ -153,34 +107,30 @@ impl LineWriter {
         }
         line.push(b']');
     }
+}
 
-    fn write_touches(&self, touches: &[FieldTouch], outputs: Outputs, line: &mut Vec<u8>) {
-        let fit = outputs.of_each_touch();
+fn write_self_contacts(touches: &TouchWriter, self_contacts: &[SelfContact], line: &mut Vec<u8>) {
+    key(line, "self_contacts");
+    line.push(b'[');
+    for (index, contact) in self_contacts.iter().enumerate() {
+        line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
+        print(line, &contact.id);
+        let [a, b] = contact.sides.map(|side| touches.link(side.link));
+        key(line, "links");
+        line.extend_from_slice(format!("[{a},{b}]").as_bytes());
         key(line, "touches");
-        line.push(b'[');
-        for (index, touch) in touches.iter().enumerate() {
-            line.extend_from_slice(if index == 0 { b"{\"id\":" } else { b",{\"id\":" });
-            print(line, &touch.id);
-            key(line, "total");
-            print(line, &touch.total);
-            key(line, "active");
-            print(line, &touch.active);
-            if let Some(centroid) = touch.centroid {
-                key(line, "centroid");
-                print(line, &centroid);
-            }
-            if let Some(position) = touch.position {
-                key(line, "position");
-                print(line, &position);
-            }
-            print_fit(line, touch, fit);
-            if !fit.is_empty() {
-                self.write_flags(touch.flags, line);
-            }
-            line.push(b'}');
-        }
-        line.push(b']');
+        print(line, &contact.sides.map(|side| side.touch));
+        key(line, "totals");
+        print(line, &contact.sides.map(|side| side.total));
+        key(line, "position");
+        print(line, &contact.position);
+        key(line, "distance");
+        print(line, &contact.distance);
+        key(line, "angle");
+        print(line, &contact.angle);
+        line.push(b'}');
     }
+    line.push(b']');
 }
 
 /// The touches that a field holds parts of, each with the field's share of its total.
@@ -196,18 +146,6 @@ fn write_parts(found: &TouchFrame, field: usize, line: &mut Vec<u8>) {
         print(line, &(part.total / touch.total));
     }
     line.push(b'}');
-}
-
-fn print_fit(line: &mut Vec<u8>, touch: &FieldTouch, outputs: Outputs) {
-    for column in outputs.columns() {
-        let Some(components) = touch.value(column) else { continue };
-        key(line, column.name);
-        match column.components {
-            _ if column.unit == Unit::Kind => print(line, &touch.fit.map(|fit| fit.kind)),
-            1 => print(line, &components[0]),
-            count => print(line, &&components[..count]),
-        }
-    }
 }
 
 fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision) {

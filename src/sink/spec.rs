@@ -117,21 +117,22 @@ impl FromStr for TableName {
 pub struct TableWish {
     /// Whether a CSV has one row per frame, with columns of their own for each field.
     pub wide: bool,
-    /// Whether separate touches are asked for: they go into a second file, `percepts.touches.csv` beside `percepts.csv`.
+    /// Whether touches are asked for: they go into a second file, `percepts.touches.csv` beside `percepts.csv`.
     pub touches: bool,
     /// Whether self-contacts are: they go into a third file, `percepts.self_contacts.csv`.
     pub self_contacts: bool,
-    /// The table that goes to standard output, which has room for one. `None`: touches if they are computed, else fields.
+    /// Whether anything of fields is.
+    pub fields: bool,
+    /// The table that goes to standard output, which has room for one. `None`: fields, or touches where nothing is asked of fields.
     pub on_stdout: Option<TableName>,
 }
 
 impl TableWish {
-    /// What tables of `outputs` are to have.
+    /// What tables of `outputs` are to have, with `touches` or without.
     #[must_use]
-    pub fn new(outputs: Outputs, wide: bool) -> Self {
-        let outputs = outputs.with_needed();
-        let (touches, self_contacts) = (outputs.contains(Outputs::TOUCHES), outputs.contains(Outputs::SELF_CONTACTS));
-        Self { wide, touches, self_contacts, on_stdout: None }
+    pub fn new(outputs: Outputs, touches: bool, wide: bool) -> Self {
+        let self_contacts = outputs.contains(Outputs::SELF_CONTACTS);
+        Self { wide, touches: touches || self_contacts, self_contacts, fields: !outputs.is_empty(), on_stdout: None }
     }
 
     /// The same, with this table on standard output.
@@ -152,7 +153,8 @@ impl TableWish {
     }
 
     fn table_on_stdout(self) -> TableName {
-        self.on_stdout.unwrap_or(if self.touches && !self.wide { TableName::Touches } else { TableName::Fields })
+        let touches_alone = self.touches && !self.fields && !self.wide;
+        self.on_stdout.unwrap_or(if touches_alone { TableName::Touches } else { TableName::Fields })
     }
 }
 
@@ -278,7 +280,7 @@ pub enum SinkTarget {
     Csv {
         /// The file; `None` if standard output has another table.
         percepts: Option<OutputPath>,
-        /// That of separate touches.
+        /// That of touches.
         touches: Option<OutputPath>,
         /// That of self-contacts.
         self_contacts: Option<OutputPath>,
@@ -289,7 +291,7 @@ pub enum SinkTarget {
     Parquet {
         /// The file.
         percepts: OutputPath,
-        /// That of separate touches.
+        /// That of touches.
         touches: Option<OutputPath>,
         /// That of self-contacts.
         self_contacts: Option<OutputPath>,

@@ -56,6 +56,11 @@ impl TouchWriter {
         }
     }
 
+    /// A link's name, as JSON.
+    pub(super) fn link(&self, link: u32) -> &str {
+        &self.links[link as usize]
+    }
+
     /// Appends `,"touches":[…],"released":[…]` to `line`. `fields` are the names of the fields, as JSON.
     pub(super) fn write<'f>(&self, found: &TouchFrame, fields: impl Fn(u32) -> &'f str, line: &mut Vec<u8>) {
         key(line, "touches");

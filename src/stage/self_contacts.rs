@@ -15,18 +15,14 @@ const FACING: f64 = -0.5;
 /// A touch whose place in the world is known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Side {
-    /// Of the plan.
-    pub(crate) field: usize,
     pub(crate) touch: u64,
     /// Of the body.
     pub(crate) link: usize,
-    /// Which of the scene's letters it is of.
-    pub(crate) letter: usize,
     pub(crate) total: f64,
     /// In the world, m.
     pub(crate) position: DVec3,
-    /// In the world; none where its field has no chart.
-    pub(crate) normal: Option<DVec3>,
+    /// In the world.
+    pub(crate) normal: DVec3,
 }
 
 /// Two sides that are one contact.
@@ -36,21 +32,15 @@ pub(crate) struct Pair {
     pub(crate) sides: [usize; 2],
     pub(crate) distance_m: f64,
     /// Between their normals.
-    pub(crate) angle_rad: Option<f64>,
+    pub(crate) angle_rad: f64,
 }
 
-/// The pairs of `sides` that are self-contacts, in the order of `sides`. `tolerance_m` of two links is how far they may be apart;
-/// `overlaps` says of two links whether they are within that at rest: there, nothing but normals tells a press over the
-/// joint from a contact, so that touches without them are no contact.
-pub(crate) fn pairs(
-    sides: &[Side],
-    tolerance_m: impl Fn(usize, usize) -> f64,
-    overlaps: impl Fn(usize, usize) -> bool,
-) -> Vec<Pair> {
+/// The pairs of `sides` that are self-contacts, in the order of `sides`. `tolerance_m` of two links is how far they may be apart.
+pub(crate) fn pairs(sides: &[Side], tolerance_m: impl Fn(usize, usize) -> f64) -> Vec<Pair> {
     let mut near = Vec::new();
     for (i, a) in sides.iter().enumerate() {
         for (j, b) in sides.iter().enumerate().skip(i + 1) {
-            if a.link == b.link || a.letter != b.letter {
+            if a.link == b.link {
                 continue;
             }
             let distance_m = a.position.distance(b.position);
@@ -58,11 +48,10 @@ pub(crate) fn pairs(
             if !matches!(distance_m.partial_cmp(&tolerance_m(a.link, b.link)), Some(order) if order.is_le()) {
                 continue;
             }
-            let cosine = a.normal.zip(b.normal).map(|(a, b)| a.dot(b).clamp(-1.0, 1.0));
-            if cosine.map_or_else(|| overlaps(a.link, b.link), |cosine| cosine >= FACING) {
-                continue;
+            let cosine = a.normal.dot(b.normal).clamp(-1.0, 1.0);
+            if cosine < FACING {
+                near.push(Pair { sides: [i, j], distance_m, angle_rad: cosine.acos() });
             }
-            near.push(Pair { sides: [i, j], distance_m, angle_rad: cosine.map(f64::acos) });
         }
     }
     near.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m).then(a.sides.cmp(&b.sides)));
@@ -90,8 +79,8 @@ pub(crate) struct Memory {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Known {
-    /// Field and touch of either side.
-    sides: [(usize, u64); 2],
+    /// The touch of either side.
+    sides: [u64; 2],
     id: u64,
 }
 
@@ -101,14 +90,14 @@ impl Memory {
         self.known.clear();
     }
 
-    /// Forgets self-contacts of which a touch has ended: those for whose field and touch `lasts` does not hold.
-    pub(crate) fn release(&mut self, lasts: impl Fn(usize, u64) -> bool) {
-        self.known.retain(|known| known.sides.iter().all(|&(field, touch)| lasts(field, touch)));
+    /// Forgets self-contacts of which a touch has ended: those for which `lasts` does not hold.
+    pub(crate) fn release(&mut self, lasts: impl Fn(u64) -> bool) {
+        self.known.retain(|known| known.sides.iter().all(|&touch| lasts(touch)));
     }
 
     /// The identity of the contact of two touches.
     pub(crate) fn id_of(&mut self, sides: [&Side; 2]) -> u64 {
-        let sides = sides.map(|side| (side.field, side.touch));
+        let sides = sides.map(|side| side.touch);
         if let Some(known) = self.known.iter().find(|known| known.sides == sides) {
             return known.id;
         }
@@ -123,60 +112,52 @@ impl Memory {
 mod tests {
     use super::*;
 
-    fn side(field: usize, link: usize, x: f64, normal: Option<DVec3>) -> Side {
-        Side { field, touch: 0, link, letter: 0, total: 1.0, position: DVec3::X * x, normal }
+    fn side(touch: u64, link: usize, x: f64, normal: DVec3) -> Side {
+        Side { touch, link, total: 1.0, position: DVec3::X * x, normal }
     }
 
-    fn found(sides: &[Side], tolerance_m: f64, overlap: bool) -> Vec<[usize; 2]> {
-        pairs(sides, |_, _| tolerance_m, |_, _| overlap).into_iter().map(|pair| pair.sides).collect()
+    fn found(sides: &[Side], tolerance_m: f64) -> Vec<[usize; 2]> {
+        pairs(sides, |_, _| tolerance_m).into_iter().map(|pair| pair.sides).collect()
     }
 
     #[test]
     fn a_contact_is_near_on_another_link_and_faces_the_other_way() {
-        let up = side(0, 0, 0.0, Some(DVec3::Z));
-        let down = |x: f64| side(1, 1, x, Some(-DVec3::Z));
-        assert_eq!(found(&[up, down(0.01)], 0.01, true), [[0, 1]]);
-        assert!(found(&[up, down(0.010_001)], 0.01, true).is_empty());
-        assert!(found(&[up, Side { link: 0, ..down(0.0) }], 0.01, true).is_empty());
-        assert!(found(&[up, Side { letter: 1, ..down(0.0) }], 0.01, true).is_empty());
-        assert!(found(&[up, down(f64::NAN)], 0.01, true).is_empty());
+        let up = side(0, 0, 0.0, DVec3::Z);
+        let down = |x: f64| side(1, 1, x, -DVec3::Z);
+        assert_eq!(found(&[up, down(0.01)], 0.01), [[0, 1]]);
+        assert!(found(&[up, down(0.010_001)], 0.01).is_empty());
+        assert!(found(&[up, Side { link: 0, ..down(0.0) }], 0.01).is_empty());
+        assert!(found(&[up, down(f64::NAN)], 0.01).is_empty());
         // 120°, a little less and a little more.
         let turned = |degrees: f64| {
             let (sine, cosine) = degrees.to_radians().sin_cos();
-            [up, side(1, 1, 0.0, Some(DVec3::new(sine, 0.0, cosine)))]
+            [up, side(1, 1, 0.0, DVec3::new(sine, 0.0, cosine))]
         };
-        assert!(found(&turned(119.9), 0.01, true).is_empty());
-        let pair = pairs(&turned(120.1), |_, _| 0.01, |_, _| true)[0];
-        assert!((pair.angle_rad.unwrap() - 120.1_f64.to_radians()).abs() < 1e-9);
-    }
-
-    #[test]
-    fn without_a_normal_only_links_that_are_apart_at_rest_have_contacts() {
-        let sides = [side(0, 0, 0.0, Some(DVec3::Z)), side(1, 1, 0.0, None)];
-        assert_eq!(found(&sides, 0.01, false), [[0, 1]]);
-        assert!(found(&sides, 0.01, true).is_empty());
+        assert!(found(&turned(119.9), 0.01).is_empty());
+        let pair = pairs(&turned(120.1), |_, _| 0.01)[0];
+        assert!((pair.angle_rad - 120.1_f64.to_radians()).abs() < 1e-9);
     }
 
     #[test]
     fn the_nearest_are_paired_first_and_each_touch_once_a_link() {
-        let a = |x: f64| side(0, 0, x, Some(DVec3::Z));
-        let b = |x: f64| side(1, 1, x, Some(-DVec3::Z));
-        assert_eq!(found(&[a(0.0), a(0.003), b(0.001), b(0.006)], 0.01, false), [[0, 2], [1, 3]]);
+        let a = |x: f64| side(0, 0, x, DVec3::Z);
+        let b = |x: f64| side(1, 1, x, -DVec3::Z);
+        assert_eq!(found(&[a(0.0), a(0.003), b(0.001), b(0.006)], 0.01), [[0, 2], [1, 3]]);
         // One on the other side: nothing is left for the farther one.
-        assert_eq!(found(&[a(0.0), a(0.003), b(0.002)], 0.01, false), [[1, 2]]);
+        assert_eq!(found(&[a(0.0), a(0.003), b(0.002)], 0.01), [[1, 2]]);
         // Between two other links, one with each.
-        let c = side(2, 2, 0.004, Some(-DVec3::Z));
-        assert_eq!(found(&[a(0.003), b(0.002), c], 0.01, false), [[0, 1], [0, 2]]);
+        let c = side(2, 2, 0.004, -DVec3::Z);
+        assert_eq!(found(&[a(0.003), b(0.002), c], 0.01), [[0, 1], [0, 2]]);
     }
 
     #[test]
     fn an_identity_lasts_as_long_as_both_touches() {
-        let (a, b) = (side(0, 0, 0.0, None), side(1, 1, 0.0, None));
+        let (a, b) = (side(1, 0, 0.0, DVec3::Z), side(2, 1, 0.0, -DVec3::Z));
         let mut memory = Memory::default();
         assert_eq!(memory.id_of([&a, &b]), 0);
-        assert_eq!(memory.id_of([&a, &Side { touch: 1, ..b }]), 1);
-        memory.release(|_, touch| touch == 0);
+        assert_eq!(memory.id_of([&a, &Side { touch: 3, ..b }]), 1);
+        memory.release(|touch| touch < 3);
         assert_eq!(memory.id_of([&a, &b]), 0);
-        assert_eq!(memory.id_of([&a, &Side { touch: 1, ..b }]), 2);
+        assert_eq!(memory.id_of([&a, &Side { touch: 3, ..b }]), 2);
     }
 }

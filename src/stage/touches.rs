@@ -9,13 +9,10 @@
 //! splits, the part that shares most keeps the identity and the others get new ones; where two meet, the one that gave
 //! most goes on. Ties go to the older identity. Identities count up and are never used again.
 //!
-//! This stage is the host's, in f64, on every backend: which taxels connect is a search, not a sum, and it is made only
-//! where it is asked for. The pressures are the backend's own.
+//! Fits of fields are made of them. This stage is the host's, in f64, on every backend: which taxels connect is a search, not a
+//! sum, and it is made only where it is asked for. The pressures are the backend's own.
 //!
-//! **Bound.** Where it is certain which taxels are pressed, it is certain which touches there are. A total carries its
-//! pressures' 2u; a mean 2u above and below of places that lie within the unit. Where a pull wP may be off by ε more than
-//! 2u of itself, with r the largest ε/wP, a total is off by r of itself more, and a mean by at most r/(1 − r) of the 2 that
-//! places lie apart.
+//! **Doubt.** Where it is certain which taxels are pressed, it is certain which touches there are.
 //!
 //! Identities are certain while every choice between claims is. With e the whole error of a pull, Σ min(P, P′) is off by
 //! Σ max(e, e′) at most and a mean by Σ e‖x − c‖/(S − Σ e). In doubt are two claims of one touch that differ by less than
@@ -27,27 +24,6 @@ use super::{SLACK, U};
 
 /// How many spacings a touch may jump between frames without sharing a taxel, and still be the same.
 const LEAP: f64 = 3.0;
-
-/// How far a coordinate of a touch's mean may be off, in the unit; relatively, its total by half of it.
-const BOUND: f64 = SLACK * 4.0 * U;
-
-/// How far a single-precision touch may be off.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct TouchBound {
-    /// Relatively.
-    pub(crate) total: f64,
-    /// Per coordinate, as a length.
-    pub(crate) place: f64,
-    /// As a distance on the surface.
-    pub(crate) position: f64,
-}
-
-/// The bound, in the unit, of touches whose pulls are off by up to `lost` of themselves more than 2u. How far that is on the
-/// surface is the field's to say.
-pub(crate) fn bound(lost: f64) -> TouchBound {
-    let moved = if lost < 0.5 { 2.0 * lost / (1.0 - lost) } else { 2.0 };
-    TouchBound { total: 0.5 * BOUND + SLACK * lost, place: BOUND + SLACK * moved, position: 0.0 }
-}
 
 /// What the doubt about a field's identities hangs on.
 #[derive(Clone, Debug, Default)]

@@ -9,8 +9,8 @@ use crate::common::{backends, frame};
 /// Everything a frame's percepts say, with numbers as bits.
 pub(crate) fn bits(percepts: &Percepts, frame: usize) -> Vec<String> {
     // f64's `{:?}` prints the shortest number that reads back to the same bits.
-    let touches = |field| percepts.field_touches(frame, field);
-    percepts.frame(frame).map(|p| format!("{} {p:?} {:?}", percepts.t_s(frame), touches(p.field))).collect()
+    let of_fields = percepts.frame(frame).map(|p| format!("{} {p:?}", percepts.t_s(frame)));
+    of_fields.chain([format!("{:?}", percepts.touches(frame))]).collect()
 }
 
 fn run(body: &Body, kind: BackendKind, frames: &[Frame], cut: usize, ids: Option<&[u32]>) -> Vec<Vec<String>> {

@@ -5,7 +5,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::{DQuat, DVec3};
 use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
 use somatic::scene::Knobs;
-use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue, Scene};
+use somatic::{
+    BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue, Scene, touch,
+};
 
 use crate::common::{Flat, backends, frame, ways};
 
@@ -54,10 +56,7 @@ fn every_output_can_be_asked_for_alone() {
             assert!(agreement.holds(), "{outputs:?} on {backend:?}: {agreement}");
             let mut compared =
                 agreement.quantities.keys().filter(|name| !["flags", "contact"].contains(&name.as_str()));
-            let of = |name: &str| Outputs::named(name.split('.').next().unwrap_or_default());
-            // Contacts are made of touches.
-            let brings = |name: &str| outputs == Outputs::SELF_CONTACTS && of(name) == Some(Outputs::TOUCHES);
-            assert!(compared.all(|name| of(name) == Some(outputs) || brings(name)), "{agreement}");
+            assert!(compared.all(|name| Outputs::named(name) == Some(outputs)), "{agreement}");
             seen.push(percepts.get(1, 0).flags);
         }
         assert!(seen.windows(2).all(|pair| pair[0] == pair[1]), "{outputs:?}: {seen:?}");
@@ -487,7 +486,7 @@ fn a_taxel_that_measures_something_else_is_left_out_and_named() {
     told.values[3] = RawValue::FAULTY;
     let untold = frame(0.0, &[3.0, 1.0, 0.0, 0.0]);
     for backend in backends() {
-        let scene = Scene::default().outputs(Outputs::USUAL | Outputs::TOUCHES);
+        let scene = Scene::default().touches(touch::Options::default());
         let engine = |body: &Body| Engine::new(body, Options::default().backend(backend).scene(scene.clone())).unwrap();
         let (mut mixed, mut pressures) = (engine(&body), engine(&plain));
         assert_eq!(mixed.plan().fields().map(|(name, _)| name.to_owned()).collect::<Vec<_>>(), ["field"]);
@@ -525,12 +524,13 @@ fn nothing_is_kept_over_a_restart_of_time() {
                 (back_or_on + 0.2, hard),
                 (3.0 * back_or_on, hard),
             ]);
-            let scene = Scene::default().outputs(Outputs::USUAL | Outputs::TOUCHES);
+            let asked = touch::Options { on: 5.0, off: 1.0, ..touch::Options::default() };
+            let scene = Scene::default().touches(asked);
             let options = Options::default().backend(backend).scene(scene).calibration(calibration.clone());
             let mut engine = Engine::new(&body, options.clone()).unwrap();
             let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
             assert!(agreement.holds(), "{agreement}");
-            let id = |index: usize| percepts.field_touches(index, 0).first().map(|touch| touch.id);
+            let id = |index: usize| percepts.touches(index).unwrap().touches.first().map(|touch| touch.id);
             let ids: Vec<Option<u64>> = (0..7).map(id).collect();
             // A stamp that repeats is no restart; identities are never used again.
             assert_eq!(ids, [Some(1), Some(1), None, Some(2), Some(2), Some(2), Some(3)], "{backend:?}, {back_or_on}");
@@ -543,10 +543,7 @@ fn nothing_is_kept_over_a_restart_of_time() {
             let mut alone = Engine::new(&body, options).unwrap();
             for (index, frame) in frames.iter().enumerate() {
                 let one = alone.process_one(frame).unwrap();
-                assert_eq!(
-                    (one.get(0, 0), one.field_touches(0, 0)),
-                    (whole.get(index, 0), whole.field_touches(index, 0))
-                );
+                assert_eq!((one.get(0, 0), one.touches(0)), (whole.get(index, 0), whole.touches(index)));
             }
         }
     }

@@ -2,10 +2,10 @@
 //!
 //! `SOMATIC_SEEDS=30 cargo test --release --test it fit_cells -- --nocapture` prints the table of docs/fit.md.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use somatic::scene::Scene;
 use somatic::source::{SimulatedSource, Source, Truth};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, TouchOutputs, touch};
 
 use crate::common::Flat;
 
@@ -122,8 +122,8 @@ impl Cell {
         calibration += &format!("\n[layer]\nsigma_m = {}\ngain_spread = {spread}\n", self.sigma_m * self.believed);
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let calibration = Calibration::parse(&calibration, &ids).unwrap();
-        let scene =
-            Scene::default().outputs(Outputs::FIT | Outputs::TOUCHES | Outputs::PRINCIPAL_AXIS).fields(["grid"]);
+        let asked = touch::Options { outputs: TouchOutputs::all(), ..touch::Options::default() };
+        let scene = Scene::default().outputs(Outputs::TOTAL).touches(asked).fields(["grid"]);
         let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(256);
         let mut engine = Engine::new(body, options).unwrap();
         engine.set_channels(source.taxels()).unwrap();
@@ -137,20 +137,21 @@ impl Cell {
         let percepts = engine.process(&frames).unwrap();
         let mut errors = Errors::default();
         for (frame, truth) in truths.iter().enumerate() {
-            let touches = percepts.field_touches(frame, 0);
+            let touches = &percepts.touches(frame).unwrap().touches;
             for touch in touches {
-                let centroid = DVec2::from_array(touch.centroid.unwrap());
+                let centroid = flat(touch.position);
                 let near = |a: &(DVec2, Option<f64>)| a.0.distance(centroid);
                 let Some(&(place, angle)) = truth.iter().min_by(|a, b| near(a).total_cmp(&near(b))) else { continue };
                 errors.touches += 1;
                 let Some(fit) = touch.fit else { continue };
-                let (moments, fitted) = match (angle, percepts.get(frame, 0).principal_axis, fit.angle) {
-                    (Some(truth), Some(axis), Some(fit)) if touches.len() == 1 => {
-                        (between(axis, truth), between(fit, truth))
+                let angle_of = |line: DVec3| flat(line).to_angle();
+                let (moments, fitted) = match (angle, touch.principal_axis, fit.direction) {
+                    (Some(truth), Some(axis), Some(fit)) => {
+                        (between(angle_of(axis), truth), between(angle_of(fit), truth))
                     }
-                    // A field has one axis, and a point no angle.
+                    // A point has no angle.
                     (Some(_), ..) => continue,
-                    (None, ..) => (centroid.distance(place), DVec2::from_array(fit.place).distance(place)),
+                    (None, ..) => (centroid.distance(place), flat(fit.place).distance(place)),
                 };
                 errors.given += 1;
                 errors.moments += moments * moments;
@@ -159,6 +160,11 @@ impl Cell {
         }
         errors
     }
+}
+
+/// The grid lies in its link's x and −z.
+fn flat(p: DVec3) -> DVec2 {
+    DVec2::new(p.x, -p.z)
 }
 
 /// Sums of squares over some touches.

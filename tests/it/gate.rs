@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use somatic::scene::{Coverage, Knobs};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Percept, RawValue, Scene};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, RawValue, Scene};
 
 use crate::common::Flat;
 
@@ -17,8 +17,8 @@ fn engine(coverage: Coverage, calibration: Option<&str>) -> Engine {
 /// All that a call gives, to the last bit: numbers are written with as many digits as tell them apart.
 fn bits(engine: &mut Engine, frame: &Frame) -> Vec<String> {
     let percepts = engine.process(std::slice::from_ref(frame)).unwrap();
-    let said = |percept: Percept, touches: &[somatic::FieldTouch]| format!("{percept:?} {touches:?}");
-    (0..percepts.fields()).map(|field| said(percepts.get(0, field), percepts.field_touches(0, field))).collect()
+    let of_fields = percepts.frame(0).map(|percept| format!("{percept:?}"));
+    of_fields.chain([format!("{:?}", percepts.touches(0))]).collect()
 }
 
 /// A step of a skin's life: from which taxel on how many change, and to what.

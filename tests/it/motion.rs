@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use somatic::scene::{Arithmetic, Cadence, MotionFilter};
-use somatic::{Body, Calibration, Engine, FieldTouch, Flags, Frame, Options, Outputs, Percept, Scene};
+use somatic::{Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Scene, Touch, touch};
 
 use crate::common::{Flat, backends, frame, ways};
 
@@ -160,18 +160,18 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
     ];
     for backend in backends() {
         for cut in [1, frames.len()] {
-            let scene = Scene::default().outputs(Outputs::TOUCHES | Outputs::CENTROID);
+            let scene = Scene::default().outputs(Outputs::CENTROID).touches(touch::Options::default());
             let mut engine = Engine::new(&cross(), Options::default().backend(backend).scene(scene)).unwrap();
-            let mut seen: Vec<Vec<FieldTouch>> = Vec::new();
+            let mut seen: Vec<Vec<Touch>> = Vec::new();
             let mut several = Vec::new();
             for part in frames.chunks(cut) {
                 let (percepts, agreement) = engine.process_and_compare(part).unwrap();
                 assert!(agreement.holds(), "{backend:?}: {agreement}");
-                seen.extend((0..part.len()).map(|frame| percepts.field_touches(frame, 0).to_vec()));
+                seen.extend((0..part.len()).map(|frame| percepts.touches(frame).unwrap().touches.clone()));
                 several.extend((0..part.len()).map(|frame| percepts.get(frame, 0).flags.contains(Flags::SEVERAL)));
             }
-            let told = |touches: &[FieldTouch]| -> Vec<(u64, f64, u32, f64)> {
-                touches.iter().map(|t| (t.id, t.total, t.active, t.centroid.unwrap()[0])).collect()
+            let told = |touches: &[Touch]| -> Vec<(u64, f64, u32, f64)> {
+                touches.iter().map(|t| (t.id, t.total, t.active, t.centre.x)).collect()
             };
             assert_eq!(told(&seen[0]), [(1, 4.0, 2, -3.5), (2, 6.0, 1, 4.0)]);
             assert_eq!(told(&seen[1]), [(1, 4.0, 1, -3.0), (2, 6.0, 1, 3.0)]);
@@ -179,11 +179,11 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
             assert!(seen[3].is_empty());
             assert_eq!(told(&seen[4]), [(3, 6.0, 1, 3.0)]);
             assert_eq!(several, [true, true, false, false, false]);
-            assert_eq!(seen[0][1].position, Some([4.0, 0.0, 0.0]));
+            assert!(seen[0][1].position.distance(glam::DVec3::new(4.0, 0.0, 0.0)) < 1e-9);
         }
         let mut usual = Engine::new(&cross(), Options::default().backend(backend)).unwrap();
         let percepts = usual.process(&frames).unwrap();
-        assert!(percepts.field_touches(0, 0).is_empty() && !percepts.get(0, 0).flags.contains(Flags::SEVERAL));
+        assert!(percepts.touches(0).is_none() && !percepts.get(0, 0).flags.contains(Flags::SEVERAL));
     }
 }
 

@@ -21,8 +21,6 @@ pub(super) struct Scale {
     pub(super) largest_total: f64,
     /// The unit of P.
     pub(super) unit: PrintedUnit,
-    /// Number of separate touches of the field.
-    pub(super) touches: usize,
 }
 
 /// A unit of P as people read it.
@@ -84,14 +82,13 @@ const fn column(heading: &'static str, width: usize, outputs: Outputs, gives_way
     Column { heading, width, outputs, gives_way, text }
 }
 
-const COLUMNS: [Column; 12] = [
+const COLUMNS: [Column; 11] = [
     column("total", 9, Outputs::TOTAL, 0, |p, scale| p.total.map(|total| scale.of_p(total))),
     column("", BAR_WIDTH, Outputs::TOTAL, 3, bar),
     column("peak", 8, Outputs::PEAK, 6, |p, scale| p.peak.map(|peak| scale.of_p(peak))),
     column("force N", 8, Outputs::FORCE, 1, |p, _| p.force.map(number)),
     column("active", 6, Outputs::ACTIVE, 4, |p, _| p.active.map(|active| active.to_string())),
     column("area mm²", 8, Outputs::AREA, 8, |p, _| p.area.map(|area| format!("{:.1}", area * 1e6))),
-    column("touches", 7, Outputs::TOUCHES, 3, |_, beside| Some(beside.touches.to_string())),
     column("u    v mm", 13, Outputs::CENTROID, 1, |p, _| p.centroid.map(|centroid| places(&centroid))),
     column("x      y      z mm", 20, Outputs::POSITION, 7, |p, _| p.position.map(|place| places(&place))),
     column("angle", 6, Outputs::ORIENTATION, 2, |p, _| p.orientation.map(line)),

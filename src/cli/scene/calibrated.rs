@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use somatic::limits::{self, MAX_TOML_BYTES};
+use somatic::scene::AskedOutputs;
 use somatic::signal::Quantity;
 use somatic::source::{SimulatedSource, SourceSpec};
-use somatic::{Body, Calibration, Error, Outputs, Result, touch};
+use somatic::{Body, Calibration, Error, Outputs, Receptor, Result, touch};
 
 use super::RunOptions;
 use crate::cli::attached;
@@ -29,9 +30,12 @@ impl RunOptions {
     }
 
     /// What is asked of touches of the whole body; `None` looks for none.
-    pub(super) fn touches(&self) -> Option<touch::Options> {
-        let outputs = self.outputs.iter().copied().reduce(|a, b| a | b)?.of_body()?;
-        Some(self.touch.unwrap_or_default().options(outputs))
+    pub(in crate::cli) fn touches(&self) -> Option<touch::Options> {
+        let outputs = AskedOutputs::all_of(&self.outputs).of_touches?;
+        // Nobody has asked for them, and there are no pressures to find them in.
+        let is_in_vain =
+            self.outputs.is_empty() && !self.letters.is_empty() && !self.letters.contains(&Receptor::Sustained);
+        (!is_in_vain).then(|| self.touch.unwrap_or_default().options(outputs))
     }
 
     /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation and an export

@@ -20,8 +20,8 @@ pub(super) fn output_names(schema: &mut schemars::Schema) {
 pub(in crate::cli) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
-        "Compute only these quantities: {}; touches.NAME adds one to those of touches [default: all but touches, self_contacts, speed_in_world, filtered_*, fit_* and \
-         *_sigma; force only where P has a unit]",
+        "Compute only these quantities: touches, which touches.NAME adds to; and of fields {} [default: touches, and of fields all but \
+         self_contacts, speed_in_world, filtered_*, fit_* and *_sigma; force only where P has a unit]",
         names.join(", ")
     )
 }

@@ -175,8 +175,8 @@ impl Builder {
             TableType::Words => Self::Words(ListBuilder::new(StringBuilder::new())),
             TableType::Word => {
                 let word = |name: &FieldNames| match column.value {
-                    ValueOf::Field | ValueOf::SideField(_) => Some(name.field.clone()),
-                    ValueOf::Link | ValueOf::SideLink(_) => Some(name.link.clone()),
+                    ValueOf::Field => Some(name.field.clone()),
+                    ValueOf::Link => Some(name.link.clone()),
                     ValueOf::Letter => name.letter.clone(),
                     ValueOf::Signal => name.signal.clone(),
                     _ => None,
@@ -189,8 +189,11 @@ impl Builder {
                         let world = skin.filter(|_| of == OfTouch::In).map(|skin| skin.world.as_str());
                         links.chain(world).collect()
                     }
+                    ValueOf::SideLink(_) => {
+                        skin.into_iter().flat_map(|skin| skin.links.iter().map(String::as_str)).collect()
+                    }
                     ValueOf::Link => names.first().map(|name| name.world.as_str()).into_iter().collect(),
-                    ValueOf::Output(..) | ValueOf::TouchFit(..) => ContactKind::ALL.map(ContactKind::name).to_vec(),
+                    ValueOf::Output(..) => ContactKind::ALL.map(ContactKind::name).to_vec(),
                     _ => Vec::new(),
                 };
                 let (mut words, mut key_of) = (Vec::new(), HashMap::new());

@@ -113,7 +113,7 @@ impl CsvSink {
                     }
                 }
                 (Rows::PerFrame(columns), Some(file)) => {
-                    let first = Row { percepts, frame, field: 0, touch: None, on_skin: None, contact: None };
+                    let first = Row { percepts, frame, field: 0, on_skin: None, contact: None };
                     for column in 0..file.columns.len() {
                         file.field(&first, file.columns[column].kind, file.columns[column].value, words)?;
                     }

@@ -20,7 +20,7 @@ pub use parquet_sink::ParquetSink;
 pub(super) use path_beside::path_beside;
 pub use row::{TableColumn, TableType};
 
-use self::names::{U_AND_V, X_Y_AND_Z, suffixes, unit_of};
+use self::names::{X_Y_AND_Z, suffixes, unit_of};
 use self::row::{Row, ValueOf};
 use super::{FieldNames, Session};
 use crate::percept::{Column, Outputs, Percepts, Unit};
@@ -98,41 +98,10 @@ fn kind_of(column: &Column, session: &Session<'_>) -> TableType {
     }
 }
 
-/// The columns of a session's touches, one row each: of the whole body where they are looked for, else of fields.
+/// The columns of a session's touches, one row each; none where it looks for none.
 #[must_use]
 pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
-    if let Some(skin) = session.skin() {
-        return on_skin::columns(skin.outputs, session);
-    }
-    let p = unit_of(Unit::P, session);
-    let mut columns = keys(&session.names);
-    let id = "Lasts from onset to release, and is never used again for the field.";
-    columns.push(TableColumn::new("id", "", TableType::U64, id, ValueOf::TouchId));
-    columns.push(TableColumn::new("total", &p, TableType::F64, "Σ wᵢPᵢ over its taxels.", ValueOf::TouchTotal));
-    columns.push(TableColumn::new("active", "1", TableType::U32, "Number of its taxels.", ValueOf::TouchActive));
-    for (component, suffix) in U_AND_V.into_iter().enumerate() {
-        let (name, help) =
-            (format!("centroid_{suffix}"), "Its centroid in the field's chart; absent where it has none.");
-        let value = ValueOf::TouchCentroid(component);
-        columns.push(TableColumn::new(&name, "m", TableType::F64, help, value).or_absent());
-    }
-    for (component, suffix) in X_Y_AND_Z.into_iter().enumerate() {
-        let name = format!("position_{suffix}");
-        columns.push(TableColumn::new(
-            &name,
-            "m",
-            TableType::F64,
-            "The same point on the surface.",
-            ValueOf::TouchPosition(component),
-        ));
-    }
-    let fit = session.outputs.of_each_touch();
-    columns.extend(columns_of(fit, session, ValueOf::TouchFit));
-    if !fit.is_empty() {
-        let help = "Why its fit, or a part of it, is absent, by name.";
-        columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
-    }
-    columns
+    session.skin().map_or(Vec::new(), |skin| on_skin::columns(skin.outputs, session))
 }
 
 /// The columns of a session's self-contacts, one row each.
@@ -144,15 +113,13 @@ pub fn self_contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
         TableColumn::new("frame", "", TableType::U64, "Number of the frame, from 0.", ValueOf::Frame),
         TableColumn::new("id", "", TableType::U64, "Lasts as long as both touches.", ValueOf::ContactId),
     ];
-    columns.extend(letter_columns(&session.names));
     for (side, letter) in ["a", "b"].into_iter().enumerate() {
         let mut column = |name: &str, unit: &str, kind, help: &str, value| {
             columns.push(TableColumn::new(&format!("{name}_{letter}"), unit, kind, help, value));
         };
-        column("field", "", TableType::Word, "Name of the field on this side.", ValueOf::SideField(side));
-        column("link", "", TableType::Word, "The link that it is on.", ValueOf::SideLink(side));
+        column("link", "", TableType::Word, "The link on this side.", ValueOf::SideLink(side));
         column("touch", "", TableType::U64, "The `id` of its touch.", ValueOf::SideTouch(side));
-        column("total", &p, TableType::F64, "Σ wᵢPᵢ over the touch's taxels.", ValueOf::SideTotal(side));
+        column("total", &p, TableType::F64, "ΣP over the touch's taxels.", ValueOf::SideTotal(side));
     }
     for (component, suffix) in X_Y_AND_Z.into_iter().enumerate() {
         let (name, help) = (format!("position_{suffix}"), "Halfway between the places of both touches, in the world.");
@@ -160,43 +127,24 @@ pub fn self_contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
     }
     let help = "How far these places are apart.";
     columns.push(TableColumn::new("distance", "m", TableType::F64, help, ValueOf::ContactDistance));
-    let help = "Between the outward normals there, π where they oppose; absent where a field has no chart.";
-    columns.push(TableColumn::new("angle", "rad", TableType::F64, help, ValueOf::ContactAngle).or_absent());
+    let help = "Between the outward normals there, π where they oppose.";
+    columns.push(TableColumn::new("angle", "rad", TableType::F64, help, ValueOf::ContactAngle));
     columns
 }
 
 /// The rows of a frame: its fields in contact, or all.
 fn rows(percepts: &Percepts, frame: usize, all_fields: bool) -> impl Iterator<Item = Row<'_>> {
     let listed = move |&field: &usize| all_fields || percepts.in_contact(frame, field);
-    (0..percepts.fields()).filter(listed).map(move |field| Row {
-        percepts,
-        frame,
-        field,
-        touch: None,
-        on_skin: None,
-        contact: None,
-    })
+    (0..percepts.fields()).filter(listed).map(move |field| Row { percepts, frame, field, on_skin: None, contact: None })
 }
 
-/// The rows of a frame's touches: of the whole body where they are looked for, else of fields.
+/// The rows of a frame's touches.
 fn touch_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>> {
-    let on_skin = on_skin::rows(percepts, frame);
-    let of_body = on_skin.is_some();
-    let of_fields = rows(percepts, frame, false).filter(move |_| !of_body).flat_map(move |row| {
-        percepts.field_touches(frame, row.field).iter().map(move |touch| Row { touch: Some(touch), ..row })
-    });
-    on_skin.into_iter().flatten().chain(of_fields)
+    on_skin::rows(percepts, frame).into_iter().flatten()
 }
 
 /// The rows of a frame's self-contacts.
 fn self_contact_rows(percepts: &Percepts, frame: usize) -> impl Iterator<Item = Row<'_>> {
     let self_contacts = percepts.self_contacts(frame).unwrap_or_default().iter();
-    self_contacts.map(move |contact| Row {
-        percepts,
-        frame,
-        field: contact.sides[0].field,
-        touch: None,
-        on_skin: None,
-        contact: Some(contact),
-    })
+    self_contacts.map(move |contact| Row { percepts, frame, field: 0, on_skin: None, contact: Some(contact) })
 }

@@ -64,7 +64,6 @@ pub(super) fn columns(outputs: TouchOutputs, session: &Session<'_>) -> Vec<Table
 /// The rows of a frame's touches; `None` where none are looked for.
 pub(super) fn rows(percepts: &Percepts, frame: usize) -> Option<impl Iterator<Item = Row<'_>>> {
     let found = percepts.touches(frame)?;
-    let row =
-        move |on_skin| Row { percepts, frame, field: 0, touch: None, on_skin: Some((found, on_skin)), contact: None };
+    let row = move |on_skin| Row { percepts, frame, field: 0, on_skin: Some((found, on_skin)), contact: None };
     Some(found.touches.iter().map(row))
 }

@@ -2,9 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::percept::{
-    Column, ContactKind, FieldTouch, Flags, Percepts, SelfContact, TOUCH_COLUMNS, Touch, TouchFlags, TouchFrame,
-};
+use crate::percept::{Column, ContactKind, Flags, Percepts, SelfContact, TOUCH_COLUMNS, Touch, TouchFlags, TouchFrame};
 use crate::sink::{FieldNames, Session, SkinNames};
 
 /// A column of a table.
@@ -72,17 +70,10 @@ pub(super) enum ValueOf {
     Output(&'static Column, usize),
     Flags,
     OnSkin(OfTouch),
-    TouchId,
-    TouchTotal,
-    TouchActive,
-    TouchCentroid(usize),
-    TouchPosition(usize),
-    TouchFit(&'static Column, usize),
     ContactId,
     ContactPosition(usize),
     ContactDistance,
     ContactAngle,
-    SideField(usize),
     SideLink(usize),
     SideTouch(usize),
     SideTotal(usize),
@@ -154,9 +145,7 @@ pub(super) struct Row<'a> {
     pub(super) percepts: &'a Percepts,
     pub(super) frame: usize,
     pub(super) field: usize,
-    /// In the table of fields' touches.
-    pub(super) touch: Option<&'a FieldTouch>,
-    /// In the table of touches of the whole body.
+    /// In the table of touches.
     pub(super) on_skin: Option<(&'a TouchFrame, &'a Touch)>,
     /// In the table of self-contacts.
     pub(super) contact: Option<&'a SelfContact>,
@@ -181,13 +170,9 @@ impl Row<'_> {
             ValueOf::OnSkin(OfTouch::Number(column, component)) => {
                 Some(TOUCH_COLUMNS[column].value(self.on_skin?.1)?[component])
             }
-            ValueOf::TouchTotal => self.touch.map(|touch| touch.total),
-            ValueOf::TouchCentroid(component) => self.touch?.centroid.map(|centroid| centroid[component]),
-            ValueOf::TouchPosition(component) => self.touch?.position.map(|position| position[component]),
-            ValueOf::TouchFit(column, component) => Some(self.touch?.value(column)?[component]),
             ValueOf::ContactPosition(component) => self.contact.map(|contact| contact.position[component]),
             ValueOf::ContactDistance => self.contact.map(|contact| contact.distance),
-            ValueOf::ContactAngle => self.contact?.angle,
+            ValueOf::ContactAngle => self.contact.map(|contact| contact.angle),
             ValueOf::SideTotal(side) => self.contact.map(|contact| contact.sides[side].total),
             _ => None,
         }
@@ -198,10 +183,8 @@ impl Row<'_> {
             ValueOf::Frame => Some(self.percepts.frame_number(self.frame)),
             ValueOf::OnSkin(OfTouch::Id) => self.on_skin.map(|(_, touch)| touch.id),
             ValueOf::OnSkin(OfTouch::Active) => self.on_skin.map(|(_, touch)| touch.active.into()),
-            ValueOf::TouchId => self.touch.map(|touch| touch.id),
             ValueOf::ContactId => self.contact.map(|contact| contact.id),
             ValueOf::SideTouch(side) => self.contact.map(|contact| contact.sides[side].touch),
-            ValueOf::TouchActive => self.touch.map(|touch| touch.active.into()),
             ValueOf::Output(..) => self.float(value).map(|number| number as u64),
             _ => None,
         }
@@ -220,8 +203,7 @@ impl Row<'_> {
             ValueOf::Link => Some(self.link(names)),
             ValueOf::Letter => name.letter.as_deref(),
             ValueOf::Signal => name.signal.as_deref(),
-            ValueOf::SideField(side) => Some(&names[self.contact?.sides[side].field].field),
-            ValueOf::SideLink(side) => Some(&names[self.contact?.sides[side].field].link),
+            ValueOf::SideLink(side) => words.link(self.contact?.sides[side].link),
             _ => self.float(value).and_then(|kind| ContactKind::ALL.get(kind as usize)).map(|kind| kind.name()),
         }
     }
@@ -229,8 +211,7 @@ impl Row<'_> {
     /// The words in a column of lists, in their order.
     pub(super) fn list<'n>(&self, value: ValueOf, words: &'n Words) -> Vec<Cow<'n, str>> {
         let Some((found, touch)) = self.on_skin else {
-            // Those of the touch in a table of touches.
-            let own = self.touch.map_or_else(|| self.percepts.flags(self.frame, self.field), |touch| touch.flags);
+            let own = self.percepts.flags(self.frame, self.field);
             return words.flags.iter().filter(|(flag, _)| own.contains(*flag)).map(|(_, name)| name.into()).collect();
         };
         match value {
