@@ -50,5 +50,5 @@ pub use stored_edges::{EdgeRow, StoredEdges};
 pub use surface::{Hit, SurfaceIndex};
 pub(crate) use surface::{PointTree, area_vector, nearest_on_triangle, point_tree};
 pub use taxel_table::{TaxelRow, read_taxel_table, taxel_table};
-pub(crate) use topology::next;
 pub use topology::{Flaws, NONE, Topology};
+pub(crate) use topology::{QuickHasher, next};

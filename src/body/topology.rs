@@ -16,7 +16,7 @@ const MIN_HEIGHT: f64 = 1e-9;
 
 /// Hashes whole numbers of a mesh, millions at once: three times as fast as the standard hasher, which guards against keys that are
 /// chosen to collide.
-type Quick = rustc_hash::FxBuildHasher;
+pub(crate) type QuickHasher = rustc_hash::FxBuildHasher;
 
 /// No triangle, vertex or part.
 pub const NONE: u32 = u32::MAX;
@@ -82,8 +82,8 @@ impl Topology {
         let side = 8.0 * within;
         let cube = |p: DVec3| (p / side).floor().to_array().map(|steps| steps as i64);
         // By group and cube its last vertex, and by vertex the one before in its cube.
-        let mut last: HashMap<(u32, [i64; 3]), u32, Quick> =
-            HashMap::with_capacity_and_hasher(positions.len() / 2, Quick::default());
+        let mut last: HashMap<(u32, [i64; 3]), u32, QuickHasher> =
+            HashMap::with_capacity_and_hasher(positions.len() / 2, QuickHasher::default());
         let mut before: Vec<u32> = Vec::new();
         for (&p, given) in positions.iter().zip(0..) {
             if !p.is_finite() {
@@ -113,7 +113,8 @@ impl Topology {
     }
 
     fn take(&mut self, triangles: &[[u32; 3]]) {
-        let mut seen: HashSet<[u32; 3], Quick> = HashSet::with_capacity_and_hasher(triangles.len(), Quick::default());
+        let mut seen: HashSet<[u32; 3], QuickHasher> =
+            HashSet::with_capacity_and_hasher(triangles.len(), QuickHasher::default());
         for (index, triangle) in triangles.iter().enumerate() {
             let corners = triangle.map(|v| self.welded.get(v as usize).copied().unwrap_or(NONE));
             let [a, b, c] = corners;

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::cells::Cells;
 use super::geodesic::SurfacePlace;
-use super::seats::{Group, Seat, seat};
+use super::seats::{Group, Seat, Seated};
 use crate::body::{Body, Modality};
 
 /// Which part of a body's surface belongs to which taxel.
@@ -19,15 +19,14 @@ pub(crate) struct CellSurface {
 }
 
 impl CellSurface {
-    /// The cells of the pressure taxels of `body`.
-    pub(crate) fn new(body: &Body) -> Self {
+    /// The cells of the pressure taxels of `body`, whose taxels are `seated`.
+    pub(crate) fn new(body: &Body, seated: &Seated) -> Self {
         let is_node = |taxel: usize| body.taxels[taxel].modality == Modality::Pressure;
         let nodes: Vec<usize> = (0..body.taxels.len()).filter(|&taxel| is_node(taxel)).collect();
-        let groups = Group::all(body, nodes.iter().map(|&taxel| body.taxels[taxel].link));
-        let mut within: Vec<Vec<(usize, SurfacePlace)>> = vec![Vec::new(); groups.len()];
+        let mut within: Vec<Vec<(usize, SurfacePlace)>> = vec![Vec::new(); seated.groups.len()];
         for &taxel in &nodes {
-            if let Some(Seat { group, place }) = seat(body, &groups, &body.taxels[taxel]) {
-                within[group].push((taxel, place));
+            if let Some(Seat { group, place }) = &seated.seats[taxel] {
+                within[*group].push((taxel, *place));
             }
         }
         let mut surface = Self {
@@ -35,7 +34,7 @@ impl CellSurface {
             cell_of: (0..body.taxels.len() as u32).collect(),
             triangles: Vec::new(),
         };
-        for (group, seats) in groups.iter().zip(within) {
+        for (group, seats) in seated.groups.iter().zip(within) {
             surface.add(body, group, seats);
         }
         surface

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::geodesic::SurfacePlace;
 use super::link_surface::LinkSurface;
-use super::seats::{Group, seat};
+use super::seats::{Seat, Seated};
 use crate::body::{Body, Taxel, area_vector};
 
 /// Surface up to this distance from a taxel counts, m.
@@ -25,16 +25,21 @@ const MAX_CUTS: u32 = 40;
 /// counts. Without such a surface it is the taxel's own normal.
 #[must_use]
 pub fn mean_normals(body: &Body) -> Vec<DVec3> {
-    let groups = Group::all(body, body.taxels.iter().map(|taxel| taxel.link));
-    let mean = |taxel: &Taxel| {
-        let seat = seat(body, &groups, taxel)?;
-        let group = &groups[seat.group];
+    mean_normals_of(body, &Seated::new(body))
+}
+
+/// The same of taxels that are `seated`.
+pub(crate) fn mean_normals_of(body: &Body, seated: &Seated) -> Vec<DVec3> {
+    let mean = |(taxel, seat): (&Taxel, &Option<Seat>)| {
+        let seat = seat.as_ref()?;
+        let group = &seated.groups[seat.group];
         let anchor_from_link = body.rest_transform(group.anchor, taxel.link);
         let own = anchor_from_link.transform_vector3(taxel.normal_in_link);
         let mean = mean_normal(&group.surface, &seat.place, own)?;
         Some(body.rest_transform(taxel.link, group.anchor).transform_vector3(mean))
     };
-    body.taxels.iter().map(|taxel| mean(taxel).unwrap_or(taxel.normal_in_link)).collect()
+    let taxels = body.taxels.iter().zip(&seated.seats);
+    taxels.map(|(taxel, seat)| mean((taxel, seat)).unwrap_or(taxel.normal_in_link)).collect()
 }
 
 /// The mean normal around `place`, on the side that `own` faces.

@@ -46,6 +46,21 @@ fn carriers(home: &Home) -> Vec<usize> {
     }
 }
 
+/// The surfaces of a body at rest, and where its taxels are on them.
+pub(crate) struct Seated {
+    pub(super) groups: Vec<Group>,
+    /// Per taxel of the body; `None` for one on no surface.
+    pub(super) seats: Vec<Option<Seat>>,
+}
+
+impl Seated {
+    pub(crate) fn new(body: &Body) -> Self {
+        let groups = Group::all(body, body.taxels.iter().map(|taxel| taxel.link));
+        let seats = body.taxels.iter().map(|taxel| seat(body, &groups, taxel)).collect();
+        Self { groups, seats }
+    }
+}
+
 /// A taxel's place on the surface of a group.
 pub(super) struct Seat {
     pub(super) group: usize,

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::skin::{Reading, Skin, SkinParts, SkinTaxel};
 use crate::body::{Body, Modality, point_tree};
-use crate::field::{CellSurface, TaxelGraph, mean_normals};
+use crate::field::{CellSurface, Seated, TaxelGraph, mean_normals_of};
 
 impl Skin {
     /// The skin of `body`, whose graph is `graph`, with the readings `reading` of its pressure taxels, by their indices in the body.
@@ -19,7 +19,10 @@ impl Skin {
         let nodes: Vec<usize> = (0..body.taxels.len()).filter(|&taxel| is_node(taxel)).collect();
         let mut node_of = vec![u32::MAX; body.taxels.len()];
         (0..).zip(&nodes).for_each(|(node, &taxel)| node_of[taxel] = node);
-        let (cells, normals, spacing_m) = (CellSurface::new(body), mean_normals(body), spacings_m(body, &nodes));
+        let seated = Seated::new(body);
+        let (cells, normals) = (CellSurface::new(body, &seated), mean_normals_of(body, &seated));
+        drop(seated);
+        let spacing_m = spacings_m(body, &nodes);
         let taxel = |(&index, spacing_m): (&usize, f64)| {
             let taxel = &body.taxels[index];
             let rest = &body.links[taxel.link].body_from_link;

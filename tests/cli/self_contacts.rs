@@ -1,6 +1,5 @@
 //! Self-contacts, against a simulation in which both skins are pressed at a known place in the world.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -168,29 +167,11 @@ fn contacts_are_there_exactly_when_both_skins_press_on_each_other() {
         assert!((distance - LAYERS_M).abs() < 0.001, "frame {index}: {contact}");
         assert!((angle - std::f64::consts::PI).abs() < 1e-6, "{contact}");
         for side in 0..2 {
-            let field =
-                frame["fields"].as_array().unwrap().iter().find(|field| field["field"] == contact["fields"][side]);
-            let touch = &field.unwrap()["touches"][0];
-            assert_eq!((&touch["id"], &touch["total"]), (&contact["touches"][side], &contact["totals"][side]));
+            let touches = frame["touches"].as_array().unwrap();
+            let touch = touches.iter().find(|touch| touch["id"] == contact["touches"][side]).unwrap();
+            assert_eq!((&touch["link"], &touch["total"]), (&contact["links"][side], &contact["totals"][side]));
         }
     }
-}
-
-#[test]
-fn contacts_of_several_letters_are_told_apart() {
-    let (plates, truth) = (Plates::new(), truth());
-    let found = plates.jointed(&plates.lines(&truth, 0.0), &["--letters", "sustained,change"]);
-    let mut letters = BTreeSet::new();
-    for frame in &found {
-        let of_frame: Vec<&str> = self_contacts(frame)
-            .iter()
-            .map(|contact| contact["letter"].as_str().unwrap_or_else(|| panic!("{contact}")))
-            .collect();
-        let different: BTreeSet<&str> = of_frame.iter().copied().collect();
-        assert_eq!(different.len(), of_frame.len(), "one contact of each: {frame}");
-        letters.extend(different);
-    }
-    assert_eq!(letters, BTreeSet::from(["change", "sustained"]));
 }
 
 #[test]
@@ -209,13 +190,13 @@ fn poses_that_are_off_and_a_tolerance_that_is_too_small_give_no_contacts() {
 }
 
 #[test]
-fn without_poses_contacts_are_absent_and_a_flag_says_why() {
+fn without_poses_contacts_are_absent() {
     let (plates, truth) = (Plates::new(), truth());
     let found = plates.run(&plates.lines(&truth, 0.0), &[]);
     for (frame, truth) in found.iter().zip(&truth) {
         assert_eq!(frame.get("self_contacts").is_some(), !(truth.lower || truth.upper), "{frame}");
-        let flags = frame["fields"].as_array().unwrap().iter().map(|field| field["flags"].as_array().unwrap());
-        assert!(flags.into_iter().all(|flags| flags.iter().any(|flag| flag == "no_pose")), "{frame}");
+        let touches = frame["touches"].as_array().unwrap();
+        assert!(touches.iter().all(|touch| touch["in"] == touch["link"]), "{frame}");
     }
     assert!(
         fails(2, &["run", "--outputs", "self_contacts", "--coordinates", "anchor"]).contains("coordinates `anchor`")
@@ -235,13 +216,13 @@ fn a_table_of_contacts_has_what_ndjson_has() {
     let mut rows = table.lines();
     assert_eq!(
         rows.next().unwrap(),
-        "t [s],frame,id,field_a,link_a,touch_a,total_a [count],field_b,link_b,touch_b,total_b [count],position_x [m],\
+        "t [s],frame,id,link_a,touch_a,total_a [count],link_b,touch_b,total_b [count],position_x [m],\
          position_y [m],position_z [m],distance [m],angle [rad]"
     );
     let row = |frame: &Value, contact: &Value| {
         let mut cells = vec![frame["t"].to_string(), frame["frame"].to_string(), contact["id"].to_string()];
         for side in 0..2 {
-            cells.extend(["fields", "links"].map(|key| contact[key][side].as_str().unwrap().to_owned()));
+            cells.push(contact["links"][side].as_str().unwrap().to_owned());
             cells.extend(["touches", "totals"].map(|key| contact[key][side].to_string()));
         }
         cells.extend((0..3).map(|axis| contact["position"][axis].to_string()));
@@ -254,7 +235,7 @@ fn a_table_of_contacts_has_what_ndjson_has() {
     assert!(Path::new(&folder.path().join("a.touches.csv")).is_file());
     let described =
         done(&["run", "--describe", "--outputs", "self_contacts", "--sink", text_of(&folder.path().join("b.csv"))]);
-    assert!(described.contains("one row per frame and self-contact") && described.contains("field_b"), "{described}");
+    assert!(described.contains("one row per frame and self-contact") && described.contains("link_b"), "{described}");
 }
 
 #[test]

@@ -323,8 +323,9 @@ fn a_dash_is_standard_output_wherever_an_output_is_named() {
     let table = |with: &str| text(&format!("{run} --outputs total,touches --sink csv:- {with}"));
     assert_eq!(table("--table fields"), at("out.csv"));
     assert_eq!(table("--table touches"), at("out.touches.csv"));
-    assert_eq!(table(""), at("out.touches.csv"), "touches where they are computed");
-    assert_eq!(text(&format!("{run} --outputs total --sink csv:-")), at("out.csv"), "fields where they are not");
+    assert_eq!(table(""), at("out.csv"), "fields where any are asked for");
+    let alone = text(&format!("{run} --outputs touches --sink csv:-"));
+    assert_eq!(alone, at("out.touches.csv"), "touches where nothing is asked of fields");
     assert!(out(&format!("{run} --sink mcap:-")).starts_with(b"\x89MCAP"));
     assert_eq!(text(&format!("{run} --sink ndjson:-")), text(&format!("{run} --sink -")));
     assert_eq!(text("convert touch.csv csv:-"), PRESSED);
@@ -336,7 +337,7 @@ fn a_dash_is_standard_output_wherever_an_output_is_named() {
         (format!("{run} --sink - --sink csv:-"), "standard output already"),
         (format!("{run} --sink csv:- --sink mcap:-"), "standard output already"),
         (format!("{run} --sink ros2-mcap:-"), "name one"),
-        (format!("{run} --sink csv:- --table touches"), "--outputs touches"),
+        (format!("{run} --outputs total --sink csv:- --table touches"), "--outputs touches"),
         (format!("{run} --sink csv:- --table fileds"), "did you mean `fields`?"),
         (format!("{run} --sink out.csv --table fields"), "--sink csv:-"),
         (format!("simulate {simulation} -o -"), "give --truth a file"),

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::body::Topology;
+use crate::body::{QuickHasher, Topology};
 
 /// Rounds of cuts, each of which halves edges: more than any surface needs.
 const MOST_ROUNDS: usize = 40;
@@ -46,7 +46,7 @@ pub(super) fn refine(
 impl Refined {
     /// Cuts long edges once; whether there was one.
     fn cut(&mut self, shortest: f64, wanted: &impl Fn(DVec3) -> f64) -> bool {
-        let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
+        let mut middles: HashMap<(u32, u32), u32, QuickHasher> = HashMap::default();
         for (&[a, b, c], _) in self.triangles.iter().zip(&self.is_new).filter(|(_, is_new)| **is_new) {
             for (from, to) in [(a, b), (b, c), (c, a)] {
                 let key = (from.min(to), from.max(to));
@@ -67,29 +67,28 @@ impl Refined {
             let [a, b, c] = corners;
             let middle = |(from, to): (u32, u32)| middles.get(&(from.min(to), from.max(to))).copied();
             let cuts = [(a, b), (b, c), (c, a)].map(middle);
-            for part in self.parts(corners, cuts) {
-                self.triangles.push(part);
-                self.parent.push(parent);
-                self.is_new.push(cuts.iter().any(Option::is_some));
-            }
+            let (parts, count) = self.parts(corners, cuts);
+            self.triangles.extend_from_slice(&parts[..count]);
+            self.parent.extend(std::iter::repeat_n(parent, count));
+            self.is_new.extend(std::iter::repeat_n(count > 1, count));
         }
         true
     }
 
-    /// The parts of a triangle whose edges are cut at `cuts`.
-    fn parts(&self, corners: [u32; 3], cuts: [Option<u32>; 3]) -> Vec<[u32; 3]> {
+    /// The parts of a triangle whose edges are cut at `cuts`, and how many they are.
+    fn parts(&self, corners: [u32; 3], cuts: [Option<u32>; 3]) -> ([[u32; 3]; 4], usize) {
         let turned = |by: usize| [0, 1, 2].map(|k| corners[(k + by) % 3]);
         let apart = |a: u32, b: u32| self.positions[a as usize].distance_squared(self.positions[b as usize]);
         match cuts {
-            [None, None, None] => vec![corners],
+            [None, None, None] => ([corners; 4], 1),
             [Some(ab), Some(bc), Some(ca)] => {
                 let [a, b, c] = corners;
-                vec![[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+                ([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]], 4)
             }
             cuts if cuts.iter().flatten().count() == 1 => {
                 let edge = cuts.iter().position(Option::is_some).unwrap_or(0);
                 let (middle, [a, b, c]) = (cuts[edge].unwrap_or(0), turned(edge));
-                vec![[a, middle, c], [middle, b, c]]
+                ([[a, middle, c], [middle, b, c], corners, corners], 2)
             }
             cuts => {
                 // Turned so that the last edge, from c to a, is whole.
@@ -100,7 +99,7 @@ impl Refined {
                     true => [[a, ab, bc], [a, bc, c]],
                     false => [[a, ab, c], [ab, bc, c]],
                 };
-                vec![[ab, b, bc], rest[0], rest[1]]
+                ([[ab, b, bc], rest[0], rest[1], corners], 3)
             }
         }
     }
