@@ -250,15 +250,18 @@ mod tests {
             for link in 0..body.links.len() {
                 // Corners and middles of edges are equally near to several triangles.
                 let triangles: Vec<[DVec3; 3]> = body.triangles_in_link(link).step_by(37).take(20).collect();
-                let places = triangles.iter().flat_map(|&[a, b, c]| [a, (a + b) / 2.0, (a + b + c) / 3.0, c * 1.1]);
-                for p in places {
+                let places = triangles.iter().flat_map(|&[a, b, c]| {
+                    let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
+                    [a, (a + b) / 2.0, (a + b + c) / 3.0, c * 1.1].map(|p| (p, normal))
+                });
+                for (p, normal) in places {
                     let one_by_one = nearest.in_link_one_by_one(link, p);
                     assert_eq!(nearest.in_link(link, p), one_by_one, "{p} in link {link}");
                     let (radius, fresh) = (0.01, Nearest::new(&body));
                     let around =
                         |nearest: &Nearest<'_>| nearest.around(link, p, radius).nearest(p + DVec3::splat(1e-3));
                     assert_eq!(around(&nearest), around(&fresh), "around {p} in link {link}");
-                    let (from, way) = (p + DVec3::splat(1e-3), DVec3::new(-0.6, 0.0, 0.8));
+                    let (from, way) = (p + DVec3::splat(1e-4), normal);
                     let pierced = |nearest: &Nearest<'_>| {
                         let hit = nearest.near(link, p, radius).along(from, way, radius)?;
                         Some((hit.position, hit.normal))

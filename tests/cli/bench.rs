@@ -121,7 +121,7 @@ fn what_is_measured_by_default_is_what_run_computes() {
         index["present_bits"].as_object().unwrap().keys().cloned().collect()
     };
     // What a percept has beside its outputs.
-    let own = ["field", "link", "contact", "flags"];
+    let own = ["field", "link", "contact", "touches", "flags"];
     let percepts = frames(&done(&["run", "--backend", "cpu", "--fields", "hand/back", "--quiet"]));
     let fields = percepts.iter().flat_map(|frame| frame["fields"].as_array().unwrap());
     let keys = fields.flat_map(|field| field.as_object().unwrap().keys().cloned());
@@ -189,7 +189,7 @@ fn what_cannot_be_measured_is_one_line() {
         (&["--wide", "61"], "61 is more than the 60 sensors"),
         (&["--frames", "100000000000"], "GiB of memory"),
         (&["--frames", "18446744073709551615"], "GiB of memory"),
-        (&["--outputs", "touches", "--dump", "x"], "touches"),
+        (&["--outputs", "self_contacts", "--dump", "x"], "self_contacts"),
     ] {
         assert_eq!(refused(more, word).lines().count(), 1);
     }
