@@ -3,13 +3,12 @@
 use super::Engine;
 use super::cadence::ChangeState;
 use super::drift_state::DriftState;
-use super::on_skin::OnSkin;
+use super::on_skin::{OnSkin, OnSkinState};
 use super::post::PostState;
 use crate::backend::BackendState;
 use crate::error::{Error, Result};
 use crate::signal::{FrameTime, IntakeState, TaxelCalibration};
 use crate::stage::layout;
-use crate::touch::TouchState;
 
 /// Everything that the next percepts depend on beside the next frames.
 ///
@@ -44,7 +43,7 @@ pub struct EngineState {
     post: PostState,
     cadence: Option<ChangeState>,
     drift: Option<DriftState>,
-    touches: Option<TouchState>,
+    touches: Option<OnSkinState>,
 }
 
 impl EngineState {
