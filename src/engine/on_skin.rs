@@ -273,7 +273,8 @@ fn sensors_are_unknown(plan: &Plan, skin: &Skin) -> Option<String> {
     };
     // Without a calibration nobody has begun to say anything.
     let is_calibrated = plan.calibrations.iter().any(|calibration| *calibration != TaxelCalibration::default());
-    let matters = is_calibrated && taxels().count() > 1 && !are_alike(|taxel| taxel.cell_m2) && !are_alike(|taxel| taxel.area_m2);
+    let matters =
+        is_calibrated && taxels().count() > 1 && !are_alike(|taxel| taxel.cell_m2) && !are_alike(|taxel| taxel.area_m2);
     matters.then(|| {
         "the calibration does not say what its sensors cover: counts weigh by the areas of taxels' cells in the place and axis of a \
          touch, as of sensors of one size; give it `sensors = \"equal\"`, or \"cell\" if each covers its cell"
