@@ -15,6 +15,7 @@ mod place;
 mod post;
 mod self_contacts;
 mod skin_fits;
+mod skin_sigmas;
 mod spread;
 mod state;
 
@@ -271,8 +272,8 @@ impl Engine {
         self.ids.binary_search(&id).ok()
     }
 
-    /// What is to be known before the first frame, a line each: taxels that no letter reads, drift that no taxel can tell, and edges
-    /// between taxels that are not those of the body's file.
+    /// What is to be known before the first frame, a line each: taxels that no letter reads, drift that no taxel can tell, edges
+    /// between taxels that are not those of the body's file, and sensors of which nothing says what they cover.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let drift = self.drift.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
@@ -280,8 +281,8 @@ impl Engine {
              and drift is taken for pressure; give the body more fields, or leave `time_constant_s` of [drift] out"
                 .to_owned()
         });
-        let edges = self.on_skin.as_ref().and_then(OnSkin::note).map(str::to_owned);
-        self.plan.left_out.remark().into_iter().chain(drift).chain(edges).collect()
+        let on_skin = self.on_skin.iter().flat_map(OnSkin::remarks).cloned();
+        self.plan.left_out.remark().into_iter().chain(drift).chain(on_skin).collect()
     }
 
     /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`] asks for them. Its nodes are what

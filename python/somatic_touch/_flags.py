@@ -77,6 +77,9 @@ class TouchFlags(_Flags):
     OFF_SKIN = 1 << 15
     POOR_FIT = 1 << 16
     NO_LAYER = 1 << 17
+    NOISE_UNKNOWN = 1 << 18
+    UNSURE = 1 << 19
+    YOUNG_FIT = 1 << 20
 
 
 Flags.__module__ = TouchFlags.__module__ = "somatic_touch"

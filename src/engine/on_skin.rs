@@ -7,7 +7,8 @@ use glam::{DAffine3, DVec3};
 
 use super::links::Links;
 use super::self_contacts::SelfContacts;
-use super::skin_fits::SkinFits;
+use super::skin_fits::{FitTrails, Moment, SkinFits};
+use super::skin_sigmas::SkinSigmas;
 use crate::backend::RawBatch;
 use crate::body::Body;
 use crate::field::TaxelGraph;
@@ -17,7 +18,7 @@ use crate::signal::{Frame, LayerResponse, Quantity, RawValue, Response, TaxelCal
 use crate::stage::fit::STEPS;
 use crate::stage::self_contacts::Memory;
 use crate::stage::{calibrate, force};
-use crate::touch::{Input, Reading, Skin, TouchState, Touches};
+use crate::touch::{Input, Reading, Skin, SkinTaxel, TouchState, Touches};
 
 /// Flags of a field that holds a taxel without a value, or with one of which something is to be said.
 const OF_VALUES: Flags =
@@ -33,12 +34,14 @@ pub(super) struct OnSkin {
     first_slot: usize,
     /// Whether each channel is in a field, whose flags say what is wrong with its value.
     all_in_fields: bool,
-    /// Why the edges that the body's file holds are not used.
-    note: Option<String>,
+    /// What is to be known before the first frame, a line each.
+    remarks: Vec<String>,
     /// Where fits are asked for.
     fits: Option<SkinFits>,
     /// Where self-contacts are asked for.
     self_contacts: Option<SelfContacts>,
+    /// Where standard deviations are asked for.
+    sigmas: Option<SkinSigmas>,
     /// Memory for a frame.
     without_value: Vec<u32>,
     notes: Vec<(u32, TouchFlags)>,
@@ -50,6 +53,7 @@ pub(super) struct OnSkin {
 pub(super) struct OnSkinState {
     touches: TouchState,
     self_contacts: Option<Memory>,
+    fits: FitTrails,
 }
 
 impl OnSkin {
@@ -65,17 +69,22 @@ impl OnSkin {
         let in_fields: BTreeSet<u32> = fields.iter().flatten().copied().collect();
         skin.set_fields(&fields);
         let fits = options.outputs.intersects(TouchOutputs::FIT).then(|| {
-            // Which taxels are fitted.
-            options.outputs |= TouchOutputs::TAXELS;
-            SkinFits::new(layer, scene.knobs.orientation_by.steps().unwrap_or(STEPS))
+            let over_s = options.outputs.contains(TouchOutputs::FIT_VELOCITY).then_some(options.velocity_over_s);
+            SkinFits::new(layer, scene.knobs.orientation_by.steps().unwrap_or(STEPS), over_s)
         });
+        let sigmas = SkinSigmas::new(options.outputs);
+        if fits.is_some() || sigmas.is_some() {
+            // Which taxels are fitted, or vary.
+            options.outputs |= TouchOutputs::TAXELS;
+        }
         Some(Self {
-            touches: Touches::new(Arc::new(skin), options),
             first_slot,
             fits,
             self_contacts: SelfContacts::new(body, plan, scene),
+            sigmas,
             all_in_fields: in_fields.len() == plan.channels(),
-            note,
+            remarks: note.into_iter().chain(sensors_are_unknown(plan, &skin)).collect(),
+            touches: Touches::new(Arc::new(skin), options),
             without_value: Vec::new(),
             notes: Vec::new(),
             poses: Vec::new(),
@@ -87,20 +96,25 @@ impl OnSkin {
         self.touches.skin()
     }
 
-    /// Why the edges that the body's file holds are not used.
-    pub(super) fn note(&self) -> Option<&str> {
-        self.note.as_deref()
+    /// What is to be known before the first frame, a line each: why the edges that the body's file holds are not used, and that
+    /// nothing says what its sensors cover.
+    pub(super) fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     pub(super) fn state(&self) -> OnSkinState {
         OnSkinState {
             touches: self.touches.state(),
+            fits: self.fits.as_ref().map(SkinFits::state).unwrap_or_default(),
             self_contacts: self.self_contacts.as_ref().map(SelfContacts::state),
         }
     }
 
     pub(super) fn restore(&mut self, state: &OnSkinState) {
         self.touches.restore(&state.touches);
+        if let Some(fits) = &mut self.fits {
+            fits.restore(&state.fits);
+        }
         if let Some((self_contacts, state)) = self.self_contacts.as_mut().zip(state.self_contacts.as_ref()) {
             self_contacts.restore(state);
         }
@@ -137,6 +151,9 @@ impl OnSkin {
             };
             self.touches.step(input, &mut found);
             flag_several(&found, &mut percepts.flags[index * plan.fields.len()..][..plan.fields.len()]);
+            if let Some(sigmas) = &mut self.sigmas {
+                sigmas.add((plan, self.touches.skin()), raw, offset, pressures, &mut found);
+            }
             self.poses.clear();
             if !found.touches.is_empty() && links.may_pose(frame) {
                 links.poses_into(frame, &mut self.poses);
@@ -147,7 +164,8 @@ impl OnSkin {
                 percepts.push_self_contacts(contacts, are_known);
             }
             if let Some(fits) = &mut self.fits {
-                fits.take((plan, self.touches.skin()), raw, offset, &self.poses, &mut found);
+                let moment = Moment { offset, t_s: frame.t_s, poses: &self.poses };
+                fits.take((plan, self.touches.skin()), raw, moment, &mut found);
             }
             percepts.put_touch_frame(index, found);
         }
@@ -234,9 +252,34 @@ fn reading(plan: &Plan, channel: usize) -> Reading {
     let calibration = &plan.calibrations[channel];
     Reading {
         newton_at_one: force::newtons_per_p(calibration.quantity, plan.areas[channel]).unwrap_or(0.0),
-        weighs_by_cell: calibration.quantity != Quantity::Newton,
+        weighs_by_cell: calibration.weighs_by_cell(),
         sigma: sigma(plan, channel),
     }
+}
+
+/// That sensors that give counts are taken to be of one size, where the calibration does not say what they cover, that matters, and the
+/// layout does not show it.
+fn sensors_are_unknown(plan: &Plan, skin: &Skin) -> Option<String> {
+    /// Sizes that differ by less than this factor are one.
+    const ALIKE: f64 = 1.05;
+    let unsaid = |calibration: &TaxelCalibration| {
+        calibration.quantity == Quantity::Count && calibration.sensors.is_none() && !calibration.mask
+    };
+    let taxels = || plan.calibrations.iter().zip(skin.taxels()).filter(|(calibration, _)| unsaid(calibration));
+    let are_alike = |size: fn(&SkinTaxel) -> f64| {
+        let range = |(low, high): (f64, f64), size: f64| (low.min(size), high.max(size));
+        let (low, high) = taxels().map(|(_, taxel)| size(taxel)).fold((f64::INFINITY, 0.0), range);
+        low > 0.0 && high <= ALIKE * low
+    };
+    // Without a calibration nobody has begun to say anything.
+    let is_calibrated = plan.calibrations.iter().any(|calibration| *calibration != TaxelCalibration::default());
+    let matters =
+        is_calibrated && taxels().count() > 1 && !are_alike(|taxel| taxel.cell_m2) && !are_alike(|taxel| taxel.area_m2);
+    matters.then(|| {
+        "the calibration does not say what its sensors cover: counts weigh by the areas of taxels' cells in the place and axis of a \
+         touch, as of sensors of one size; give it `sensors = \"equal\"`, or \"cell\" if each covers its cell"
+            .to_owned()
+    })
 }
 
 /// The standard deviation of the noise of P, about: where it is not known, that of half a count, or a third of the dead band.

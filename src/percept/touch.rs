@@ -47,6 +47,13 @@ bitflags! {
         const POOR_FIT = 1 << 16;
         /// What the layer makes of a contact is not known, as the calibration has no `[layer]` or a taxel has no area: no fit.
         const NO_LAYER = 1 << 17;
+        /// The calibration does not say how much its sensors' values vary: no standard deviations.
+        const NOISE_UNKNOWN = 1 << 18;
+        /// Taxels near their thresholds, or pressed little, may change what is found by more than noise does: a standard deviation is
+        /// absent.
+        const UNSURE = 1 << 19;
+        /// It has had fits for less than 0.2 s without a gap as long: no velocity of the fit.
+        const YOUNG_FIT = 1 << 20;
     }
 }
 
@@ -100,6 +107,12 @@ pub struct Touch {
     pub velocity: Option<DVec3>,
     /// What presses, where that is asked for and known.
     pub fit: Option<TouchFit>,
+    /// Standard deviation of the total from the noise of the sensors, in the unit of P; only on request, as the next two.
+    pub total_sigma: Option<f64>,
+    /// Standard deviation of the position along u and v of the touch's chart, m.
+    pub position_sigma_m: Option<[f64; 2]>,
+    /// Standard deviation of the principal axis, rad.
+    pub principal_axis_sigma_rad: Option<f64>,
     /// Whether its place and directions are in the world (or in [`crate::Scene::relative_to`]), because the frame carried a pose of its
     /// link.
     pub in_world: bool,
@@ -107,6 +120,8 @@ pub struct Touch {
     pub flags: TouchFlags,
     /// The taxel that the chart is based at: the one nearest to the weighted mean.
     pub base: u32,
+    /// It began, was joined with another, lost a part or went over to another link in this frame: what moves is measured anew.
+    pub(crate) begins_anew: bool,
     pub(crate) links: [u32; 2],
     pub(crate) fields: [u32; 2],
     pub(crate) taxels: [u32; 2],
@@ -129,6 +144,8 @@ pub struct TouchFit {
     pub width_m: f64,
     /// Of a segment from end to end, m; of a blob the standard deviation of its pressure along.
     pub length_m: Option<f64>,
+    /// Change of its middle on the skin over 0.2 s, m/s; of a line only across it.
+    pub velocity: Option<DVec3>,
     /// Standard deviations, where the noise of the sensors is known; that of the place is along u and v of the chart.
     pub sigma: Option<FitSigma>,
 }

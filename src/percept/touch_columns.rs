@@ -61,6 +61,14 @@ bitflags! {
         const FIT_LENGTH = 1 << 23;
         /// The standard deviations of all of these.
         const FIT_SIGMAS = 1 << 24;
+        /// How fast that moves on the skin.
+        const FIT_VELOCITY = 1 << 25;
+        /// The standard deviation of its total; only on request, as the next two.
+        const TOTAL_SIGMA = 1 << 26;
+        /// The standard deviation of its position along u and v of its chart.
+        const POSITION_SIGMA = 1 << 27;
+        /// The standard deviation of its principal axis.
+        const PRINCIPAL_AXIS_SIGMA = 1 << 28;
     }
 }
 
@@ -76,7 +84,8 @@ impl TouchOutputs {
         .difference(Self::ORIENTATION)
         .difference(Self::TAXELS)
         .difference(Self::WRENCH)
-        .difference(Self::FIT);
+        .difference(Self::FIT)
+        .difference(Self::SIGMAS);
 
     /// What is made of fits.
     pub const FIT: Self = Self::FIT_KIND
@@ -85,7 +94,11 @@ impl TouchOutputs {
         .union(Self::FIT_DIRECTION)
         .union(Self::FIT_WIDTH)
         .union(Self::FIT_LENGTH)
-        .union(Self::FIT_SIGMAS);
+        .union(Self::FIT_SIGMAS)
+        .union(Self::FIT_VELOCITY);
+
+    /// Standard deviations of what is not made of fits.
+    pub const SIGMAS: Self = Self::TOTAL_SIGMA.union(Self::POSITION_SIGMA).union(Self::PRINCIPAL_AXIS_SIGMA);
 
     /// The names as `--outputs touches.NAME` and NDJSON spell them, in order.
     pub fn names(self) -> impl Iterator<Item = String> {
@@ -114,7 +127,7 @@ pub struct TouchColumn {
     pub name: &'static str,
     /// What it is measured in.
     pub unit: Unit,
-    /// Numbers of a value: 1, 2 (along and across) or 3 (x, y and z).
+    /// Numbers of a value: 1, 2 (along and across, or along u and v) or 3 (x, y and z).
     pub components: usize,
     /// What it is, in a line.
     pub help: &'static str,
@@ -193,4 +206,8 @@ touch_columns! {
     FIT_SIGMAS "fit_width_sigma" Metre 1 "The standard deviation of that." |touch| one_of(sigma(touch).map(|sigma| sigma.width));
     FIT_LENGTH "fit_length" Metre 1 "How long a segment is; of a blob the standard deviation of its pressure along." |touch| one_of(touch.fit.and_then(|fit| fit.length_m));
     FIT_SIGMAS "fit_length_sigma" Metre 1 "The standard deviation of that." |touch| one_of(sigma(touch).filter(|_| has(touch, |fit| fit.length_m)).map(|sigma| sigma.length));
+    FIT_VELOCITY "fit_velocity" MetrePerSecond 3 "Change of the place of the fit on the skin over 0.2 s, m/s; of a line only across it." |touch| vector(touch.fit.and_then(|fit| fit.velocity));
+    TOTAL_SIGMA "total_sigma" P 1 "The standard deviation of its total, from the sensors' noise." |touch| one_of(touch.total_sigma);
+    POSITION_SIGMA "position_sigma" Metre 2 "The standard deviation of its position along u and v of its own chart, m." |touch| touch.position_sigma_m.map(|[u, v]| [u, v, 0.0]);
+    PRINCIPAL_AXIS_SIGMA "principal_axis_sigma" Radian 1 "The standard deviation of its principal axis, rad." |touch| one_of(touch.principal_axis_sigma_rad);
 }

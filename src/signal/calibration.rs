@@ -7,6 +7,7 @@ mod keys;
 mod layer;
 mod old_names;
 mod overlay;
+mod sensors;
 mod thresholds;
 
 use std::collections::BTreeMap;
@@ -16,6 +17,7 @@ use serde::Deserialize;
 
 pub use self::layer::LayerResponse;
 pub use self::overlay::LaidOver;
+pub use self::sensors::Sensors;
 pub use self::thresholds::{ChangeCalibration, ContactThresholds};
 use super::curve::Curve;
 use super::drift::DriftKeys;
@@ -59,6 +61,8 @@ pub struct TaxelCalibration {
     pub response: Response,
     /// What P is. Gain, dead band and P_max are in its SI unit, whatever unit the file is in.
     pub quantity: Quantity,
+    /// How large the sensor is beside its cell; `None` where nothing is said.
+    pub sensors: Option<Sensors>,
 }
 
 impl Default for TaxelCalibration {
@@ -74,6 +78,20 @@ impl Default for TaxelCalibration {
             mask: false,
             response: Response::Linear,
             quantity: Quantity::Count,
+            sensors: None,
+        }
+    }
+}
+
+impl TaxelCalibration {
+    /// Whether its P counts times the area of its cell in the place and axis of a touch: a pressure always does, a force or a count of
+    /// sensors of one size. Where nothing is said of sensors, those that give newtons cover their cells, and others are of one size.
+    #[must_use]
+    pub fn weighs_by_cell(&self) -> bool {
+        match (self.quantity, self.sensors) {
+            (Quantity::Pascal, _) => true,
+            (_, Some(sensors)) => sensors == Sensors::Equal,
+            (quantity, None) => quantity == Quantity::Count,
         }
     }
 }

@@ -17,7 +17,8 @@ mod wiring;
 pub use block::FrameBlock;
 pub use board_health::BoardHealth;
 pub use calibration::{
-    Calibration, ChangeCalibration, Checks, ContactThresholds, LaidOver, LayerResponse, Onset, TaxelCalibration,
+    Calibration, ChangeCalibration, Checks, ContactThresholds, LaidOver, LayerResponse, Onset, Sensors,
+    TaxelCalibration,
 };
 pub use curve::Curve;
 pub(crate) use curve::slope;

@@ -8,7 +8,7 @@
 //! var θ = Σ (wᵢσᵢ)² ((a − d)·ΔuᵢΔvᵢ − b·(Δuᵢ² − Δvᵢ²))² / h⁴
 //!
 //! with Δ = x − c, the moments a, b, d of [`super::principal_axis`] and h² = (a − d)² + (2b)². The centroid's own error does not turn the
-//! axis, as Σ wP Δ = 0.
+//! axis, as Σ wP Δ = 0. A touch of the whole body counts P without weights in its total, and its chart stands for u and v.
 //!
 //! **Where it does not hold**, a quantity has no sigma, `unsure`. A taxel within [`NEAR_SIGMAS`] σ of its threshold may be
 //! pressed in one frame and not in the next. With a hard onset P then jumps by the threshold: the quantity has no sigma where the
@@ -44,7 +44,10 @@ const MAX_TURN: f64 = 0.1;
 /// A taxel that can be used, pressed or not.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Felt {
+    /// Of its P in place and axis,
     pub(crate) weight: f64,
+    /// and in the total.
+    pub(crate) weight_in_total: f64,
     /// P ≥ 0.
     pub(crate) pressure: f64,
     /// P, were there no threshold, less that threshold.
@@ -151,9 +154,9 @@ pub(crate) fn reference(taxels: &[Felt], charted: bool) -> Sigmas {
         let Some(sigma) = taxel.sigma else { continue };
         let offset = taxel.place_m - centroid;
         let turn = straight * offset.x * offset.y - skew * (offset.x * offset.x - offset.y * offset.y);
-        let slopes = [1.0, offset.x / total, offset.y / total, turn / squared];
-        for (variance, slope) in variances.iter_mut().zip(slopes) {
-            variance.add(taxel, sigma, taxel.weight * slope);
+        let slopes = [offset.x / total, offset.y / total, turn / squared].map(|slope| taxel.weight * slope);
+        for (variance, slope) in variances.iter_mut().zip([taxel.weight_in_total].into_iter().chain(slopes)) {
+            variance.add(taxel, sigma, slope);
         }
     }
     let [of_total, of_u, of_v, of_axis] = variances;
@@ -176,6 +179,7 @@ mod tests {
     fn felt(taxels: &[(f64, f64, f64)]) -> Vec<Felt> {
         let taxel = |&(u, v, pressure): &(f64, f64, f64)| Felt {
             weight: 1.0,
+            weight_in_total: 1.0,
             pressure,
             margin: pressure,
             threshold: 0.5,

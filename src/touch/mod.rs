@@ -9,7 +9,7 @@
 //! 2. **Identity** (`identity.rs`): most shared pressure, from onset to release, with hysteresis on a touch's total.
 //! 3. **Quantities** (`measure.rs`, `moments.rs`, `chart.rs`, `cell_tree.rs`, `trail.rs`): sums; the point of the skin nearest to
 //!    the weighted mean in space; axis, spread and orientation in the chart of the touch; velocity on the skin; force and torque by
-//!    link.
+//!    link. Fits and standard deviations are made by the engine, which has the raw values.
 //!
 //! All is in double precision, on the body at rest; quantities come out in the frame of the touch's link. `reference.rs` is the
 //! same as a definition, written plainly and slowly, with the margins of its choices.
@@ -42,4 +42,5 @@ mod unrolled;
 pub use options::{Options, Splits};
 pub use skin::{Reading, Skin, SkinParts, SkinTaxel};
 pub use touches::{Input, TouchState, Touches};
+pub(crate) use trail::Trail;
 pub use unrolled::Unrolled;

@@ -27,7 +27,8 @@ pub struct SkinTaxel {
 
 impl SkinTaxel {
     /// Weight of its P in place and axis.
-    pub(super) fn weight(&self) -> f64 {
+    #[must_use]
+    pub fn weight(&self) -> f64 {
         if self.reading.weighs_by_cell { self.cell_m2 } else { 1.0 }
     }
 }

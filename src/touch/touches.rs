@@ -280,7 +280,8 @@ impl Touches {
             let Some(touch) = out.touches.last_mut() else { continue };
             let new = Kept { id: named.id, began_s: t_s, link: touch.link, trail: Trail::default() };
             let mut kept = named.continues.map_or(new, |before| self.memory.touches[before as usize]);
-            if kept.link != touch.link || named.merged || named.parted {
+            touch.begins_anew = named.continues.is_none() || kept.link != touch.link || named.merged || named.parted;
+            if touch.begins_anew {
                 kept.trail.clear();
             }
             (kept.id, kept.link) = (named.id, touch.link);

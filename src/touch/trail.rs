@@ -14,7 +14,7 @@ const MOST: usize = 19;
 
 /// The positions of a touch in the past, of fixed size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Trail {
+pub(crate) struct Trail {
     /// The oldest first.
     past: [Past; MOST],
     count: u32,
@@ -28,12 +28,18 @@ struct Past {
 
 impl Trail {
     /// Forgets all positions.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.count = 0;
     }
 
+    /// Whether no position was kept since `over_s` before `t_s`.
+    pub(crate) fn is_broken(&self, t_s: f64, over_s: f64) -> bool {
+        let last = self.past[..self.count as usize].last();
+        last.is_some_and(|last| t_s - last.t_s > over_s * (1.0 + ROUNDING))
+    }
+
     /// Takes the `position` at `t_s`, m; the velocity over `over_s`, m/s, if the trail goes back so far.
-    pub(super) fn follow(&mut self, t_s: f64, position: DVec3, over_s: f64) -> Option<DVec3> {
+    pub(crate) fn follow(&mut self, t_s: f64, position: DVec3, over_s: f64) -> Option<DVec3> {
         let past = &self.past[..self.count as usize];
         let is_old = |past: &Past, by_s: f64| t_s - past.t_s >= by_s * (1.0 - ROUNDING);
         let then = past.iter().rposition(|past| is_old(past, over_s));
@@ -83,7 +89,9 @@ mod tests {
             assert_eq!(trail.follow(0.9 - 0.1 * f64::from(step), DVec3::X, 0.2), None);
         }
         assert_eq!(trail.follow(1.3, DVec3::X * 0.3, 0.2), Some(DVec3::X * (0.3 / (1.3 - 1.0))));
+        assert!(trail.is_broken(1.6, 0.2) && !trail.is_broken(1.5, 0.2));
         trail.clear();
         assert_eq!(trail.follow(9.0, DVec3::X, 0.2), None);
+        assert!(!Trail::default().is_broken(9.0, 0.2), "there is nothing to break");
     }
 }

@@ -125,7 +125,7 @@ fn check_checks(checks: &Checks) -> Result<()> {
 mod tests {
     use super::*;
     use crate::keys::without_column;
-    use crate::signal::{ChangeCalibration, ContactThresholds, FsrResponse, FsrSignal, Response};
+    use crate::signal::{ChangeCalibration, ContactThresholds, FsrResponse, FsrSignal, Response, Sensors};
 
     #[test]
     fn a_taxel_overrides_what_holds_for_all() {
@@ -152,6 +152,7 @@ mod tests {
         assert!(why("[all]\nbaselin = 1").contains("did you mean `baseline`"));
         assert!(why("[all]\nraw_range = [5, 1]").contains("line 2"));
         assert_eq!(why("[all]\nonset = \"late\""), "line 2: `onset` is `late`; it must be `hard` or `soft`");
+        assert_eq!(why("[all]\nsensors = \"all\""), "line 2: `sensors` is `all`; it must be `cell` or `equal`");
         assert_eq!(why("[all]\nnoise = -1"), "line 2: `noise` is -1; it must be 0 or more raw units");
         assert!(why("[checks]\nbroken_frame_share = 3").contains("between 0 and 1"));
         assert!(why("all = 3").contains("line 1"));
@@ -165,6 +166,21 @@ mod tests {
         assert!(why("[layer]\ngain_spread = 0.1").contains("sigma_m"));
         assert!(why("[chnge]\non = 3").contains("did you mean `change`"));
         assert!(why("[change]\nfield = 3").starts_with("line 2"));
+    }
+
+    #[test]
+    fn a_pressure_weighs_by_its_cell_and_other_quantities_as_their_sensors_cover_it() {
+        let weighs = |keys: &str, of_seven: &str| {
+            let text = format!("[all]\n{keys}\n[taxel.7]\n{of_seven}\n");
+            let read = Calibration::parse(&text, &[3, 7]).unwrap();
+            [0, 1].map(|taxel| read.taxels[taxel].weighs_by_cell())
+        };
+        let [cell, equal] = [Sensors::Cell, Sensors::Equal].map(|sensors| format!("sensors = \"{}\"", sensors.name()));
+        assert_eq!(weighs("", &cell), [true, false]);
+        assert_eq!(weighs("unit = \"mN\"", &equal), [false, true]);
+        assert_eq!(weighs(&cell, "unit = \"kPa\""), [false, true]);
+        assert_eq!(weighs(&cell, &equal), [false, true]);
+        assert_eq!(weighs(&format!("unit = \"N\"\n{equal}"), &cell), [true, false]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Onset, TaxelCalibration};
+use super::{Onset, Sensors, TaxelCalibration};
 use crate::error::{Error, Result, nearest};
 use crate::keys::Text;
 use crate::signal::curve::{Column, Curve};
@@ -18,6 +18,7 @@ const MAX_MISSING: usize = 16;
 #[serde(deny_unknown_fields)]
 pub(super) struct Keys {
     unit: Option<Spanned<String>>,
+    sensors: Option<Spanned<String>>,
     baseline: Option<Spanned<f64>>,
     gain: Option<Spanned<f64>>,
     invert: Option<bool>,
@@ -100,6 +101,13 @@ impl Draft {
         self.apply_response(keys, curves, text)?;
         if let Some(unit) = &keys.unit {
             self.unit = unit.get_ref().parse().map_err(|e: Error| text.wrong(unit.span(), e.to_string()))?;
+        }
+        if let Some(sensors) = &keys.sensors {
+            let sensors = sensors.get_ref().parse::<Sensors>().map_err(|_| {
+                let what = format!("`sensors` is `{}`; it must be `cell` or `equal`", sensors.get_ref());
+                text.wrong(sensors.span(), what)
+            })?;
+            self.taxel.sensors = Some(sensors);
         }
         let taxel = &mut self.taxel;
         let number =

@@ -3,17 +3,19 @@
 use std::fmt::Write as _;
 
 use super::sensor::{FsrOutput, Kind, Sensor};
-use crate::signal::FsrCircuit;
+use crate::signal::{FsrCircuit, Sensors};
 
 /// Width of a dead band, standard deviations of the noise: one value in 10⁹ exceeds it.
 const DEAD_BAND_SIGMAS: f64 = 6.0;
 
 impl Sensor {
-    /// The calibration file for sensors of the taxels `ids` on the body called `body`.
-    pub(super) fn calibration(&self, body: &str, ids: &[u32]) -> String {
+    /// The calibration file for sensors of the taxels `ids` on the body called `body`, which cover what `sensors` says.
+    pub(super) fn calibration(&self, body: &str, ids: &[u32], sensors: Sensors) -> String {
         let mut text = String::from("# The sensors of a simulation as they are.\n\n");
         let _ = writeln!(text, "body = {}\n\n[all]", toml::Value::from(body));
-        let mut keys = self.keys();
+        let unit = self.gives_newtons().then(|| ("unit", "\"N\"".to_owned()));
+        let mut keys = vec![("sensors", format!("\"{}\"", sensors.name()))];
+        keys.extend(unit.into_iter().chain(self.keys()));
         if let Some(noise) = self.noise() {
             keys.push(("noise", noise.to_string()));
         }
@@ -28,6 +30,11 @@ impl Sensor {
             let _ = write!(text, "\n[taxel.{id}]\nmask = true\n");
         }
         text
+    }
+
+    /// Whether P is the force in newtons, and not one of the paper's signals.
+    fn gives_newtons(&self) -> bool {
+        matches!(self.kind, Kind::Ideal | Kind::Linear { .. })
     }
 
     /// Standard deviation of a raw value, with that of rounding to whole counts; `None` where it depends on the force.

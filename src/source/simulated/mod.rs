@@ -33,7 +33,7 @@ use self::file::File;
 use self::sensor::{Reading, Sensor};
 use self::setup::{Setup, Touch};
 use self::truth::line_angle;
-use self::whole::BodySkin;
+use self::whole::{BodySkin, Covers};
 use self::whole_truth::{Moment, TouchOfBody};
 use super::Source;
 use crate::body::{Body, Modality, Taxel};
@@ -42,7 +42,7 @@ use crate::error::{Error, Result, failed};
 use crate::field::FieldSet;
 use crate::keys::Text;
 use crate::limits::{self, MAX_TOML_BYTES};
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Frame, RawValue, Sensors};
 
 /// A source of frames of simulated touches.
 pub struct SimulatedSource {
@@ -52,6 +52,8 @@ pub struct SimulatedSource {
     frames: u64,
     layer: Layer,
     sensor: Sensor,
+    /// What the sensors cover.
+    sensors: Sensors,
     /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
     ids: Vec<u32>,
     taxels: Vec<(usize, f64)>,
@@ -203,12 +205,17 @@ impl SimulatedSource {
             let link = body.links[touch.link].name.clone();
             touches.push(Pressing::Link(LinkTouch { link, touch, taxels: places }));
         }
+        let sensors = match &body_skin {
+            Some(_) if covers == Covers::Cell => Sensors::Cell,
+            _ => size_of(&taxels),
+        };
         Ok(Self {
             name: name.to_owned(),
             rate_hz,
             frames: frames as u64,
             layer,
             sensor,
+            sensors,
             forces_newton: vec![0.0; ids.len()],
             ids,
             taxels,
@@ -251,11 +258,12 @@ impl SimulatedSource {
     }
 
     /// The calibration of these sensors, as `docs/calibration.md` describes such a file: what they read when untouched
-    /// is 0, `ideal` and `linear` ones give newton, `fsr` ones the linear signal, and broken ones are masked. It knows the layer.
+    /// is 0, `ideal` and `linear` ones give newtons (`unit`), `fsr` ones the linear signal, and broken ones are masked. It knows the
+    /// layer, and what the sensors cover.
     #[must_use]
     pub fn calibration(&self) -> String {
         let body = Path::new(&self.body.name).file_name().unwrap_or_default();
-        let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids);
+        let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids, self.sensors);
         text + &self.layer.calibration()
     }
 
@@ -366,6 +374,15 @@ impl Source for SimulatedSource {
     fn progress(&self) -> Option<f64> {
         Some(self.next as f64 / self.frames as f64)
     }
+}
+
+/// What sensors that feel squares with these sides cover: sides that are all one are of sensors of one size, others are those of cells.
+fn size_of(taxels: &[(usize, f64)]) -> Sensors {
+    /// Sides that differ by less than this share are one.
+    const ALIKE: f64 = 0.01;
+    let range = |(low, high): (f64, f64), &(_, side_m): &(usize, f64)| (low.min(side_m), high.max(side_m));
+    let (low, high) = taxels.iter().fold((f64::INFINITY, 0.0), range);
+    if high <= (1.0 + ALIKE) * low { Sensors::Equal } else { Sensors::Cell }
 }
 
 fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
