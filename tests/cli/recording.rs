@@ -653,7 +653,8 @@ fn what_is_stale_is_stale_in_a_recording() {
     recorder.finish().unwrap();
 
     // As an engine says that got the frames themselves.
-    let options = somatic::Options::default().backend(somatic::BackendKind::Cpu);
+    let scene = somatic::Scene::default().touches(somatic::touch::Options::default());
+    let options = somatic::Options::default().scene(scene).backend(somatic::BackendKind::Cpu);
     let mut engine = somatic::Engine::new(&body, options).unwrap();
     engine.track_stale();
     let percepts = engine.process(&kept).unwrap();

@@ -45,7 +45,7 @@ fn an_interrupted_recording_leaves_no_part_under_a_final_name() {
         }
         // Its second frame comes after a minute and a half.
         let mut run = somatic(&["run", "--backend", "cpu", "--quiet", "--source", "touch.csv", "--speed", "0.001"])
-            .args(["--sink", "-", "--sink", "out.csv", "--sink", "out.mcap", "--sink", "out.ndjson"])
+            .args(["--outputs", "total", "--sink", "-", "--sink", "out.csv", "--sink", "out.mcap", "--sink", "out.ndjson"])
             .args(if old { &["--force"][..] } else { &[] })
             .current_dir(folder.path())
             .stdout(Stdio::piped())
@@ -75,7 +75,7 @@ fn an_interrupted_recording_leaves_no_part_under_a_final_name() {
         }
         // Uninterrupted, all of them are there.
         let sinks = ["--sink", "out.csv", "--sink", "out.mcap", "--sink", "out.ndjson", "--force"];
-        let run = ["run", "--backend", "cpu", "--quiet", "--source", "touch.csv"];
+        let run = ["run", "--backend", "cpu", "--quiet", "--source", "touch.csv", "--outputs", "total"];
         let output = somatic(&[&run[..], &sinks].concat()).current_dir(folder.path()).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         assert_eq!(frames(&std::fs::read_to_string(at("out.ndjson")).unwrap()).len(), 3);
@@ -97,7 +97,7 @@ fn what_plays_until_it_is_ended_is_whole_when_it_is() {
     lines.next().unwrap().unwrap();
     signal(&run, "-INT");
     assert_eq!(code_of(&mut run), Some(0));
-    assert_eq!(files_in(folder.path()), ["out.csv", "out.mcap"]);
+    assert_eq!(files_in(folder.path()), ["out.csv", "out.mcap", "out.touches.csv"]);
     done(&["info", text_of(&at("out.mcap"))]);
 }
 
