@@ -20,7 +20,7 @@ use somatic::robot::Ros2Source;
 use somatic::robot::messages::{Header, Marker, MarkerArray, Message as _, PointCloud2, PointField};
 use somatic::sink::{FieldNames, InputFrames, LimbSends, Ros2Sink, Session, Sink, ZenohSink};
 use somatic::source::{LimbOptions, LimbSource, Source as _};
-use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue, Scene};
+use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue, Scene, touch};
 
 use crate::shape::Shape;
 
@@ -135,8 +135,9 @@ impl Took {
 }
 
 fn run(body: &Body, way: Way) -> Took {
-    let mut engine = Engine::new(body, Options::default().scene(Scene::default()).backend(BackendKind::Cpu))
-        .expect("the CPU is here");
+    let scene = Scene::default().touches(touch::Options::default());
+    let mut engine =
+        Engine::new(body, Options::default().scene(scene).backend(BackendKind::Cpu)).expect("the CPU is here");
     let taxels: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let session = Session {
         names: FieldNames::all_of(engine.plan()),
@@ -180,7 +181,8 @@ fn run(body: &Body, way: Way) -> Took {
             let _ = sink.write(engine.percepts()).expect("it goes on");
         }
         if let Way::Bare(of) = way {
-            socket.get_or_insert_with(|| Bare::new(body, of, engine.percepts().touched(0).count())).send();
+            let touches = engine.percepts().touches(0).map_or(0, |found| found.touches.len());
+            socket.get_or_insert_with(|| Bare::new(body, of, touches)).send();
         }
         if number >= WARM_FRAMES {
             took.handing_us.push(begin.elapsed().as_secs_f64() * 1e6);
@@ -201,7 +203,7 @@ struct Bare {
 }
 
 impl Bare {
-    fn new(body: &Body, of: &str, touched: usize) -> Self {
+    fn new(body: &Body, of: &str, touches: usize) -> Self {
         let bind = || UdpSocket::bind("127.0.0.1:0").expect("a free port");
         let (from, to) = (bind(), bind());
         from.connect(to.local_addr().expect("it is bound")).expect("loopback is there");
@@ -209,7 +211,7 @@ impl Bare {
             let mut bytes = vec![0; 1 << 16];
             while to.recv(&mut bytes).is_ok() {}
         });
-        let messages = if of == "zenoh" { vec![vec![1; 16 + 4 * TAXELS]] } else { ros2_messages(body, touched) };
+        let messages = if of == "zenoh" { vec![vec![1; 16 + 4 * TAXELS]] } else { ros2_messages(body, touches) };
         Self { messages, from }
     }
 
@@ -220,7 +222,7 @@ impl Bare {
     }
 }
 
-fn ros2_messages(body: &Body, touched: usize) -> Vec<Vec<u8>> {
+fn ros2_messages(body: &Body, touches: usize) -> Vec<Vec<u8>> {
     let header = |frame_id: &str| Header { frame_id: frame_id.to_owned(), ..Header::default() };
     let field = |name: &str| PointField { name: name.to_owned(), ..PointField::default() };
     let cloud = |link: usize| PointCloud2 {
@@ -229,8 +231,8 @@ fn ros2_messages(body: &Body, touched: usize) -> Vec<Vec<u8>> {
         data: vec![1; 16 * body.taxels.iter().filter(|taxel| taxel.link == link).count()],
         ..PointCloud2::default()
     };
-    let marker = Marker { header: header("link"), ns: "field/0000".to_owned(), ..Marker::default() };
-    let markers = MarkerArray { markers: vec![marker; 2 * touched] }.to_cdr();
+    let marker = Marker { header: header("link"), ns: "touches".to_owned(), ..Marker::default() };
+    let markers = MarkerArray { markers: vec![marker; touches] }.to_cdr();
     (0..body.links.len()).map(|link| cloud(link).to_cdr()).chain([markers]).collect()
 }
 
@@ -251,7 +253,8 @@ fn time_of_other_threads() -> Duration {
 fn press(frame: &mut Frame, number: usize) {
     frame.t_s = number as f64 * PERIOD.as_secs_f64();
     for (index, value) in frame.values.iter_mut().enumerate() {
-        *value = RawValue::new(((index * 7 + number * 131) % 977 + 1) as f64);
+        // Some ten ridges that wander over the skin: a touch each.
+        *value = RawValue::new(((index + number * 7) % 100 + 1) as f64);
     }
 }
 

@@ -11,7 +11,7 @@ use somatic::signal::Quantity;
 use somatic::sink::{FieldNames, Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableName, TableWish};
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Precision, Result};
 
-use self::serve::{give, give_lines, serve};
+use self::serve::{give, give_lines, opened, serve};
 use super::attachments::attachments;
 use super::describe::describe;
 use super::doubts::Doubts;
@@ -213,7 +213,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         print(&describe(&sinks, &session, arguments.wide)?)?;
         return Ok(DONE);
     }
-    let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<_>>()?;
+    let sinks = opened(targets, &session, asked.quiet)?;
     #[cfg(feature = "page")]
     let taxels = source.taxels().to_vec();
     let about = RunInfo { engine: &engine, body: &body, source: &input.name, all_fields: asked.all_fields };

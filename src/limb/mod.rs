@@ -7,6 +7,8 @@ mod key;
 mod network;
 #[cfg(feature = "zenoh")]
 mod packet;
+#[cfg(feature = "zenoh")]
+mod qualified;
 mod sends;
 
 pub(crate) use key::checked_key;
@@ -16,4 +18,6 @@ pub(crate) use network::{Network, Publication, Side};
 pub(crate) use packet::{
     FRAME_BYTES, Packet, PerceptHead, end_packet, frame_packet, hash, layout_packet, open, percepts_begin, raw_value,
 };
+#[cfg(feature = "zenoh")]
+pub(crate) use qualified::qualified;
 pub use sends::LimbSends;

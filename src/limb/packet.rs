@@ -43,15 +43,25 @@ pub(crate) struct Percepts<'a> {
     pub(crate) t: f64,
     /// The number of the frame.
     pub(crate) frame: u64,
-    /// As in NDJSON.
+    /// As in NDJSON, as are those that follow.
     #[serde(borrow)]
     pub(crate) fields: &'a RawJson,
+    #[serde(borrow, default)]
+    pub(crate) touches: Option<&'a RawJson>,
+    #[serde(borrow, default)]
+    pub(crate) released: Option<&'a RawJson>,
+    #[serde(borrow, default)]
+    pub(crate) self_contacts: Option<&'a RawJson>,
 }
 
 impl PartialEq for Percepts<'_> {
     fn eq(&self, other: &Self) -> bool {
         let key = |of: &Self| (of.boot, of.sequence, of.t.to_bits(), of.frame);
-        key(self) == key(other) && self.fields.get() == other.fields.get()
+        let json = |of: &Self| {
+            let optional = [of.touches, of.released, of.self_contacts];
+            (of.fields.get().to_owned(), optional.map(|json| json.map(|json| json.get().to_owned())))
+        };
+        key(self) == key(other) && json(self) == json(other)
     }
 }
 
@@ -194,6 +204,14 @@ mod tests {
         assert_eq!(head, Head { board: 0, boot: 2, sequence: 8, time_us: 500_000 });
         let Packet::Percepts(line) = packet else { panic!() };
         assert_eq!((line.frame, line.fields.get()), (6, r#"[{"field":"a"}]"#));
+        assert!(line.touches.is_none() && line.released.is_none() && line.self_contacts.is_none());
+        percepts_begin(&mut bytes, PerceptHead { boot: 2, sequence: 9 });
+        bytes.extend_from_slice(
+            br#""t":0.5,"frame":7,"touches":[{"id":3}],"released":[2],"fields":[],"self_contacts":[]}"#,
+        );
+        let Packet::Percepts(line) = open(&bytes).unwrap().1 else { panic!() };
+        let json = [line.touches, line.released, line.self_contacts].map(|json| json.map(RawJson::get));
+        assert_eq!(json, [Some(r#"[{"id":3}]"#), Some("[2]"), Some("[]")]);
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub use self::entries::Attached;
 pub use self::reader::Reader;
 pub use self::recorder::Recorder;
 pub use self::survey::{Rhythm, Survey, Topic};
-pub(crate) use self::view::{Arrow, Cloud, Scene, Transforms, scalars, surface};
+pub(crate) use self::view::{Cloud, Scene, ShownTouch, Transforms, scalars, surface};
 
 /// The topic of the frames.
 pub const FRAMES: &str = "/somatic/frames";
@@ -41,7 +41,7 @@ pub const FRAMES: &str = "/somatic/frames";
 pub const PERCEPTS: &str = "/somatic/percepts";
 /// The topic of the taxels as points with their pressures.
 pub const TAXELS: &str = "/somatic/taxels";
-/// The topic of the touched fields as spheres and arrows.
+/// The topic of the touches as ellipsoids and arrows.
 pub const TOUCHES: &str = "/somatic/touches";
 /// The topic of where links are.
 pub const LINKS: &str = "/somatic/links";

@@ -37,6 +37,8 @@ pub struct Recorder {
     taxels: String,
     /// What the outputs of percepts are measured in: metadata of their channel.
     units: BTreeMap<String, String>,
+    /// The JSON schema of percepts.
+    schema_of_percepts: String,
     message: Vec<u8>,
     flushed: Instant,
     /// Whether anything waits to be flushed.
@@ -87,6 +89,7 @@ impl Recorder {
             channels: Vec::new(),
             taxels: words_of(ids),
             units: BTreeMap::new(),
+            schema_of_percepts: r#"{"title":"somatic.Percepts","type":"object"}"#.to_owned(),
             message: Vec::new(),
             flushed: Instant::now(),
             pending: false,
@@ -103,8 +106,13 @@ impl Recorder {
         Ok(recorder)
     }
 
+    /// Says which keys a line of percepts may have, as a JSON schema, before the first of them.
+    pub(crate) fn set_schema_of_percepts(&mut self, schema: String) {
+        self.schema_of_percepts = schema;
+    }
+
     /// Says what the percepts' outputs are measured in, each as the JSON of its unit, before the first of them.
-    pub(crate) fn set_units(&mut self, units: impl IntoIterator<Item = (&'static str, serde_json::Value)>) {
+    pub(crate) fn set_units(&mut self, units: impl IntoIterator<Item = (String, serde_json::Value)>) {
         let word = |unit: serde_json::Value| unit.as_str().map_or_else(|| unit.to_string(), str::to_owned);
         self.units = units.into_iter().map(|(output, unit)| (format!("unit_{output}"), word(unit))).collect();
     }
@@ -160,7 +168,7 @@ impl Recorder {
     fn add_channel(&mut self, topic: &str) -> Result<u16> {
         let (schema, encoding, message_encoding, data) = match topic {
             FRAMES => ("somatic.Frame", "protobuf", "protobuf", schemas::somatic()),
-            PERCEPTS => ("somatic.Percepts", "jsonschema", "json", schemas::PERCEPTS.as_bytes().to_vec()),
+            PERCEPTS => ("somatic.Percepts", "jsonschema", "json", self.schema_of_percepts.clone().into_bytes()),
             TAXELS => ("foxglove.PointCloud", "protobuf", "protobuf", schemas::foxglove()),
             SURFACE | TOUCHES => ("foxglove.SceneUpdate", "protobuf", "protobuf", schemas::foxglove()),
             LINKS => ("foxglove.FrameTransforms", "protobuf", "protobuf", schemas::foxglove()),

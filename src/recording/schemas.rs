@@ -109,12 +109,6 @@ pub(super) fn foxglove() -> Vec<u8> {
     set
 }
 
-/// The schema of a percept: a line of percept NDJSON.
-pub(super) const PERCEPTS: &str = r#"{"title":"somatic.Percepts","type":"object","properties":{"t":{"type":"number"},
-"frame":{"type":"integer"},"fields":{"type":"array","items":{"type":"object","properties":{"field":{"type":"string"},
-"link":{"type":"string"},"contact":{"type":"boolean"},"total":{"type":"number"},"peak":{"type":"number"},
-"flags":{"type":"array","items":{"type":"string"}}}}}}}"#;
-
 // Numbers of fields in `descriptor.proto`.
 fn file(
     set: &mut Writer<'_>,

@@ -147,21 +147,24 @@ impl<'a> Transforms<'a> {
     }
 }
 
-/// A touched field: a sphere where it is touched, and an arrow that presses it.
-pub(crate) struct Arrow<'a> {
-    pub(crate) field: &'a str,
-    pub(crate) link: &'a str,
-    /// In the link's frame, m.
-    pub(crate) position: [f64; 3],
-    /// The outward unit normal there, where it is known.
-    pub(crate) normal: Option<[f64; 3]>,
-    /// Diameter of the sphere, m.
-    pub(crate) diameter_m: f64,
+/// A touch: an ellipsoid where it is, and an arrow that presses it.
+pub(crate) struct ShownTouch<'a> {
+    pub(crate) id: u64,
+    /// What the rest is in.
+    pub(crate) frame: &'a str,
+    /// The middle of the ellipsoid, m.
+    pub(crate) position: DVec3,
+    /// The outward unit normal there.
+    pub(crate) normal: DVec3,
+    /// Turns the ellipsoid's axes into those of the frame.
+    pub(crate) turn: DQuat,
+    /// Its diameters along its own axes, m.
+    pub(crate) diameters_m: DVec3,
     /// Length of the arrow, m.
     pub(crate) length_m: f64,
 }
 
-/// The touched fields: `foxglove.SceneUpdate`, in place of whatever was shown before.
+/// The touches of a frame: `foxglove.SceneUpdate`, in place of whatever was shown before.
 pub(crate) struct Scene<'a> {
     writer: Writer<'a>,
     time_ns: u64,
@@ -177,28 +180,26 @@ impl<'a> Scene<'a> {
         Self { writer, time_ns }
     }
 
-    pub(crate) fn push(&mut self, arrow: &Arrow<'_>) {
+    pub(crate) fn push(&mut self, touch: &ShownTouch<'_>) {
+        let &ShownTouch { id, frame, position, normal, turn, diameters_m, length_m } = touch;
         self.writer.message(2, |entity| {
             entity.time(1, self.time_ns);
-            entity.text(2, arrow.link);
-            entity.text(3, arrow.field);
+            entity.text(2, frame);
+            entity.text(3, &id.to_string());
             entity.number(5, 1);
-            if let Some(normal) = arrow.normal {
-                let normal = DVec3::from_array(normal);
-                let tail = DVec3::from_array(arrow.position) + normal * arrow.length_m;
-                entity.message(7, |primitive| {
-                    // An arrow lies along +x.
-                    pose(primitive, 1, tail.to_array(), DQuat::from_rotation_arc(DVec3::X, -normal));
-                    primitive.double(2, 0.7 * arrow.length_m);
-                    primitive.double(3, 0.1 * arrow.length_m);
-                    primitive.double(4, 0.3 * arrow.length_m);
-                    primitive.double(5, 0.2 * arrow.length_m);
-                    colour(primitive, 6, 1.0);
-                });
-            }
+            entity.message(7, |arrow| {
+                // An arrow lies along +x.
+                let tail = position + normal * length_m;
+                pose(arrow, 1, tail.to_array(), DQuat::from_rotation_arc(DVec3::X, -normal));
+                arrow.double(2, 0.7 * length_m);
+                arrow.double(3, 0.1 * length_m);
+                arrow.double(4, 0.3 * length_m);
+                arrow.double(5, 0.2 * length_m);
+                colour(arrow, 6, 1.0);
+            });
             entity.message(9, |sphere| {
-                pose(sphere, 1, arrow.position, DQuat::IDENTITY);
-                vector(sphere, 2, [arrow.diameter_m; 3]);
+                pose(sphere, 1, position.to_array(), turn);
+                vector(sphere, 2, diameters_m.to_array());
                 colour(sphere, 3, 0.6);
             });
         });

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::body::Body;
-use crate::percept::{Column, Unit};
+use crate::percept::{Column, TouchOutputs, Unit};
 use crate::scene::Plan;
 
 /// Version of the percepts' schema, with the header as its first line.
@@ -13,6 +13,12 @@ const VERSION: u32 = 2;
 /// field.
 pub(super) fn units(plan: &Plan) -> Vec<(&'static str, Value)> {
     plan.outputs().columns().map(|column| (column.name, unit(plan, column))).collect()
+}
+
+/// The units of all quantities of touches of the whole body; none where no touches are looked for.
+pub(super) fn units_of_touches(plan: &Plan) -> Vec<(&'static str, Value)> {
+    let outputs = plan.touch_outputs().unwrap_or(TouchOutputs::empty());
+    outputs.columns().map(|column| (column.name, in_unit(plan, column.unit))).collect()
 }
 
 fn unit(plan: &Plan, column: &Column) -> Value {
@@ -39,9 +45,9 @@ pub(super) fn line(plan: &Plan, body: Option<&Body>) -> String {
         json!({"name": body.name, "taxels": body.taxels.len(), "fields": fields})
     });
     let mut line = json!({"somatic": VERSION, "units": units, "body": body});
-    if let Some(outputs) = plan.touch_outputs() {
-        let of_touches = outputs.columns().map(|column| (column.name.to_owned(), in_unit(plan, column.unit)));
-        line["touches"] = Value::Object(of_touches.collect());
+    if plan.touch_outputs().is_some() {
+        let units = units_of_touches(plan).into_iter();
+        line["touches"] = Value::Object(units.map(|(name, unit)| (name.to_owned(), unit)).collect());
     }
     line.to_string()
 }

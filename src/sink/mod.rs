@@ -11,12 +11,16 @@ mod ndjson;
 #[cfg(feature = "page")]
 mod page;
 #[cfg(feature = "mcap")]
+mod percept_schema;
+#[cfg(feature = "mcap")]
 mod recorded;
 #[cfg(feature = "mcap")]
 mod ros2;
 mod spec;
 mod table;
 mod touch_line;
+#[cfg(feature = "mcap")]
+mod touch_mark;
 #[cfg(feature = "mcap")]
 mod view;
 #[cfg(feature = "zenoh")]
@@ -53,6 +57,11 @@ use crate::signal::{BoardHealth, Frame, RawValue, Wiring};
 
 /// Something that takes percepts.
 pub trait Sink {
+    /// What people are to know before the first frame, a line each: what the output will not hold, and why.
+    fn remarks(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Takes the frames of the next percepts. Sinks of percepts ignore them.
     ///
     /// # Errors
@@ -255,7 +264,7 @@ pub enum RecordPart {
     Frames,
     /// Percepts, as in NDJSON.
     Percepts,
-    /// What viewers show: taxels with pressures, touched fields, links.
+    /// What viewers show: taxels with pressures, touches, links.
     View,
 }
 

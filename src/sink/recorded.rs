@@ -2,12 +2,14 @@
 
 use super::header;
 use super::line::LineWriter;
+use super::percept_schema;
 use super::view::ViewWriter;
 use super::{Flow, InputFrames, RecordPart, Session, Sink};
 use crate::error::Result;
 use crate::output::OutputPath;
 use crate::percept::Percepts;
 use crate::recording::{PERCEPTS, Recorder};
+use crate::scene::Plan;
 
 /// Records to MCAP.
 pub struct RecordingSink {
@@ -26,8 +28,11 @@ impl RecordingSink {
     pub fn create(output: OutputPath, session: &Session<'_>) -> Result<Self> {
         let create = if session.is_recorded { Recorder::create_whole } else { Recorder::create };
         let mut recorder = create(output, session.taxels)?;
+        recorder.set_schema_of_percepts(percept_schema::text());
         if let Some(plan) = session.plan {
-            recorder.set_units(header::units(plan));
+            let of_fields = header::units(plan).into_iter().map(|(name, unit)| (name.to_owned(), unit));
+            let of_touches = header::units_of_touches(plan).into_iter();
+            recorder.set_units(of_fields.chain(of_touches.map(|(name, unit)| (format!("touches.{name}"), unit))));
         }
         for (name, media_type, bytes) in &session.attached {
             recorder.attach(name, media_type, bytes)?;
@@ -39,7 +44,10 @@ impl RecordingSink {
             frames: holds(RecordPart::Frames),
             percepts: holds(RecordPart::Percepts)
                 .then(|| LineWriter::new(&session.names, session.all_fields).with_skin(skin.as_ref())),
-            view: session.body.filter(|_| holds(RecordPart::View)).map(|body| ViewWriter::new(body, &session.names)),
+            view: session.body.filter(|_| holds(RecordPart::View)).map(|body| {
+                let world = session.plan.map_or("world", Plan::world);
+                ViewWriter::new(body, &session.names, world)
+            }),
             line: Vec::new(),
         })
     }

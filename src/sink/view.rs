@@ -1,15 +1,17 @@
-//! Writes what viewers show of a recording, at a rate for the eye: taxels with pressures, touched fields, link poses.
+//! Writes what viewers show of a recording, at a rate for the eye: taxels with pressures, touches, link poses.
 
 use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 
+use super::touch_mark::TouchMark;
 use super::{FieldNames, InputFrames};
 use crate::body::Body;
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::recording::{
-    Arrow, Cloud, FIELDS, LINKS, Recorder, SURFACE, Scene, TAXELS, TOUCHES, Transforms, nanoseconds, scalars, surface,
+    Cloud, FIELDS, LINKS, Recorder, SURFACE, Scene, ShownTouch, TAXELS, TOUCHES, Transforms, nanoseconds, scalars,
+    surface,
 };
 use crate::signal::Frame;
 
@@ -19,8 +21,6 @@ const TAXELS_PERIOD_S: f64 = 0.1;
 const TOUCHES_PERIOD_S: f64 = 0.04;
 /// Period of the messages of links at rest, s: a viewer that seeks needs them soon.
 const LINKS_PERIOD_S: f64 = 1.0;
-/// Diameter of the sphere of a touch without an area, m.
-const DEFAULT_DIAMETER_M: f64 = 0.01;
 /// Length of the arrow of the strongest touch so far, m; the shortest is a fifth of it.
 const MAX_ARROW_M: f64 = 0.06;
 
@@ -53,8 +53,8 @@ pub(super) struct ViewWriter {
     world: Vec<DAffine3>,
     /// Per taxel id, its link and position in it, m.
     taxels: HashMap<u32, (usize, DVec3)>,
-    /// Told apart by their names alone.
-    fields: Vec<FieldNames>,
+    /// The frame of touches that are in the world.
+    world_name: String,
     /// Topics of the fields without parents, each with the field's index.
     top_fields: Vec<(String, usize)>,
     /// By link, the corners of its triangles in its frame, m, until they are written.
@@ -70,7 +70,8 @@ pub(super) struct ViewWriter {
 }
 
 impl ViewWriter {
-    pub(super) fn new(body: &Body, names: &[FieldNames]) -> Self {
+    /// For `body`, whose fields are called `names`; touches in the world are in the frame `world`.
+    pub(super) fn new(body: &Body, names: &[FieldNames], world: &str) -> Self {
         let links: Vec<Link> = body
             .links
             .iter()
@@ -94,16 +95,15 @@ impl ViewWriter {
             let parent = body.fields.iter().find(|spec| spec.name == name).and_then(|spec| spec.parent.as_deref());
             !parent.is_some_and(is_computed)
         };
-        let fields: Vec<FieldNames> = names.iter().map(FieldNames::told_apart).collect();
-        let top = names.iter().zip(&fields).enumerate().filter(|(_, (names, _))| is_top(&names.field));
+        let top = names.iter().enumerate().filter(|(_, names)| is_top(&names.field));
         Self {
-            top_fields: top.map(|(index, (_, shown))| (format!("{FIELDS}{}", shown.field), index)).collect(),
+            top_fields: top.map(|(index, names)| (format!("{FIELDS}{}", names.told_apart().field), index)).collect(),
             surface: Some(surface),
             index_of: links.iter().enumerate().map(|(index, link)| (link.name.clone(), index)).collect(),
             world: links.iter().map(|link| link.world_from_link).collect(),
             taxels: body.taxels.iter().map(|taxel| (taxel.id, (taxel.link, taxel.position_in_link))).collect(),
             links,
-            fields,
+            world_name: world.to_owned(),
             cloud: Cloud::default(),
             pressures: Vec::new(),
             max_total: 0.0,
@@ -179,7 +179,7 @@ impl ViewWriter {
         }
     }
 
-    /// Writes the touched fields.
+    /// Writes touches, and the totals of fields.
     pub(super) fn write_touches(&mut self, percepts: &Percepts, recorder: &mut Recorder) -> Result<()> {
         for frame in 0..percepts.frames() {
             let t_s = percepts.t_s(frame);
@@ -191,30 +191,27 @@ impl ViewWriter {
                     recorder.write(topic, t_s, &self.message)?;
                 }
             }
-            if !self.timers[1].is_due(t_s, TOUCHES_PERIOD_S) {
+            let Some(found) = percepts.touches(frame).filter(|_| self.timers[1].is_due(t_s, TOUCHES_PERIOD_S)) else {
                 continue;
-            }
+            };
             self.message.clear();
             let mut scene = Scene::new(nanoseconds(t_s), &mut self.message);
-            let mut any = false;
-            for percept in percepts.touched(frame) {
-                let Some(position) = percept.position else { continue };
-                let FieldNames { field, link, world, .. } = &self.fields[percept.field];
-                let pressed = percept.total.or(percept.peak);
-                self.max_total = self.max_total.max(pressed.unwrap_or(0.0));
-                let share = pressed.map_or(1.0, |pressed| pressed / self.max_total.max(f64::MIN_POSITIVE));
-                let area = percept.area.filter(|&area| area > 0.0);
-                scene.push(&Arrow {
-                    field,
-                    link: if percept.in_world { world } else { link },
+            for touch in &found.touches {
+                self.max_total = self.max_total.max(touch.total);
+                let share = touch.total / self.max_total.max(f64::MIN_POSITIVE);
+                let TouchMark { position, normal, turn, diameters_m } = TouchMark::of(touch);
+                scene.push(&ShownTouch {
+                    id: touch.id,
+                    frame: if touch.in_world { &self.world_name } else { &self.links[touch.link as usize].name },
                     position,
-                    normal: percept.normal,
-                    diameter_m: area.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt()),
+                    normal,
+                    turn,
+                    diameters_m,
                     length_m: MAX_ARROW_M * share.clamp(0.2, 1.0),
                 });
-                any = true;
             }
             // The end of all touches is written once.
+            let any = !found.touches.is_empty();
             if any || self.shown {
                 recorder.write(TOUCHES, t_s, &self.message)?;
             }

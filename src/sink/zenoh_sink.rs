@@ -1,11 +1,11 @@
 //! Sends the frames or the percepts of a limb to the computer that brings limbs together.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::time::{Duration, Instant};
 
 use super::handover::{Carrier, Handover, tell};
 use super::line::LineWriter;
-use super::{FieldNames, Flow, InputFrames, Session, Sink};
+use super::{FieldNames, Flow, InputFrames, Session, Sink, SkinNames};
 use crate::error::Result;
 use crate::limb::{
     FRAME_BYTES, LimbSends, Network, PerceptHead, Publication, Side, end_packet, frame_packet, hash, layout_packet,
@@ -27,7 +27,7 @@ pub struct ZenohSink {
     packets: Handover<Vec<u8>>,
     sends: LimbSends,
     lines: LineWriter,
-    /// The indices of the values that are sent, of a frame's: those of the taxels that the plan reads.
+    /// The indices of the values that are sent, of a frame's: those of the taxels of the plan's fields.
     sent: Vec<usize>,
     values: Vec<RawValue>,
     layout: u32,
@@ -44,7 +44,11 @@ impl ZenohSink {
     /// The session cannot be opened.
     pub fn open(key: &str, sends: LimbSends, session: &Session<'_>) -> Result<Self> {
         let read: Option<HashSet<u32>> = session.plan.zip(session.body).map(|(plan, body)| {
-            plan.body_taxels.iter().filter_map(|&index| body.taxels.get(index)).map(|taxel| taxel.id).collect()
+            taxels_of_fields(plan)
+                .into_iter()
+                .filter_map(|index| body.taxels.get(index))
+                .map(|taxel| taxel.id)
+                .collect()
         });
         let is_read = |id: &u32| read.as_ref().is_none_or(|read| read.contains(id));
         let sent: Vec<usize> = (0..session.taxels.len()).filter(|&index| is_read(&session.taxels[index])).collect();
@@ -116,16 +120,28 @@ impl Sink for ZenohSink {
     }
 }
 
+/// The taxels of the fields of `plan`, as indices of the body. Touches of the whole body read the others, too; those are for other
+/// limbs to send.
+fn taxels_of_fields(plan: &Plan) -> BTreeSet<usize> {
+    let members = plan.fields.iter().flat_map(|field| plan.members_of(field));
+    members.map(|member| plan.body_taxels[plan.channel_of(member.slot as usize)]).collect()
+}
+
 /// Bytes of a frame of a limb whose engine has `plan`, without those of Zenoh and of the network.
 #[must_use]
 pub fn limb_frame_bytes(plan: &Plan) -> usize {
-    FRAME_BYTES + 4 * plan.channels()
+    FRAME_BYTES + 4 * taxels_of_fields(plan).len()
 }
 
-/// Bytes of `percepts`, all their frames, as a limb sends them, without those of Zenoh and of the network.
+/// Bytes of `percepts`, all their frames, as a limb sends them, without those of Zenoh and of the network. Their touches are on `skin`.
 #[must_use]
-pub fn limb_percept_bytes(names: &[FieldNames], all_fields: bool, percepts: &Percepts) -> usize {
-    let lines = LineWriter::new(names, all_fields);
+pub fn limb_percept_bytes(
+    names: &[FieldNames],
+    all_fields: bool,
+    skin: Option<&SkinNames>,
+    percepts: &Percepts,
+) -> usize {
+    let lines = LineWriter::new(names, all_fields).with_skin(skin);
     let bytes = |frame: usize| {
         let mut line = Vec::new();
         percepts_begin(&mut line, PerceptHead { boot: 255, sequence: percepts.frame_number(frame) as u32 });
@@ -173,7 +189,7 @@ mod tests {
     use std::thread;
 
     use super::*;
-    use crate::{Body, Engine, Frame, Options, bundled};
+    use crate::{Body, Engine, Frame, Options, Scene, bundled, touch};
 
     fn median_us(mut act: impl FnMut()) -> f64 {
         let mut took: Vec<f64> = (0..4000)
@@ -187,6 +203,23 @@ mod tests {
             .collect();
         took.sort_by(f64::total_cmp);
         took[took.len() / 2]
+    }
+
+    #[test]
+    fn a_limb_sends_the_taxels_of_its_fields_also_where_touches_read_all() {
+        let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        let scene = |touches: Option<touch::Options>| {
+            Scene { fields: vec!["hand/midhand/thumb".into()], ..Scene::default() }.touches(touches)
+        };
+        let plan = |touches: Option<touch::Options>| {
+            let options = Options::default().scene(scene(touches)).backend(crate::BackendKind::Reference);
+            Engine::new(&body, options).unwrap().plan().clone()
+        };
+        let (without, with) = (plan(None), plan(Some(touch::Options::default())));
+        assert!(without.channels() == 5 && with.channels() == body.taxels.len());
+        assert_eq!(taxels_of_fields(&with), taxels_of_fields(&without));
+        assert_eq!(taxels_of_fields(&with).into_iter().collect::<Vec<_>>(), without.body_taxels);
+        assert_eq!(limb_frame_bytes(&with), FRAME_BYTES + 4 * 5);
     }
 
     #[test]

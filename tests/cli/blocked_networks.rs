@@ -85,7 +85,7 @@ fn a_node_that_stops_reading_holds_up_no_percept_and_what_it_did_not_get_is_coun
     let domain = domain();
     let touches = ("/somatic/touches", "visualization_msgs/msg/MarkerArray", "reliable:stamps");
     let mut peer = Peer::receive(&python, &domain, &[touches]);
-    let arguments = ["run", "-q", "--body", &body, "--source", "-", "--outputs", "peak,position", "--backend", "cpu"];
+    let arguments = ["run", "-q", "--body", &body, "--source", "-", "--outputs", "touches,peak", "--backend", "cpu"];
     let mut child = run(&domain, &[&arguments[..], &["--sink", "-", "--sink", "ros2"]].concat());
     let mut send = |number: u64| writeln!(child.child.stdin.as_mut().unwrap(), "{}", frame(4, number)).unwrap();
     // Of what is sent while the two find each other, some may be nobody's.

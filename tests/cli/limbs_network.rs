@@ -144,32 +144,32 @@ impl Limb {
 
     /// The same in a network namespace.
     pub fn start_in(space: Option<&str>, field: &str, key: &str, config: &str) -> Self {
+        Self::start_as(space, field, key, config, &["--outputs", OUTPUTS, "--all-fields"])
+    }
+
+    /// The same with any outputs and further sinks.
+    pub fn start_as(space: Option<&str>, field: &str, key: &str, config: &str, more: &[&str]) -> Self {
         let sink = if key.contains(':') { key.to_owned() } else { format!("zenoh:{key}") };
-        let arguments = [
-            "run",
-            "--fields",
-            field,
-            "--outputs",
-            OUTPUTS,
-            "--source",
-            "-",
-            "--backend",
-            "cpu",
-            "--sink",
-            &sink,
-            "--zenoh-config",
-            config,
-            "--all-fields",
-        ];
-        let mut running = Running::start(space, &arguments);
+        let arguments =
+            ["run", "--fields", field, "--source", "-", "--backend", "cpu", "--sink", &sink, "--zenoh-config", config];
+        let mut running = Running::start(space, &[&arguments[..], more].concat());
         let input = Some(running.take_input());
         Self { running, input, taxels: taxels_of(field), begin: Instant::now(), written: Vec::new() }
     }
 
     /// Sends the frame `row`, at `t_s` on the limb's clock.
     pub fn send_at(&mut self, row: u64, t_s: f64) {
+        self.send_values(t_s, |index| value(row, index));
+    }
+
+    /// Sends a frame in which every taxel has the same raw value.
+    pub fn send_all(&mut self, value: f64) {
+        self.send_values(self.begin.elapsed().as_secs_f64(), |_| value);
+    }
+
+    fn send_values(&mut self, t_s: f64, value: impl Fn(usize) -> f64) {
         let values: BTreeMap<String, f64> =
-            self.taxels.iter().enumerate().map(|(index, id)| (id.to_string(), value(row, index))).collect();
+            self.taxels.iter().enumerate().map(|(index, id)| (id.to_string(), value(index))).collect();
         let line = json!({"t": t_s, "values": values});
         self.written.push(Instant::now());
         writeln!(self.input.as_mut().unwrap(), "{line}").unwrap();

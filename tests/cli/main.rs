@@ -25,6 +25,8 @@ mod limbs_merged;
 mod limbs_network;
 #[cfg(all(unix, feature = "zenoh"))]
 mod limbs_others;
+#[cfg(all(unix, feature = "zenoh"))]
+mod limbs_touches;
 mod limits;
 mod live;
 mod mjcf;

@@ -693,7 +693,9 @@ fn another_library_reads_the_same() {
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
-    let percepts = done(&["run", "--sink", &source(&path), "--sink", "-", "--backend", "cpu"]);
+    let outputs = ["--outputs", "touches,touches.taxels,total,area"];
+    let percepts =
+        done(&[&["run", "--sink", &source(&path), "--sink", "-", "--backend", "cpu"], &outputs[..]].concat());
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mcap/read.py");
     let output = Command::new(python).arg(script).arg(&path).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
@@ -742,15 +744,14 @@ fn another_library_reads_the_same() {
     let shown: Vec<&Value> =
         said["touches"].as_array().unwrap().iter().flat_map(|scene| scene.as_array().unwrap()).collect();
     let lines = frames(&percepts);
-    let felt: Vec<&Value> = lines.iter().flat_map(|line| line["fields"].as_array().unwrap()).collect();
+    let felt: Vec<&Value> = lines.iter().flat_map(|line| line["touches"].as_array().unwrap()).collect();
     assert!(shown.len() > 20 && shown.len() <= felt.len());
     for entity in shown {
-        let known = felt.iter().any(|f| {
-            let arrows = u64::from(!f["normal"].is_null());
-            f["field"] == entity["id"]
-                && f["link"] == entity["frame_id"]
-                && f["position"] == entity["sphere"]
-                && entity["arrows"] == arrows
+        let known = felt.iter().any(|touch| {
+            entity["id"] == touch["id"].to_string()
+                && entity["frame_id"] == touch["in"]
+                && entity["sphere"] == touch["position"]
+                && entity["arrows"] == 1
         });
         assert!(known, "{entity}");
     }

@@ -1,6 +1,6 @@
 //! Messages and bags of ROS 2, as other programs read them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -13,7 +13,7 @@ use somatic::robot::messages::{
 
 use super::python::python_with;
 use super::skips::skip;
-use super::{done, fails, file, files_in, frames, stderr, text_of};
+use super::{done, fails, file, files_in, frames, output, stderr, text_of};
 
 const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
 
@@ -199,63 +199,117 @@ fn a_bag_is_read_whole_and_our_percepts_come_back_from_it() {
     let (folder, flags) = arm_run();
     let bag = folder.path().join("touch bag");
     let sink = format!("ros2-mcap:{}", text_of(&bag));
-    let percepts = frames(&done(&with(&flags, &["--sink", &sink])));
+    let outputs = ["--outputs", "touches,touches.wrench,total", "--sink", &sink];
+    let percepts = frames(&done(&with(&flags, &outputs)));
     assert_eq!(files_in(&bag), ["metadata.yaml", "touch bag_0.mcap"]);
     let Some(read) = read(&["bag", text_of(&bag)]) else { return };
     let read = read.unwrap();
     let topics = read["topics"].as_object().unwrap();
     assert!(topics.values().all(|topic| topic["hash"] == true), "{topics:?}");
     let count = |topic: &str| topics[topic]["count"].as_u64().unwrap();
-    assert_eq!(count("/somatic/taxels/fore_arm"), 101);
-    assert_eq!(count("/tf"), 101);
+    for topic in ["/somatic/taxels/fore_arm", "/somatic/wrench/fore_arm", "/tf"] {
+        assert_eq!(count(topic), 101, "{topic}");
+    }
     let messages = read["messages"].as_array().unwrap();
     assert_eq!((&read["count"], &read["by_mcap_ros2"]), (&messages.len().into(), &messages.len().into()));
     assert!(read["times_ns"].as_array().unwrap().is_sorted_by_key(|time| time.as_u64().unwrap()));
     assert_eq!((&read["start_ns"], &read["duration_ns"]), (&0.into(), &2_000_000_001_u64.into()));
 
-    // By time and name, the sphere of each touched field.
-    let mut spheres = BTreeMap::new();
-    let mut deleted = 0;
-    let mut forces = BTreeMap::new();
+    // By time and id, the marker of each touch, and its end; by time, the wrench of the link, and those of touches.
+    let (mut markers, mut ended) = (BTreeMap::new(), BTreeSet::new());
+    let (mut of_link, mut of_touches) = (BTreeMap::new(), BTreeMap::<u64, Vec<&Value>>::new());
     for message in messages {
         let (topic, time_ns, values) = (message[0].as_str().unwrap(), message[1].as_u64().unwrap(), &message[2]);
-        if topic == "/somatic/touches" {
-            for marker in values["markers"].as_array().unwrap() {
-                assert_eq!(marker["header"]["stamp"]["sec"].as_u64().unwrap(), time_ns / 1_000_000_000);
-                deleted += usize::from(marker["action"] == 2);
-                if marker["type"] == 2 && marker["action"] == 0 {
-                    spheres.insert((time_ns, marker["ns"].as_str().unwrap().to_owned()), marker);
+        match topic {
+            "/somatic/touches" => {
+                for marker in values["markers"].as_array().unwrap() {
+                    assert_eq!(marker["header"]["stamp"]["sec"].as_u64().unwrap(), time_ns / 1_000_000_000);
+                    assert_eq!(marker["ns"], "touches");
+                    let key = (time_ns, marker["id"].as_u64().unwrap());
+                    let is_new =
+                        if marker["action"] == 2 { ended.insert(key) } else { markers.insert(key, marker).is_none() };
+                    assert!(is_new, "one for each touch: {marker}");
                 }
             }
-        } else if let Some(field) = topic.strip_prefix("/somatic/wrench/") {
-            assert_eq!(values["header"]["frame_id"], "fore_arm");
-            forces.insert((time_ns, field.to_owned()), values["wrench"].clone());
+            "/somatic/wrench/fore_arm" => drop(of_link.insert(time_ns, values)),
+            "/somatic/touch_wrenches" => of_touches.entry(time_ns).or_default().push(values),
+            _ => {}
         }
     }
-    let mut compared = 0;
+    let vector = |value: &Value| DVec3::from_array(["x", "y", "z"].map(|axis| number(&value[axis])));
+    let listed = |value: &Value| DVec3::from_array([0, 1, 2].map(|axis| number(&value[axis])));
+    let (mut compared, mut deleted) = (0, 0);
     for frame in &percepts {
         let time_ns = (number(&frame["t"]) * 1e9).round() as u64;
-        for field in frame["fields"].as_array().unwrap() {
-            let name = field["field"].as_str().unwrap().to_owned();
-            let marker = spheres.remove(&(time_ns, name.clone())).unwrap_or_else(|| panic!("{name} at {time_ns}"));
-            assert_eq!((&field["link"], &marker["header"]["frame_id"]), (&"world".into(), &"world".into()));
-            let [x, y, z] = [0, 1, 2].map(|axis| number(&field["position"][axis]));
-            let place = &marker["pose"]["position"];
-            for (theirs, ours) in [("x", x), ("y", y), ("z", z)].map(|(axis, ours)| (number(&place[axis]), ours)) {
-                assert!((theirs - ours).abs() < 1e-12, "{name} at {time_ns}: {place}");
+        let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+        let touches = frame["touches"].as_array().unwrap();
+        let presses = of_touches.remove(&time_ns).unwrap_or_default();
+        assert_eq!(presses.len(), touches.len(), "all on one link");
+        for (touch, press) in touches.iter().zip(presses) {
+            let id = touch["id"].as_u64().unwrap();
+            let marker = markers.remove(&(time_ns, id)).unwrap_or_else(|| panic!("{id} at {time_ns}"));
+            assert_eq!(
+                (&marker["type"], &touch["in"], &marker["header"]["frame_id"]),
+                (&2.into(), &"world".into(), &"world".into())
+            );
+            let pose = &marker["pose"];
+            assert!(
+                vector(&pose["position"]).distance(listed(&touch["position"])) < 1e-12,
+                "{id} at {time_ns}: {pose}"
+            );
+            let [x, y, z, w] = ["x", "y", "z", "w"].map(|part| number(&pose["orientation"][part]));
+            let turn = DQuat::from_xyzw(x, y, z, w);
+            assert!((turn * DVec3::Z).distance(listed(&touch["normal"])) < 1e-9, "{id} at {time_ns}: {pose}");
+            if let Some(axis) = touch.get("principal_axis") {
+                assert!((turn * DVec3::X).cross(listed(axis)).length() < 1e-6, "{id} at {time_ns}: {pose} {axis}");
             }
-            // The skin is flat and points to z: its pull is −z, the force's size that of the percept.
-            if let Some(wrench) = forces.get(&(time_ns, name)) {
-                let (force, told) = (&wrench["force"], number(&field["force"]));
-                assert!(
-                    (number(&force["z"]) + told).abs() <= 1e-12 * told.abs() && number(&force["x"]).abs() < 1e-9,
-                    "{force} {told}"
-                );
-                compared += 1;
+            let own = &touch["wrench"]["fore_arm"];
+            assert_eq!(press["header"]["frame_id"], "fore_arm");
+            for (part, sum) in [("force", &mut force), ("torque", &mut torque)] {
+                assert_eq!(vector(&press["wrench"][part]), listed(&own[part]));
+                *sum += listed(&own[part]);
             }
+            compared += 1;
+        }
+        // The skin is flat and points to z: what presses it pulls along −z.
+        let wrench = &of_link[&time_ns]["wrench"];
+        assert_eq!(of_link[&time_ns]["header"]["frame_id"], "fore_arm");
+        assert!(vector(&wrench["force"]).distance(force) < 1e-9 && vector(&wrench["torque"]).distance(torque) < 1e-9);
+        assert!(force.x.abs() < 1e-9 && force.z <= 0.0, "{force}");
+        for id in frame["released"].as_array().unwrap() {
+            assert!(ended.remove(&(time_ns, id.as_u64().unwrap())), "{id} at {time_ns}");
+            deleted += 1;
         }
     }
-    assert!(spheres.is_empty() && compared > 50 && deleted > 0, "{compared} compared, {deleted} deleted");
+    assert!(
+        markers.is_empty() && ended.is_empty() && compared > 50 && deleted > 0,
+        "{compared} compared, {deleted} deleted"
+    );
+}
+
+#[test]
+fn what_a_bag_will_not_hold_is_said_once() {
+    let (folder, flags) = arm_run();
+    let body = flags[2].as_str();
+    let said = |name: &str, more: &[&str]| {
+        let sink = format!("ros2-mcap:{}", text_of(&folder.path().join(name)));
+        let arm = ["run", "--body", body, "--source", &flags[4], "--backend", "reference", "--sink", &sink];
+        let output = output(&[&arm[..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        stderr(&output).lines().filter(|line| line.contains("sink `ros2-mcap`")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    // Without a calibration P is a count; fields alone have no touches.
+    let counts = said("counts", &["--outputs", "touches,total"]);
+    assert!(matches!(&counts[..], [why] if why.contains("no wrenches of links: P has no unit")), "{counts:?}");
+    let calibration = flags.iter().find(|flag| flag.ends_with("arm-calibration.toml")).unwrap();
+    let calibrated = ["--calibration", calibration];
+    assert_eq!(said("both", &[&calibrated[..], &["--outputs", "touches,total"]].concat()), [""; 0]);
+    let fields = said("fields", &[&calibrated[..], &["--outputs", "total"]].concat());
+    assert!(
+        matches!(&fields[..], [why] if why.contains("no markers of touches: add touches to --outputs")),
+        "{fields:?}"
+    );
+    assert_eq!(said("quiet", &["--outputs", "total", "--quiet"]), [""; 0]);
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn time_ns(frame: &Value) -> u64 {
 }
 
 const ARM_TOPICS: [(&str, &str, &str); 6] = [
-    ("/left/somatic/wrench/fore_arm/patch_01", "geometry_msgs/msg/WrenchStamped", "reliable"),
+    ("/left/somatic/wrench/fore_arm", "geometry_msgs/msg/WrenchStamped", "reliable"),
     ("/left/somatic/taxels/fore_arm", CLOUD, "best_effort"),
     ("/left/somatic/touches", "visualization_msgs/msg/MarkerArray", "reliable"),
     ("/left/tf", "tf2_msgs/msg/TFMessage", "reliable"),
@@ -71,9 +71,12 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
     let Some(python) = python() else { return };
     let (_folder, body, lines) = arm();
     let (urdf, calibration) = (format!("{ROBOT}/arm.urdf"), format!("{ROBOT}/arm-calibration.toml"));
-    let flags = [&arm_flags(&body, &urdf, &calibration)[..], &["--sink", "ros2:/left"]].concat();
+    let outputs = ["--outputs", "touches,touches.wrench,total", "--sink", "ros2:/left"];
+    let flags = [&arm_flags(&body, &urdf, &calibration)[..], &outputs].concat();
     let domain = domain();
-    let mut peer = Peer::receive(&python, &domain, &ARM_TOPICS);
+    let mut topics = ARM_TOPICS.to_vec();
+    topics.push(("/left/somatic/touch_wrenches", "geometry_msgs/msg/WrenchStamped", "reliable"));
+    let mut peer = Peer::receive(&python, &domain, &topics);
     let mut percepts = Vec::new();
     for _ in 0..2 {
         let mut child = run(&domain, &flags);
@@ -99,42 +102,49 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
     let clouds = of("/left/somatic/taxels/fore_arm");
     assert!(clouds.len() * 1000 >= times.len() * 999, "{} of {} clouds", clouds.len(), times.len());
     assert!(clouds.iter().all(|cloud| cloud["header"]["frame_id"] == "fore_arm" && cloud["point_step"] == 20));
-    // The spheres are the percepts.
-    let mut spheres = BTreeMap::new();
-    let mut deleted = 0;
+    // The markers are the touches, one each, and end with them.
+    let (mut markers, mut ended) = (BTreeMap::new(), 0);
     for message in of("/left/somatic/touches") {
         for marker in message["markers"].as_array().unwrap() {
-            deleted += usize::from(marker["action"] == 2);
-            if marker["type"] == 2 && marker["action"] == 0 {
-                spheres.insert((stamp_ns(message), marker["ns"].as_str().unwrap().to_owned()), marker.clone());
+            ended += usize::from(marker["action"] == 2);
+            if marker["action"] == 0 {
+                markers.insert((stamp_ns(message), marker["id"].as_u64().unwrap()), marker.clone());
             }
         }
     }
-    // The skin is flat and points to z: the force on it is the percept's, along −z.
-    let wrenches = of("/left/somatic/wrench/fore_arm/patch_01");
-    let forces: BTreeMap<u64, f64> =
-        wrenches.iter().map(|wrench| (stamp_ns(wrench), wrench["wrench"]["force"]["z"].as_f64().unwrap())).collect();
-    assert!(wrenches.len() == times.len() && forces.len() == percepts[0].len(), "{} wrenches", wrenches.len());
-    let (mut compared, mut forces_compared) = (0, 0);
+    // The skin is flat and points to z: the force on it is that of the touches, along −z.
+    let pull = |message: &Value| message["wrench"]["force"]["z"].as_f64().unwrap();
+    let wrenches = of("/left/somatic/wrench/fore_arm");
+    let of_link: BTreeMap<u64, f64> = wrenches.iter().map(|wrench| (stamp_ns(wrench), pull(wrench))).collect();
+    assert!(wrenches.len() == times.len() && of_link.len() == percepts[0].len(), "{} wrenches", wrenches.len());
+    let of_touches: BTreeMap<u64, Vec<f64>> =
+        of("/left/somatic/touch_wrenches").iter().fold(BTreeMap::new(), |mut all, wrench| {
+            all.entry(stamp_ns(wrench)).or_default().push(pull(wrench));
+            all
+        });
+    let (mut compared, mut released) = (0, 0);
     for frame in &percepts[0] {
-        for field in frame["fields"].as_array().unwrap() {
-            let marker = &spheres[&(time_ns(frame), field["field"].as_str().unwrap().to_owned())];
-            let number = |value: &Value| value.as_f64().unwrap();
-            let [x, y, z] = [0, 1, 2].map(|axis| number(&field["position"][axis]));
+        let number = |value: &Value| value.as_f64().unwrap();
+        let mut forces = Vec::new();
+        for touch in frame["touches"].as_array().unwrap() {
+            let marker = &markers[&(time_ns(frame), touch["id"].as_u64().unwrap())];
+            let [x, y, z] = [0, 1, 2].map(|axis| number(&touch["position"][axis]));
             let place = &marker["pose"]["position"];
             for (axis, ours) in [("x", x), ("y", y), ("z", z)] {
                 assert!((number(&place[axis]) - ours).abs() < 1e-12, "{place}");
             }
-            if field["field"] == "fore_arm/patch_01" {
-                let told = number(&field["force"]);
-                assert!((forces[&time_ns(frame)] + told).abs() <= 1e-12 * told.abs(), "{field}");
-                forces_compared += 1;
-            }
+            forces.push(number(&touch["wrench"]["fore_arm"]["force"][2]));
             compared += 1;
         }
+        let sum: f64 = forces.iter().sum();
+        assert!((of_link[&time_ns(frame)] - sum).abs() <= 1e-9, "{frame}");
+        // Both runs have the same times.
+        let twice = [&forces[..], &forces].concat();
+        assert_eq!(of_touches.get(&time_ns(frame)).cloned().unwrap_or_default(), twice);
+        released += 2 * frame["released"].as_array().unwrap().len();
     }
-    assert!(forces_compared > 10, "{forces_compared} forces");
-    assert!(compared > 50 && compared == spheres.len() && deleted > 0, "{compared} of {}, {deleted}", spheres.len());
+    assert!(compared > 50 && compared == markers.len(), "{compared} of {}", markers.len());
+    assert!(ended == released && ended > 0, "{ended} ends of {released}");
 }
 
 #[test]
@@ -147,7 +157,22 @@ fn another_node_finds_the_node_and_what_it_writes_and_reads_until_it_goes() {
     let mut writes = Peer::start(&python, &domain, &["node", "/left/somatic", "6"]);
     let mut reads = Peer::start(&python, &domain, &["node", "/somatic_joints", "2"]);
     let body = body.display().to_string();
-    let flags = ["run", "-q", "--body", &body, "--source", "-", "--joints", &urdf, "--up", "z", "--sink", "ros2:/left"];
+    let flags = [
+        "run",
+        "-q",
+        "--body",
+        &body,
+        "--source",
+        "-",
+        "--joints",
+        &urdf,
+        "--up",
+        "z",
+        "--outputs",
+        "touches,total",
+        "--sink",
+        "ros2:/left",
+    ];
     let child = run(&domain, &[&flags[..], &["--joint-states", "ros2:/joint_states"]].concat());
     let topics = |peer: &mut Peer| -> [Vec<String>; 2] { serde_json::from_str(&peer.line()).unwrap() };
     let names = ["diagnostics", "somatic/joint_states", "somatic/taxels/fore_arm", "somatic/touches", "tf"];
@@ -409,13 +434,13 @@ fn a_thousand_taxels_at_250_hz_arrive() {
     let mut peer = Peer::receive(&python, &domain, &topics);
     let mut child = run(
         &domain,
-        &["run", "--body", text_of(&body), "--source", "-", "--outputs", "position,normal", "--sink", "ros2"],
+        &["run", "--body", text_of(&body), "--source", "-", "--outputs", "touches,total", "--sink", "ros2"],
     );
     peer.wait_for("matched");
     std::thread::sleep(Duration::from_millis(500));
     let frame = |number: usize| {
         let values: BTreeMap<String, usize> =
-            (0..1000).map(|id: usize| (id.to_string(), 1 + (id * number) % 90)).collect();
+            (0..1000).map(|id: usize| (id.to_string(), 1 + (id + 7 * number) % 250)).collect();
         json!({"t": number as f64 * 0.004, "values": values}).to_string()
     };
     // A second of lines is sent again with other times.

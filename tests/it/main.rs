@@ -9,6 +9,7 @@ mod bodies;
 mod body_touches;
 mod change;
 mod common;
+mod controller;
 mod draft;
 mod edited;
 mod endurance;

@@ -85,7 +85,7 @@ impl Bill {
         }
         #[cfg(feature = "zenoh")]
         let network = match engines.last_mut() {
-            Some(engine) => super::network::Network::of(asked, engine, &played.calls, recorded.is_some())?,
+            Some(engine) => super::network::Network::of((asked, body), engine, &played.calls, recorded.is_some())?,
             None => None,
         };
         let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;

@@ -1,8 +1,8 @@
 //! What a limb would send: its frames, or its percepts.
 
 use serde_json::{Value, json};
-use somatic::sink::{FieldNames, limb_frame_bytes, limb_percept_bytes};
-use somatic::{Engine, Frame, Result};
+use somatic::sink::{FieldNames, SkinNames, limb_frame_bytes, limb_percept_bytes};
+use somatic::{Body, Engine, Frame, Result};
 
 use crate::cli::scene::RunOptions;
 
@@ -15,9 +15,9 @@ pub(super) struct Network {
 }
 
 impl Network {
-    /// Of `calls`, which `engine` makes percepts of, if they go over a network. Whether their times are real is `is_recorded`.
+    /// On `body`, of `calls`, which `engine` makes percepts of, if they go over a network. Whether their times are real is `is_recorded`.
     pub(super) fn of(
-        asked: &RunOptions,
+        (asked, body): (&RunOptions, &Body),
         engine: &mut Engine,
         calls: &[Vec<Frame>],
         is_recorded: bool,
@@ -26,10 +26,11 @@ impl Network {
             return Ok(None);
         }
         let names = FieldNames::all_of(engine.plan());
+        let skin = SkinNames::of(body, engine.plan());
         let frame_bytes = limb_frame_bytes(engine.plan()) as f64;
         let (mut bytes, mut frames) = (0, 0);
         for call in calls {
-            bytes += limb_percept_bytes(&names, asked.all_fields, engine.process(call)?);
+            bytes += limb_percept_bytes(&names, asked.all_fields, skin.as_ref(), engine.process(call)?);
             frames += call.len();
         }
         let times = || calls.iter().flatten().map(|frame| frame.t_s);

@@ -1,9 +1,22 @@
 //! Hands frames and percepts to sinks.
 
-use somatic::sink::{Flow, InputFrames, Sink};
+use somatic::sink::{Flow, InputFrames, Session, Sink, SinkTarget};
 use somatic::{Percepts, Result};
 
 use crate::cli::stdio::say;
+
+/// Opens all of `targets`, and says what they will not hold, unless `quiet`.
+pub(super) fn opened(
+    targets: Vec<SinkTarget>,
+    session: &Session<'_>,
+    quiet: bool,
+) -> Result<Vec<Box<dyn Sink + Send>>> {
+    let sinks = targets.into_iter().map(|target| target.open(session)).collect::<Result<Vec<_>>>()?;
+    if !quiet {
+        sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| say(&remark));
+    }
+    Ok(sinks)
+}
 
 /// Does something with each sink that somebody reads. While somebody waits for every frame, a sink that fails is told and
 /// left out, and the others go on; the last one that fails is an error.

@@ -60,6 +60,10 @@ impl Ros2BagSink {
 }
 
 impl Sink for Ros2BagSink {
+    fn remarks(&self) -> Vec<String> {
+        self.messages.remarks().into_iter().map(|remark| format!("sink `ros2-mcap`: {remark}")).collect()
+    }
+
     fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         for frame in input.frames {
             let mut moment = Moment::default();

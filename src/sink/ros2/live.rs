@@ -3,12 +3,11 @@
 use std::time::{Duration, Instant};
 
 use super::clock::RosClock;
-use super::messages::{BOARDS, Messages, Topic, of_boards};
+use super::messages::{BOARDS, Messages, Topic, TopicKind, of_boards};
 use super::moment::{Moment, without_frames};
 use crate::dds::{Delivery, Node, Writer};
 use crate::error::Result;
 use crate::percept::Percepts;
-use crate::recording::BagType;
 use crate::robot::messages::{Message as _, PointCloud2};
 use crate::signal::BoardHealth;
 use crate::sink::handover::{Carrier, Handover, tell};
@@ -28,6 +27,8 @@ const RECEIPTS_WITHIN: Duration = Duration::from_secs(1);
 /// messages of other topics.
 const CLOUD_DEPTH: usize = ROOM;
 const DEPTH: usize = 100;
+/// Touches of a frame with many.
+const MANY_TOUCHES: usize = 16;
 
 /// Sends percepts, and the frames that they are made of, to nodes of ROS 2.
 pub struct Ros2Sink {
@@ -36,6 +37,7 @@ pub struct Ros2Sink {
     /// Frames whose percepts are still to come, and others to fill again: `read` of them.
     moments: Vec<Moment>,
     read: usize,
+    remarks: Vec<String>,
 }
 
 /// What the sending thread gets.
@@ -59,11 +61,12 @@ impl Ros2Sink {
         let mut writers = Vec::new();
         for kind in messages.topics() {
             let topic = format!("{namespace}{}", live_name(&kind.name));
-            writers.push(node.writer(&topic, kind.kind.name, delivery(&kind.kind)).map_err(at)?);
+            writers.push(node.writer(&topic, kind.kind.name, delivery(kind)).map_err(at)?);
         }
+        let remarks = messages.remarks().into_iter().map(|remark| format!("{name}: {remark}")).collect();
         let sender = Sender { messages, writers, refused: 0, name: name.clone(), _node: node };
         let handover = Handover::start(&name, "frames", ROOM, sender)?;
-        Ok(Self { handover, clock: RosClock::new(session.ros_time), moments: Vec::new(), read: 0 })
+        Ok(Self { handover, clock: RosClock::new(session.ros_time), moments: Vec::new(), read: 0, remarks })
     }
 }
 
@@ -72,12 +75,11 @@ fn live_name(name: &str) -> &str {
     if name == "/joint_states" { "/somatic/joint_states" } else { name }
 }
 
-fn delivery(kind: &BagType) -> Delivery {
-    if kind.name == PointCloud2::TYPE {
-        Delivery::BestEffort { depth: CLOUD_DEPTH }
-    } else {
-        Delivery::Reliable { depth: DEPTH }
+fn delivery(topic: &TopicKind) -> Delivery {
+    if topic.kind.name == PointCloud2::TYPE {
+        return Delivery::BestEffort { depth: CLOUD_DEPTH };
     }
+    Delivery::Reliable { depth: if topic.has_several { DEPTH * MANY_TOUCHES } else { DEPTH } }
 }
 
 /// Makes messages and sends them, on a thread of its own.
@@ -125,6 +127,10 @@ impl Carrier<Item> for Sender {
 }
 
 impl Sink for Ros2Sink {
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
+    }
+
     fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         self.moments.resize_with(self.moments.len().max(input.frames.len()), Moment::default);
         for (moment, frame) in self.moments.iter_mut().zip(input.frames) {

@@ -4,15 +4,16 @@ use super::moment::Moment;
 use super::places::{Clouds, header, rest_poses, topic_part, transforms};
 use super::readings::Readings;
 use super::touches::Touches;
-use super::wrenches::{WrenchField, wrench_fields};
+use super::wrenches::{LinkWrenches, of_touch};
 use crate::error::{Error, Result};
+use crate::percept::TouchOutputs;
 use crate::recording::BagType;
 use crate::robot::messages::{
     Byte, DiagnosticArray, DiagnosticStatus, JointState, KeyValue, MarkerArray, Message, PointCloud2, TfMessage,
     WrenchStamped,
 };
 use crate::signal::{BoardHealth, Pose};
-use crate::sink::{FieldNames, Session};
+use crate::sink::Session;
 
 /// Period of the transforms of links at rest, s: a player that jumps needs them soon.
 const LINKS_PERIOD_S: f64 = 1.0;
@@ -26,10 +27,9 @@ const STALE: Byte = Byte(3);
 pub(super) struct Topic(pub(super) usize);
 
 const LINKS: Topic = Topic(0);
-const TOUCHES: Topic = Topic(1);
-const JOINTS: Topic = Topic(2);
+const JOINTS: Topic = Topic(1);
 /// How boards are doing.
-pub(super) const BOARDS: Topic = Topic(3);
+pub(super) const BOARDS: Topic = Topic(2);
 
 /// What a topic is.
 #[derive(Clone, Debug)]
@@ -38,11 +38,13 @@ pub(super) struct TopicKind {
     pub(super) kind: BagType,
     /// Whether it is only there where something is told.
     pub(super) is_optional: bool,
+    /// Whether a frame has several of its messages: one for each touch.
+    pub(super) has_several: bool,
 }
 
 fn topic<M: Message>(name: impl Into<String>) -> TopicKind {
     let kind = BagType { name: M::TYPE, hash: M::HASH, definition: M::definition() };
-    TopicKind { name: name.into(), kind, is_optional: false }
+    TopicKind { name: name.into(), kind, is_optional: false, has_several: false }
 }
 
 /// Makes the messages of each frame.
@@ -50,9 +52,12 @@ pub(super) struct Messages {
     topics: Vec<TopicKind>,
     clouds: Clouds,
     first_cloud: usize,
-    wrenches: Vec<WrenchField>,
+    wrenches: LinkWrenches,
     first_wrench: usize,
-    touches: Touches,
+    /// Where touches are looked for.
+    touches: Option<(Topic, Touches)>,
+    /// Where the wrench of each touch is asked for; and the links' names.
+    touch_wrenches: Option<(Topic, Vec<String>)>,
     at_rest: Vec<(String, Pose)>,
     links_told_s: Option<f64>,
     readings: Readings,
@@ -66,31 +71,48 @@ impl Messages {
             return Err(Error::failed("messages of ROS 2 need the robot's body"));
         };
         let clouds = Clouds::new(body);
-        let wrenches = wrench_fields(body, plan);
+        let wrenches = LinkWrenches::new(body, plan, session.taxels);
         let mut topics = vec![
             topic::<TfMessage>("/tf"),
-            topic::<MarkerArray>("/somatic/touches"),
             TopicKind { is_optional: true, ..topic::<JointState>("/joint_states") },
             TopicKind { is_optional: true, ..topic::<DiagnosticArray>("/diagnostics") },
         ];
+        let mut add = |kind: TopicKind| {
+            topics.push(kind);
+            Topic(topics.len() - 1)
+        };
+        let skin = session.skin();
+        let touch_wrenches = skin.as_ref().filter(|skin| skin.outputs.contains(TouchOutputs::WRENCH)).map(|skin| {
+            (
+                add(TopicKind { has_several: true, ..topic::<WrenchStamped>("/somatic/touch_wrenches") }),
+                skin.links.clone(),
+            )
+        });
+        let touches = skin.map(|skin| (add(topic::<MarkerArray>("/somatic/touches")), Touches::new(skin)));
         let first_cloud = topics.len();
         let of_link = |link: &str| topic::<PointCloud2>(format!("/somatic/taxels/{}", topic_part(link)));
         topics.extend(clouds.links().map(of_link));
         let first_wrench = topics.len();
-        let of_field =
-            |field: &WrenchField| topic::<WrenchStamped>(format!("/somatic/wrench/{}", topic_part(&field.name)));
-        topics.extend(wrenches.iter().map(of_field));
+        let of_link = |link: &str| topic::<WrenchStamped>(format!("/somatic/wrench/{}", topic_part(link)));
+        topics.extend(wrenches.names().map(of_link));
         Ok(Self {
             topics,
             clouds,
             first_cloud,
             wrenches,
             first_wrench,
-            touches: Touches::new(session.names.iter().map(FieldNames::told_apart).collect()),
+            touches,
+            touch_wrenches,
             at_rest: rest_poses(body),
             links_told_s: None,
             readings: Readings::new(body),
         })
+    }
+
+    /// What there are no messages of, and why, a line each.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        let untouched = self.touches.is_none().then(|| "no markers of touches: add touches to --outputs".to_owned());
+        untouched.into_iter().chain(self.wrenches.remarks().iter().cloned()).collect()
     }
 
     /// All topics that there may be.
@@ -119,15 +141,20 @@ impl Messages {
         for (cloud, message) in self.clouds.messages(time_ns, &self.readings).enumerate() {
             send(Topic(self.first_cloud + cloud), message.to_cdr())?;
         }
-        for (index, field) in self.wrenches.iter().enumerate() {
-            if let Some(wrench) = field.message(time_ns, &self.readings) {
-                send(Topic(self.first_wrench + index), wrench.to_cdr())?;
+        for (link, wrench) in self.wrenches.messages(time_ns, &self.readings, &moment.missing) {
+            send(Topic(self.first_wrench + link), wrench.to_cdr())?;
+        }
+        if let Some((topic, links)) = &self.touch_wrenches {
+            let known = moment.presses.iter().filter_map(|press| Some((press.link, press.wrench?)));
+            for (link, wrench) in known {
+                send(*topic, of_touch(time_ns, &links[link as usize], &wrench).to_cdr())?;
             }
         }
-        if let Some(markers) = self.touches.message(time_ns, &moment.touched).map(Message::to_cdr)
-            && !send(TOUCHES, markers)?
+        if let Some((topic, touches)) = &mut self.touches
+            && let Some(markers) = touches.message(time_ns, &moment.touches).map(Message::to_cdr)
+            && !send(*topic, markers)?
         {
-            self.touches.was_refused();
+            touches.was_refused();
         }
         Ok(())
     }

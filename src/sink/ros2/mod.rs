@@ -1,4 +1,4 @@
-//! Percepts as messages of ROS 2: taxels, touched fields, wrenches, links, joints and boards, in a bag or live.
+//! Percepts as messages of ROS 2: taxels, touches, wrenches, links, joints and boards, in a bag or live.
 
 mod bag;
 mod clock;

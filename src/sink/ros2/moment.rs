@@ -1,9 +1,10 @@
 //! What a frame gives, kept until its messages are made.
 
 use crate::error::Error;
-use crate::percept::{Column, Percepts};
+use crate::percept::{LinkShare, Percepts};
 use crate::signal::{Frame, Pose};
 use crate::sink::Pressures;
+use crate::sink::touch_mark::TouchMark;
 
 /// A frame and its percepts, as far as messages tell of them.
 #[derive(Clone, Debug, Default)]
@@ -17,32 +18,23 @@ pub(super) struct Moment {
     pub(super) joints: Vec<(String, f64)>,
     /// By taxel id; those that are missing or rejected are left out.
     pub(super) pressures: Vec<(u32, f64)>,
-    pub(super) touched: Vec<TouchedField>,
+    /// Indices of the frame's values that did not come.
+    pub(super) missing: Vec<usize>,
+    /// The oldest first.
+    pub(super) touches: Vec<FeltTouch>,
+    /// What each of them presses on each link, one touch after the other.
+    pub(super) presses: Vec<LinkShare>,
 }
 
-/// What markers show of a touched field. A whole percept is a kilobyte: filling one for each field took most of handing over.
+/// What markers show of a touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct TouchedField {
-    /// As [`crate::Percept::field`].
-    pub(super) field: usize,
-    /// Position (m) and normal, in the world or in the field's link.
-    pub(super) position: Option<[f64; 3]>,
-    pub(super) normal: Option<[f64; 3]>,
+pub(super) struct FeltTouch {
+    pub(super) id: u64,
+    /// Index of its link.
+    pub(super) link: u32,
+    /// Whether the mark is in the world, and not in that link.
     pub(super) in_world: bool,
-    pub(super) area_m2: Option<f64>,
-}
-
-impl TouchedField {
-    pub(super) fn of(percepts: &Percepts, frame: usize, field: usize) -> Self {
-        let value = |column| percepts.value(frame, field, column);
-        Self {
-            field,
-            position: value(&Column::POSITION),
-            normal: value(&Column::NORMAL),
-            in_world: percepts.in_world(frame, field),
-            area_m2: value(&Column::AREA).map(|[area_m2, ..]| area_m2),
-        }
-    }
+    pub(super) mark: TouchMark,
 }
 
 /// Why percepts alone are refused.
@@ -59,13 +51,22 @@ impl Moment {
         self.has_stale_pose = frame.has_stale_pose;
         self.joints.clone_from(&frame.joints);
         pressures(frame, &mut self.pressures);
-        self.touched.clear();
+        self.missing.clear();
+        let values = frame.values.iter().enumerate();
+        self.missing.extend(values.filter(|(_, value)| value.is_missing()).map(|(index, _)| index));
+        self.touches.clear();
+        self.presses.clear();
     }
 
     /// Takes the percepts of frame `frame` of `percepts`, which are its own.
     pub(super) fn feel(&mut self, percepts: &Percepts, frame: usize) {
-        let touched = (0..percepts.fields()).filter(|&field| percepts.in_contact(frame, field));
-        self.touched.clear();
-        self.touched.extend(touched.map(|field| TouchedField::of(percepts, frame, field)));
+        self.touches.clear();
+        self.presses.clear();
+        let Some(found) = percepts.touches(frame) else { return };
+        for touch in &found.touches {
+            let mark = TouchMark::of(touch);
+            self.touches.push(FeltTouch { id: touch.id, link: touch.link, in_world: touch.in_world, mark });
+            self.presses.extend_from_slice(found.links(touch));
+        }
     }
 }

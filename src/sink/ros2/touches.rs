@@ -1,68 +1,71 @@
-//! Touched fields as markers with ids that stay.
+//! Touches of the whole body as markers: one each, whose id stays.
 
 use std::mem::take;
 
-use glam::{DQuat, DVec3};
-
-use super::moment::TouchedField;
+use super::moment::FeltTouch;
 use super::places::{quaternion, vector};
 use crate::robot::messages::{Color, Header, Marker, MarkerArray, Point, Time};
-use crate::sink::FieldNames;
+use crate::sink::SkinNames;
 
-/// Types and actions of `visualization_msgs/Marker`.
-const ARROW: i32 = 0;
+/// Type and actions of `visualization_msgs/Marker`.
 const SPHERE: i32 = 2;
 const ADD: i32 = 0;
 const DELETE: i32 = 2;
 
-/// Diameter of the sphere of a touch without an area, m.
-const DEFAULT_DIAMETER_M: f64 = 0.01;
-/// Length of the arrow along a touch's normal, and the diameters of its shaft and head, m.
-const ARROW_M: [f64; 3] = [0.04, 0.004, 0.008];
+/// The namespace of all markers: ids are of the whole body, and a touch keeps its own where it goes over to another link.
+const NAMESPACE: &str = "touches";
 const COLOUR: Color = Color { r: 1.0, g: 0.55, b: 0.1, a: 0.9 };
 
 /// Makes the markers of each frame.
 pub(super) struct Touches {
-    /// Told apart by their names alone.
-    fields: Vec<FieldNames>,
-    /// By field, whether its sphere and its arrow are shown.
-    shown: Vec<[bool; 2]>,
+    links: Vec<String>,
+    world: String,
+    /// The touches that are shown, each with its frame.
+    shown: Vec<(u64, Frame)>,
     /// The same before the last message.
-    before: Vec<[bool; 2]>,
+    before: Vec<(u64, Frame)>,
     /// The last message, whose memory the next one takes.
     message: MarkerArray,
 }
 
+/// What a marker's place is in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Frame {
+    World,
+    Link(u32),
+}
+
 impl Touches {
-    pub(super) fn new(fields: Vec<FieldNames>) -> Self {
-        let none = vec![[false; 2]; fields.len()];
-        Self { shown: none.clone(), before: none, fields, message: MarkerArray::default() }
+    pub(super) fn new(skin: SkinNames) -> Self {
+        let (shown, before) = (Vec::new(), Vec::new());
+        Self { links: skin.links, world: skin.world, shown, before, message: MarkerArray::default() }
     }
 
-    /// The markers of a frame: those of `touched` fields, and the ends of those that are no longer touched. `None` where there
-    /// are neither.
-    pub(super) fn message(&mut self, time_ns: u64, touched: &[TouchedField]) -> Option<&MarkerArray> {
-        let Self { fields, shown, before, message } = self;
+    /// The markers of a frame: those of its `touches`, and the ends of those that are over. `None` where there are neither.
+    pub(super) fn message(&mut self, time_ns: u64, touches: &[FeltTouch]) -> Option<&MarkerArray> {
+        let Self { links, world, shown, before, message } = self;
         std::mem::swap(shown, before);
-        shown.fill([false; 2]);
+        shown.clear();
         let mut made = Made { markers: &mut message.markers, count: 0, time_ns };
-        for touch in touched {
-            let Some(position) = touch.position.map(DVec3::from) else { continue };
-            let names = &fields[touch.field];
-            shown[touch.field][0] = true;
-            let sphere = made.placed(names, touch, 0, position, DQuat::IDENTITY);
-            (sphere.r#type, sphere.scale) = (SPHERE, vector(DVec3::splat(diameter_m(touch.area_m2))));
-            if let Some(normal) = touch.normal.map(DVec3::from) {
-                shown[touch.field][1] = true;
-                let turn = DQuat::from_rotation_arc(DVec3::X, normal.normalize_or(DVec3::X));
-                let arrow = made.placed(names, touch, 1, position, turn);
-                (arrow.r#type, arrow.scale) = (ARROW, vector(ARROW_M.into()));
-            }
+        let name = |frame: Frame| match frame {
+            Frame::World => world.as_str(),
+            Frame::Link(link) => &links[link as usize],
+        };
+        for touch in touches {
+            let frame = if touch.in_world { Frame::World } else { Frame::Link(touch.link) };
+            shown.push((touch.id, frame));
+            let marker = made.next(name(frame), touch.id);
+            let (place, turn) = (touch.mark.position, touch.mark.turn);
+            marker.r#type = SPHERE;
+            marker.pose.position = Point { x: place.x, y: place.y, z: place.z };
+            marker.pose.orientation = quaternion(turn);
+            marker.scale = vector(touch.mark.diameters_m);
+            marker.color = COLOUR;
+            // It moves with its link until the next message.
+            marker.frame_locked = !touch.in_world;
         }
-        for (field, (shown, before)) in shown.iter().zip(before).enumerate() {
-            for part in (0..2).filter(|&part| before[part] && !shown[part]) {
-                made.next(&fields[field], &fields[field].link, id(field, part)).action = DELETE;
-            }
+        for &(id, frame) in before.iter().filter(|(id, _)| !is_among(shown, *id)) {
+            made.next(name(frame), id).action = DELETE;
         }
         let count = made.count;
         message.markers.truncate(count);
@@ -71,10 +74,14 @@ impl Touches {
 
     /// Says that the last message was not sent: what it ended is still shown.
     pub(super) fn was_refused(&mut self) {
-        for (shown, before) in self.shown.iter_mut().zip(&self.before) {
-            (0..2).for_each(|part| shown[part] |= before[part]);
-        }
+        let Self { shown, before, .. } = self;
+        before.retain(|(id, _)| !is_among(shown, *id));
+        shown.append(before);
     }
+}
+
+fn is_among(shown: &[(u64, Frame)], id: u64) -> bool {
+    shown.iter().any(|(other, _)| *other == id)
 }
 
 /// Markers that are made in the memory of older ones.
@@ -85,8 +92,8 @@ struct Made<'a> {
 }
 
 impl Made<'_> {
-    /// The next marker, of a field's part, in `frame`.
-    fn next(&mut self, names: &FieldNames, frame: &str, id: i32) -> &mut Marker {
+    /// The next marker, of the touch `id`, in `frame`.
+    fn next(&mut self, frame: &str, id: u64) -> &mut Marker {
         if self.count == self.markers.len() {
             self.markers.push(Marker::default());
         }
@@ -94,41 +101,16 @@ impl Made<'_> {
         self.count += 1;
         let (mut frame_id, mut ns) = (take(&mut marker.header.frame_id), take(&mut marker.ns));
         frame.clone_into(&mut frame_id);
-        names.field.clone_into(&mut ns);
+        NAMESPACE.clone_into(&mut ns);
         let header = Header { stamp: Time::from_ns(self.time_ns), frame_id };
-        *marker = Marker { header, ns, id, action: ADD, ..Marker::default() };
-        marker
-    }
-
-    /// The next marker, at `position` and turned by `turn`, both in the frame that the touch is told in.
-    fn placed(
-        &mut self,
-        names: &FieldNames,
-        touch: &TouchedField,
-        part: usize,
-        position: DVec3,
-        turn: DQuat,
-    ) -> &mut Marker {
-        let frame = if touch.in_world { &names.world } else { &names.link };
-        let marker = self.next(names, frame, id(touch.field, part));
-        marker.pose.position = Point { x: position.x, y: position.y, z: position.z };
-        marker.pose.orientation = quaternion(turn.normalize());
-        marker.color = COLOUR;
-        // It moves with its link until the next message.
-        marker.frame_locked = !touch.in_world;
+        *marker = Marker { header, ns, id: marker_id(id), action: ADD, ..Marker::default() };
         marker
     }
 }
 
-/// The diameter of a sphere that is as wide as a touch of this area.
-fn diameter_m(area_m2: Option<f64>) -> f64 {
-    let area_m2 = area_m2.filter(|&area| area > 0.0);
-    area_m2.map_or(DEFAULT_DIAMETER_M, |area| 2.0 * (area / std::f64::consts::PI).sqrt())
-}
-
-/// The id of a field's sphere (0) or arrow (1): the same from onset to release, and in every run of the same scene.
-fn id(field: usize, part: usize) -> i32 {
-    i32::try_from(2 * field + part).unwrap_or(i32::MAX)
+/// The id of the touch `id`: the same number, which begins again after 2³¹ touches.
+fn marker_id(id: u64) -> i32 {
+    (id & 0x7FFF_FFFF) as i32
 }
 
 #[cfg(test)]
@@ -137,22 +119,46 @@ mod tests {
 
     #[test]
     fn a_marker_whose_end_was_not_sent_is_ended_with_the_next_message() {
-        let touch = |field| TouchedField { field, position: Some([0.1, 0.0, 0.0]), ..TouchedField::default() };
-        let names = |field: &str| FieldNames { field: field.into(), link: "hand".into(), ..FieldNames::default() };
-        let mut touches = Touches::new(["a", "b"].map(names).into());
-        let mut told = |touched: &[TouchedField], is_sent: bool| {
+        let touch = |id| FeltTouch { id, ..FeltTouch::default() };
+        let skin = SkinNames { links: vec!["hand".into()], world: "world".into(), ..SkinNames::default() };
+        let mut touches = Touches::new(skin);
+        let mut told = |touched: &[FeltTouch], is_sent: bool| {
             let markers = touches.message(0, touched).map_or(&[][..], |message| &message.markers);
-            let told = markers.iter().map(|marker| (marker.ns.clone(), marker.action)).collect::<Vec<_>>();
+            let told = markers.iter().map(|marker| (marker.id, marker.action)).collect::<Vec<_>>();
+            assert!(markers.iter().all(|marker| marker.ns == NAMESPACE && marker.header.frame_id == "hand"));
             if !is_sent {
                 touches.was_refused();
             }
             told
         };
-        let [a, b] = ["a", "b"].map(str::to_owned);
-        assert_eq!(told(&[touch(0)], true), [(a.clone(), ADD)]);
-        assert_eq!(told(&[touch(1)], false), [(b.clone(), ADD), (a.clone(), DELETE)]);
-        assert_eq!(told(&[touch(1)], true), [(b.clone(), ADD), (a, DELETE)]);
-        assert_eq!(told(&[], true), [(b, DELETE)]);
+        assert_eq!(told(&[touch(7)], true), [(7, ADD)]);
+        assert_eq!(told(&[touch(9)], false), [(9, ADD), (7, DELETE)]);
+        assert_eq!(told(&[touch(9)], true), [(9, ADD), (7, DELETE)]);
+        assert_eq!(told(&[touch(9), touch(10)], true), [(9, ADD), (10, ADD)]);
+        assert_eq!(told(&[touch(10)], true), [(10, ADD), (9, DELETE)]);
+        assert_eq!(told(&[], true), [(10, DELETE)]);
         assert_eq!(told(&[], true), []);
+    }
+
+    #[test]
+    fn an_end_is_told_in_the_frame_that_the_touch_was_in_last() {
+        let skin =
+            SkinNames { links: ["arm", "hand"].map(str::to_owned).into(), world: "map".into(), ..SkinNames::default() };
+        let mut touches = Touches::new(skin);
+        let mut frames = |touched: &[FeltTouch]| -> Vec<(String, bool)> {
+            let markers = touches.message(0, touched).map_or(&[][..], |message| &message.markers);
+            markers.iter().map(|marker| (marker.header.frame_id.clone(), marker.frame_locked)).collect()
+        };
+        let touch = |id, link, in_world| FeltTouch { id, link, in_world, ..FeltTouch::default() };
+        let locked = |name: &str, is_locked: bool| (name.to_owned(), is_locked);
+        assert_eq!(frames(&[touch(0, 0, false), touch(1, 1, true)]), [locked("arm", true), locked("map", false)]);
+        // It goes over to another link, with the same id.
+        assert_eq!(frames(&[touch(0, 1, false)]), [locked("hand", true), locked("map", false)]);
+        assert_eq!(frames(&[]), [locked("hand", false)]);
+    }
+
+    #[test]
+    fn ids_are_those_of_touches_and_never_negative() {
+        assert_eq!([0, 17, 0x8000_0001, u64::MAX].map(marker_id), [0, 17, 1, i32::MAX]);
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::super::boards::{BoardFrame, BoardState, Clock, LimbPercepts, Shared, Verdict};
 use crate::error::Error;
-use crate::limb::{Packet, open, raw_value};
+use crate::limb::{Packet, open, qualified, raw_value};
 use crate::wire::{FrameCounts, Head, PacketOrder};
 
 /// A limb that sends nothing for this long is silent.
@@ -113,11 +113,15 @@ impl Limb {
         match packet {
             Packet::Layout { taxels } => self.lay_out(&taxels),
             Packet::Frame { layout, values } => self.frame(layout, values, &order, now, read_at),
-            Packet::Percepts(percepts) => {
-                let told = format!("{{\"limb\":{},\"t\":", serde_json::Value::from(self.key.as_str()));
-                let rest = format!(",\"frame\":{},\"fields\":{}}}", percepts.frame, percepts.fields.get());
-                self.percepts(&told, &rest, &order, now, read_at);
-            }
+            Packet::Percepts(percepts) => match qualified(&self.key, &percepts) {
+                Ok(rest) => self.percepts(&rest, &order, now, read_at),
+                Err(why) => {
+                    // They are not used: they count as lost.
+                    self.lost += 1;
+                    self.shared.lock().accounts[self.index].lost += 1;
+                    self.bad(why);
+                }
+            },
             Packet::End => self.end(&head),
         }
     }
@@ -183,9 +187,10 @@ impl Limb {
         self.shared.deliver(frame, read_at);
     }
 
-    fn percepts(&mut self, told: &str, rest: &str, order: &PacketOrder, now: Duration, read_at: Instant) {
+    /// Passes percepts on; `rest` is their line behind the time.
+    fn percepts(&mut self, rest: &str, order: &PacketOrder, now: Duration, read_at: Instant) {
         let t_s = self.clock.host_time_s(order.time_us, now.as_secs_f64());
-        let line = format!("{told}{t_s}{rest}");
+        let line = format!("{{\"limb\":{},\"t\":{t_s}{rest}", serde_json::Value::from(self.key.as_str()));
         let mut state = self.shared.lock();
         state.set_verdict(self.index, Verdict::Good);
         if state.accounts[self.index].delivered == 0 {
