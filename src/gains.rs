@@ -24,7 +24,7 @@ use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result, failed};
 use crate::percept::{self, Outputs, Percepts};
-use crate::scene::{Knobs, Plan, Scene};
+use crate::scene::{Knobs, Scene};
 use crate::signal::{Calibration, Frame, Letter};
 use crate::stage::fit::{Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
 use crate::touch;
@@ -138,7 +138,7 @@ impl GainsSurvey {
                 if !self.seen.is_multiple_of(self.stride) {
                     continue;
                 }
-                let observed = observed(self.engine.plan(), field, frame, &self.value_of);
+                let observed = observed(&self.engine, field, frame, &self.value_of);
                 self.touches.extend(observed);
                 if self.touches.len() > MOST {
                     let mut index = 0;
@@ -170,7 +170,14 @@ fn touches_on(percepts: &Percepts, frame: usize, field: usize) -> usize {
 }
 
 /// The touch on `field`, as fits take it; `None` where it cannot be used.
-fn observed(plan: &Plan, field: usize, frame: &Frame, value_of: &[Option<usize>]) -> Option<Observed> {
+fn observed(engine: &Engine, field: usize, frame: &Frame, value_of: &[Option<usize>]) -> Option<Observed> {
+    let (plan, skin) = (engine.plan(), engine.skin()?);
+    // The skin's nodes are the plan's channels.
+    let beside = |taxel: usize| {
+        let node = plan.body_taxels.binary_search(&taxel).ok();
+        let beside = node.map_or(&[][..], |node| skin.beside(node as u32));
+        beside.iter().map(|&other| plan.body_taxels[other as usize])
+    };
     let of = &plan.fields[field];
     of.chart.as_ref()?;
     if !of.area_known {
@@ -185,7 +192,8 @@ fn observed(plan: &Plan, field: usize, frame: &Frame, value_of: &[Option<usize>]
     if pressed.len() < 6 {
         return None;
     }
-    let around = pressed.iter().flat_map(|&member| of.beside[member].iter().map(|&other| other as usize));
+    let around = pressed.iter().flat_map(|&member| beside(taxels[member]));
+    let around = around.filter_map(|taxel| taxels.iter().position(|&other| other == taxel));
     let members: BTreeSet<usize> = pressed.iter().copied().chain(around).collect();
     let reach_m = 2.0 * of.spacing * f64::from(of.unit_m);
     let taxels = members.into_iter().filter_map(|member| Some((taxels[member], all[member]?))).collect();

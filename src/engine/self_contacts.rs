@@ -34,7 +34,7 @@ impl SelfContacts {
     /// The self-contacts of a frame, whose touches are `found`, and whether they are known: those of touches that are in the world.
     pub(super) fn find(&mut self, found: &TouchFrame, restarts: bool) -> (Vec<SelfContact>, bool) {
         let in_world = found.touches.iter().filter(|touch| touch.in_world);
-        let sides: Vec<Side> = in_world
+        let mut sides: Vec<Side> = in_world
             .map(|touch| Side {
                 touch: touch.id,
                 link: touch.link as usize,
@@ -43,6 +43,7 @@ impl SelfContacts {
                 normal: touch.normal,
             })
             .collect();
+        sides.sort_by_key(|side| (side.link, side.touch));
         if restarts {
             self.memory.restart();
         }

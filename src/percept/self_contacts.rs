@@ -6,7 +6,7 @@
 pub struct SelfContact {
     /// Lasts as long as both touches do, and is never used again.
     pub id: u64,
-    /// The touch on either link, the older one first.
+    /// The touch on either link, that of the body's earlier link first.
     pub sides: [SelfContactSide; 2],
     /// Halfway between the places of both touches, in the world, m.
     pub position: [f64; 3],

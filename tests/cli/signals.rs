@@ -45,7 +45,18 @@ fn an_interrupted_recording_leaves_no_part_under_a_final_name() {
         }
         // Its second frame comes after a minute and a half.
         let mut run = somatic(&["run", "--backend", "cpu", "--quiet", "--source", "touch.csv", "--speed", "0.001"])
-            .args(["--outputs", "total", "--sink", "-", "--sink", "out.csv", "--sink", "out.mcap", "--sink", "out.ndjson"])
+            .args([
+                "--outputs",
+                "total",
+                "--sink",
+                "-",
+                "--sink",
+                "out.csv",
+                "--sink",
+                "out.mcap",
+                "--sink",
+                "out.ndjson",
+            ])
             .args(if old { &["--force"][..] } else { &[] })
             .current_dir(folder.path())
             .stdout(Stdio::piped())

@@ -108,7 +108,10 @@ fn tables_name_the_link_that_stands_for_the_world() {
     let (plates, truth) = (Plates::new(), closed());
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("upper.csv");
-    plates.jointed(&plates.lines(&truth, 0.0), &["--relative-to", "upper", "--sink", text_of(&table), "--sink", "-"]);
+    plates.jointed(
+        &plates.lines(&truth, 0.0),
+        &["--relative-to", "upper", "--outputs", "total,position", "--sink", text_of(&table), "--sink", "-"],
+    );
     let rows = std::fs::read_to_string(&table).unwrap();
     assert!(rows.lines().skip(1).all(|row| row.contains(",upper,")) && rows.lines().count() > 7, "{rows}");
 }
