@@ -75,6 +75,11 @@ impl OnSkin {
         self.touches.skin()
     }
 
+    /// From now on gives the taxels of touches too.
+    pub(super) fn keep_taxels(&mut self) {
+        self.touches.keep_taxels();
+    }
+
     /// Why the edges that the body's file holds are not used.
     pub(super) fn note(&self) -> Option<&str> {
         self.note.as_deref()
