@@ -244,6 +244,12 @@ impl Engine {
         self.pick();
     }
 
+    /// From now on [`crate::TouchFrame::taxels`] has the taxels of touches, whatever [`Scene::touches`] asks for, if `are_kept`. For
+    /// pages, which show them.
+    pub fn keep_touch_taxels(&mut self, are_kept: bool) {
+        self.on_skin.iter_mut().filter(|_| are_kept).for_each(OnSkin::keep_taxels);
+    }
+
     /// Tells which board each taxel hangs on: from now on, the drift of one that is touched is that of its board's
     /// untouched taxels, where there are three. Without, it is that of its link's, else of the body's. For before the first
     /// frame.

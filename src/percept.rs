@@ -38,6 +38,8 @@ mod presence;
 mod self_contacts;
 mod touch;
 mod touch_columns;
+#[cfg(any(feature = "page", all(feature = "cli", feature = "gpu")))]
+mod touch_trails;
 mod typed;
 
 pub use batch::Percepts;
@@ -52,6 +54,8 @@ pub use flags::Flags;
 pub use self_contacts::{SelfContact, SelfContactSide};
 pub use touch::{FieldShare, LinkShare, Touch, TouchFit, TouchFlags, TouchFrame, Wrench};
 pub use touch_columns::{TOUCH_COLUMNS, TouchColumn, TouchOutputs};
+#[cfg(any(feature = "page", all(feature = "cli", feature = "gpu")))]
+pub(crate) use touch_trails::TouchTrails;
 
 /// The arithmetic that made the numbers, and so the digits worth printing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

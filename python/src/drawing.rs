@@ -95,8 +95,10 @@ impl Wish<'_> {
         let chosen = if self.fields.is_empty() { Vec::new() } else { named(&self.fields)? };
         let options = Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone(), edges: false };
         if let Some(read) = read {
+            let touches = somatic::touch::Options::default();
+            let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).coordinates(Coordinates::Anchor);
             let options_of_engine = somatic::Options::default()
-                .scene(Scene::default().outputs(Outputs::USUAL).coordinates(Coordinates::Anchor))
+                .scene(scene)
                 .backend(BackendKind::Cpu)
                 .batch(1);
             let options_of_engine = match self.calibration {
@@ -106,13 +108,13 @@ impl Wish<'_> {
             let mut engine = Engine::new(body, options_of_engine)?;
             engine.set_channels(&read.taxels)?;
             let frames = read.frames(raised);
-            let moments = Moments::of(&mut engine, body, &set.fields, times, &read.name, frames)?;
+            let moments = Moments::of(&mut engine, body, times, &read.name, frames)?;
             return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));
         }
         let picture = match &self.uv {
             None if self.ids => {
                 let pressures = vec![Some(0.0); body.taxels.len()];
-                let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", percepts: &[], t_s: None };
+                let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", touches: &[], t_s: None };
                 TouchPicture::new(body, &set.fields, &options, true)?.draw(&moment)?
             }
             None => picture::of_body(body, &set.fields, &options)?,

@@ -344,6 +344,7 @@ impl PyEngine {
             if inner.page.as_ref().is_some_and(|page| page.is_open()) {
                 return Err(Error::usage("this engine is shown already; close its other view"));
             }
+            inner.engine.keep_touch_taxels(true);
             let page = Arc::new(Page::start(&listen, &inner.engine, &self.run.body, &self.channels)?);
             inner.page = Some(Arc::clone(&page));
             Ok(page)

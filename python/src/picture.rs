@@ -102,7 +102,7 @@ pub(crate) enum SizeOfPicture {
 ///
 /// `what` is a `Body`, or a `Recording` whose body is known. Of a body the taxels have the colours of their `fields` (globs); `uv` draws the
 /// chart of one field instead; `ids` labels taxels. Of a recording they have the colours of their pressures under `calibration` (by
-/// default its own), and touched fields their percepts: at the time `at_s`, by default where most is pressed, or from `from_s` to
+/// default its own), and each touch of the body has its mark: at the time `at_s`, by default where most is pressed, or from `from_s` to
 /// `to_s` as an animation with `rate_hz` pictures a second. `views` are sides, such as 'front' and 'top', or 'all'; `look_at` is a
 /// field or link that fills the picture; `size` is the width, or width and height at most, in pixels.
 ///

@@ -1,4 +1,4 @@
-//! `somatic render`: a picture of a body and its fields, or of a touch on it.
+//! `somatic render`: a picture of a body and its fields, or of touches on it.
 
 mod touched;
 
@@ -28,10 +28,11 @@ Examples:
   somatic render hand -o touch.png --source touch.csv --from 1 --to 4      an animation
   somatic render insoles.csv -o peak.png       a pressure system's export, with its own sensors
 
-With a recording, taxels have the colours of their pressures, and each touched field has its
-centroid, the line of its orientation, its principal axis as an ellipse and its motion of a
-quarter of a second as an arrow; of nested fields the largest with a chart. Otherwise a taxel in several fields shows a slice of each. Up to twelve fields are named; of more, those
-side by side differ in colour.";
+With a recording, taxels have the colours of their pressures. Each touch has one mark: its
+taxels have a rim of its colour, its id stands at its place, an ellipse shows its principal axis
+and spread, an arrow its motion of a quarter of a second, and a fading line where it was in the
+last second. Without a recording a taxel in several fields shows a slice of each. Up to twelve
+fields are named; of more, those side by side differ in colour.";
 
 /// Draw a body, its taxels coloured by field, or by their pressures in a recording.
 #[derive(Args)]

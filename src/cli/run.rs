@@ -154,6 +154,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     #[cfg(feature = "page")]
     let options = settled.options.clone();
     let mut engine = Engine::new(&body, settled.options)?;
+    engine.keep_touch_taxels(has_page);
     let verify = asked.verify && has_another_to_compare(&engine, settled.why.as_deref())?;
     // Boards speak as soon as their lines are open: not before somebody can listen.
     let mut wiring = None;

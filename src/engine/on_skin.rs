@@ -96,6 +96,11 @@ impl OnSkin {
         self.touches.skin()
     }
 
+    /// From now on gives the taxels of touches too.
+    pub(super) fn keep_taxels(&mut self) {
+        self.touches.keep_taxels();
+    }
+
     /// What is to be known before the first frame, a line each: why the edges that the body's file holds are not used, and that
     /// nothing says what its sensors cover.
     pub(super) fn remarks(&self) -> &[String] {

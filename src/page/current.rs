@@ -6,7 +6,8 @@ use super::readings::{Reading, Readings};
 use super::scale::Scale;
 use super::scene::PageScene;
 use super::snapshot::Snapshot;
-use crate::percept::{Column, Percept, SelfContact, Touch};
+use super::touches::TouchPlaces;
+use crate::percept::{Column, Percept, SelfContact, TouchFrame};
 
 /// The newest frame, read when the first viewer wants it.
 #[derive(Debug)]
@@ -18,7 +19,7 @@ pub(super) struct Current {
     /// Of the last frame that was read.
     percepts: Vec<Percept>,
     percept_changes: u64,
-    touches: Vec<(u32, Touch)>,
+    touches: TouchFrame,
     /// 0 where there never was any.
     touch_changes: u64,
     self_contacts: Vec<SelfContact>,
@@ -29,6 +30,7 @@ pub(super) struct Current {
     scale_changes: u64,
     counts: Counts,
     of_world: Vec<bool>,
+    touch_places: TouchPlaces,
     origin: [f64; 3],
 }
 
@@ -41,7 +43,7 @@ impl Current {
             poses: scene.poses.clone(),
             percepts: Vec::new(),
             percept_changes: 0,
-            touches: Vec::new(),
+            touches: TouchFrame::default(),
             touch_changes: 0,
             self_contacts: Vec::new(),
             self_contacts_are_known: false,
@@ -50,6 +52,7 @@ impl Current {
             scale_changes: 0,
             counts: scene.counts.clone(),
             of_world: scene.of_world.clone(),
+            touch_places: scene.touch_places.clone(),
             origin: scene.origin.to_array(),
         }
     }
@@ -103,6 +106,11 @@ impl Current {
 
     pub(super) fn touch_changes(&self) -> u64 {
         self.touch_changes
+    }
+
+    /// How touches are written.
+    pub(super) fn touch_places(&self) -> &TouchPlaces {
+        &self.touch_places
     }
 
     pub(super) fn self_contact_changes(&self) -> u64 {

@@ -3,7 +3,7 @@
 use super::message::VERSION;
 use super::series::Trail;
 
-/// Bit of a percept's present columns: its position, normal and touches are in the world.
+/// Bit of a percept's present columns: its position and normal are in the world.
 pub(super) const IN_WORLD: u32 = 1 << 31;
 /// Columns that have a bit beside it: a page shows the first of these.
 pub(super) const MAX_COLUMNS: usize = 31;

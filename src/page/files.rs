@@ -58,6 +58,7 @@ const FILES: &[PageFile] = files![
     "taxels.js",
     "theme.js",
     "timeline.js",
+    "touch_panel.js",
     "view.js",
     "wire.js",
 ];

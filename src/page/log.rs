@@ -8,9 +8,9 @@ const CAPACITY: usize = 4096;
 /// What an event is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
-    /// A field is touched.
+    /// A touch begins, or a field is touched.
     Onset,
-    /// A field is no longer touched.
+    /// A touch ends, or a field is no longer touched.
     Release,
     /// A board comes, goes, or loses frames.
     Board,
@@ -30,6 +30,22 @@ impl EventKind {
     }
 }
 
+/// What an event is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum About {
+    /// The whole run.
+    Run,
+    /// A field.
+    Field(u32),
+    /// A touch of the whole body.
+    Touch {
+        /// Which one.
+        id: u64,
+        /// The link with most of it.
+        link: u32,
+    },
+}
+
 /// An event.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Event {
@@ -37,8 +53,8 @@ pub(super) struct Event {
     pub(super) seq: u64,
     pub(super) t_s: f64,
     pub(super) kind: EventKind,
-    pub(super) field: Option<u32>,
-    /// Absent where the kind and the field say it.
+    pub(super) about: About,
+    /// Absent where the kind and what it is about say it.
     pub(super) text: Option<String>,
 }
 
@@ -88,7 +104,7 @@ mod tests {
     use super::*;
 
     fn event(t_s: f64) -> Event {
-        Event { seq: 0, t_s, kind: EventKind::Onset, field: Some(1), text: None }
+        Event { seq: 0, t_s, kind: EventKind::Onset, about: About::Field(1), text: None }
     }
 
     #[test]

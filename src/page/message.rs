@@ -6,7 +6,7 @@ use super::series::Series;
 use crate::percept::Column;
 
 /// The version of the protocol.
-pub(super) const VERSION: u32 = 2;
+pub(super) const VERSION: u32 = 3;
 /// The most bytes of a message.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 << 10;
 /// The most series of a viewer.
@@ -200,11 +200,11 @@ mod tests {
         let series = Series { field: 2, column: &COLUMNS[4], component: 1 };
         for (text, message) in [
             (
-                r#"{"type":"hello","version":2,"token":"ab","after_event":null}"#,
+                r#"{"type":"hello","version":3,"token":"ab","after_event":null}"#,
                 Message::Hello { token: "ab".to_owned(), after_event: None },
             ),
             (
-                r#"{"after_event":7,"token":"","version":2,"type":"hello"}"#,
+                r#"{"after_event":7,"token":"","version":3,"type":"hello"}"#,
                 Message::Hello { token: String::new(), after_event: Some(7) },
             ),
             (r#"{"type":"drawn","seq":5}"#, Message::Drawn { seq: 5 }),
@@ -243,8 +243,8 @@ mod tests {
             r#"{"type":"drawn","seq":-1}"#,
             r#"{"type":"drawn","seq":1,"seq":2}"#,
             r#"{"type":"drawn","seq":4294967296}"#,
-            r#"{"type":"hello","version":1,"token":"a","after_event":null}"#,
-            r#"{"type":"hello","version":2,"token":7,"after_event":null}"#,
+            r#"{"type":"hello","version":2,"token":"a","after_event":null}"#,
+            r#"{"type":"hello","version":3,"token":7,"after_event":null}"#,
             r#"{"type":"columns","columns":["principal_axis","nothing"]}"#,
             r#"{"type":"series","series":[{"field":3,"column":"total","component":0}]}"#,
             r#"{"type":"series","series":[{"field":0,"column":"total","component":1}]}"#,
@@ -263,7 +263,7 @@ mod tests {
         let one = r#"{"field":0,"column":"total","component":0}"#;
         let many = |count: usize| format!(r#"{{"type":"series","series":[{}]}}"#, vec![one; count].join(","));
         assert!(parsed(&many(16)).is_ok() && parsed(&many(17)).is_err());
-        let long = format!(r#"{{"type":"hello","version":2,"token":"{}"}}"#, "é".repeat(MAX_MESSAGE_BYTES / 2));
+        let long = format!(r#"{{"type":"hello","version":3,"token":"{}"}}"#, "é".repeat(MAX_MESSAGE_BYTES / 2));
         assert!(parsed(&long).is_err());
         assert!(parsed(&"[".repeat(60_000)).is_err());
     }

@@ -31,6 +31,7 @@ mod socket;
 mod tests;
 mod text;
 mod token;
+mod touches;
 mod viewer;
 mod wake;
 

@@ -5,11 +5,11 @@ use std::sync::{Arc, MutexGuard};
 use std::time::Instant;
 
 use super::exchange::{Exchange, Shared, WAITING_ROWS};
-use super::log::{Event, EventKind};
+use super::log::{About, Event, EventKind};
 use super::scene::PageScene;
 use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
-use crate::percept::{Flags, Percepts};
+use crate::percept::{Flags, Percepts, TouchTrails};
 use crate::scene::Plan;
 use crate::signal::{BoardHealth, Frame, Pose, RawValue};
 
@@ -48,6 +48,10 @@ pub struct Publisher {
     last_poses: Vec<(u32, Pose)>,
     /// By field.
     in_contact: Vec<bool>,
+    /// Touches of the last frame: their ids and links.
+    touching: Vec<(u64, u32)>,
+    /// Where touches were.
+    trails: TouchTrails,
     /// Whether the next frame does not follow the last one.
     jumped: bool,
     number: Option<u64>,
@@ -69,6 +73,8 @@ impl Publisher {
             index_of_link: scene.index_of_link.clone(),
             last_poses: Vec::new(),
             in_contact: vec![false; scene.plan.fields.len()],
+            touching: Vec::new(),
+            trails: TouchTrails::default(),
             jumped: false,
             number: None,
             published: 0,
@@ -120,13 +126,22 @@ impl Publisher {
     pub fn publish(&mut self, percepts: &Percepts) {
         let Some(last) = percepts.frames().checked_sub(1) else { return };
         self.note_contacts(percepts);
+        self.pass(percepts);
         self.published += percepts.frames() as u64;
         let snapshot = &mut *self.snapshot;
         snapshot.number = self.number.unwrap_or_else(|| percepts.frame_number(last));
         snapshot.published = self.published;
         snapshot.percepts.clear();
         snapshot.percepts.extend(percepts.touched(last));
-        snapshot.touches.clear();
+        match percepts.touches(last) {
+            Some(found) => {
+                snapshot.touches.clone_from(found);
+                // Viewers that skip frames would miss them: what is not there has ended.
+                snapshot.touches.released.clear();
+            }
+            None => snapshot.touches.clear(),
+        }
+        snapshot.trails.clone_from(&self.trails);
         let self_contacts = percepts.self_contacts(last);
         snapshot.self_contacts_are_known = self_contacts.is_some();
         snapshot.self_contacts.clear();
@@ -139,6 +154,15 @@ impl Publisher {
         self.try_flush();
     }
 
+    /// Takes the percepts of frames that are not shown, on the way to one that is: trails of touches lead through them.
+    pub fn pass(&mut self, percepts: &Percepts) {
+        for frame in 0..percepts.frames() {
+            if let Some(found) = percepts.touches(frame) {
+                self.trails.follow(percepts.t_s(frame), found);
+            }
+        }
+    }
+
     /// Says that the next frame does not follow the last one, as after a seek: what is touched in it begins no touch.
     pub fn jump(&mut self) {
         self.jumped = true;
@@ -146,7 +170,8 @@ impl Publisher {
 
     /// Logs an event: a message about a board or another notice.
     pub fn event(&mut self, kind: EventKind, t_s: f64, field: Option<usize>, text: String) {
-        self.add_event(Event { seq: 0, t_s, kind, field: field.map(|field| field as u32), text: Some(text) });
+        let about = field.map_or(About::Run, |field| About::Field(field as u32));
+        self.add_event(Event { seq: 0, t_s, kind, about, text: Some(text) });
     }
 
     /// Replaces what is shown of the boards.
@@ -199,7 +224,11 @@ impl Publisher {
         self.exchange.wake_for_viewers();
     }
 
+    /// Onsets and releases: of touches of the whole body where these are looked for, else of fields.
     fn note_contacts(&mut self, percepts: &Percepts) {
+        if percepts.touches(0).is_some() {
+            return self.note_touches(percepts);
+        }
         let fields = percepts.fields().max(1);
         for (frame, flags) in percepts.flags.chunks_exact(fields).enumerate() {
             let jumped = std::mem::take(&mut self.jumped);
@@ -212,10 +241,31 @@ impl Publisher {
                 if !jumped {
                     let kind = if touched { EventKind::Onset } else { EventKind::Release };
                     let t_s = percepts.t_s(frame);
-                    self.add_event(Event { seq: 0, t_s, kind, field: Some(field as u32), text: None });
+                    self.add_event(Event { seq: 0, t_s, kind, about: About::Field(field as u32), text: None });
                 }
             }
         }
+    }
+
+    fn note_touches(&mut self, percepts: &Percepts) {
+        let mut before = std::mem::take(&mut self.touching);
+        for frame in 0..percepts.frames() {
+            let jumped = std::mem::take(&mut self.jumped);
+            let now = percepts.touches(frame).map_or(&[][..], |found| &found.touches);
+            if !jumped {
+                let t_s = percepts.t_s(frame);
+                let event = |kind, id, link| Event { seq: 0, t_s, kind, about: About::Touch { id, link }, text: None };
+                for &(id, link) in before.iter().filter(|(id, _)| now.iter().all(|touch| touch.id != *id)) {
+                    self.add_event(event(EventKind::Release, id, link));
+                }
+                for touch in now.iter().filter(|touch| before.iter().all(|(id, _)| *id != touch.id)) {
+                    self.add_event(event(EventKind::Onset, touch.id, touch.link));
+                }
+            }
+            before.clear();
+            before.extend(now.iter().map(|touch| (touch.id, touch.link)));
+        }
+        self.touching = before;
     }
 
     fn add_event(&mut self, event: Event) {

@@ -10,9 +10,11 @@ use super::mesh::{Mesh, disc_radii_m};
 use super::message::{Counts, VERSION};
 use super::poses::Poses;
 use super::scale::Scale;
+use super::text::Names;
+use super::touches::TouchPlaces;
 use crate::body::{Body, ChartKind};
 use crate::colours::pressure_colours;
-use crate::percept::{Column, Flags, Outputs, Unit};
+use crate::percept::{Column, Flags, Outputs, TouchFlags, Unit};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Quantity, Wiring};
 
@@ -62,10 +64,11 @@ pub struct PageScene {
     pub(super) origin: DVec3,
     pub(super) poses: Poses,
     pub(super) counts: Counts,
-    /// What people call the fields.
-    pub(super) labels: Vec<String>,
+    /// What people call fields and links.
+    pub(super) names: Names,
     /// By field, whether its places are in the world even where the frame has no pose.
     pub(super) of_world: Vec<bool>,
+    pub(super) touch_places: TouchPlaces,
     pub(super) scale: Scale,
 }
 
@@ -102,7 +105,9 @@ impl PageScene {
             "channels": info.wiring.map(|wiring| channels(body, wiring)),
             "fields": fields(body, plan),
             "columns": columns.iter().map(|column| column_json(column, plan)).collect::<Vec<_>>(),
-            "flags": flag_names(),
+            "flags": by_bit(Flags::all().iter_names().map(|(name, flag)| (name, flag.bits()))),
+            "touches": plan.touch_outputs().is_some(),
+            "touch_flags": by_bit(TouchFlags::all().iter_names().map(|(name, flag)| (name, flag.bits()))),
             "self_contacts": plan.outputs().contains(Outputs::SELF_CONTACTS),
             "colours": pressure_colours().to_vec(),
         });
@@ -114,8 +119,12 @@ impl PageScene {
             origin,
             poses,
             counts: Counts { taxels: body.taxels.len(), fields: plan.fields.len(), columns },
-            labels: (0..plan.fields.len()).map(|field| plan.label(field)).collect(),
+            names: Names {
+                fields: (0..plan.fields.len()).map(|field| plan.label(field)).collect(),
+                links: body.links.iter().map(|link| link.name.clone()).collect(),
+            },
             of_world: plan.fields.iter().map(|field| field.anchor.is_none()).collect(),
+            touch_places: TouchPlaces::new(body, plan, origin),
             scale: Scale::of(plan, info.recorded_max),
             plan: plan.clone(),
         }
@@ -150,11 +159,13 @@ fn column_json(column: &Column, plan: &Plan) -> Value {
     json!({"name": column.name, "unit": unit, "components": column.components, "help": column.help})
 }
 
-/// The flags' names by their bits.
-fn flag_names() -> Vec<Option<String>> {
-    let mut names = vec![None; 32 - Flags::all().bits().leading_zeros() as usize];
-    for (name, flag) in Flags::all().iter_names() {
-        names[flag.bits().trailing_zeros() as usize] = Some(name.to_lowercase());
+/// Flags' names by their bits.
+fn by_bit<'a>(flags: impl Iterator<Item = (&'a str, u32)>) -> Vec<Option<String>> {
+    let mut names = Vec::new();
+    for (name, bits) in flags {
+        let bit = bits.trailing_zeros() as usize;
+        names.resize(names.len().max(bit + 1), None);
+        names[bit] = Some(name.to_lowercase());
     }
     names
 }

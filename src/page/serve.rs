@@ -321,7 +321,7 @@ impl Content {
         if viewer.seen_event != self.newest_event {
             let (lost, events) = exchange.lock().log.after(viewer.seen_event, EVENTS_AT_ONCE);
             viewer.seen_event = events.last().map_or(self.newest_event, |event| event.seq);
-            socket.push(Payload::Text(text::events(lost, &events, &self.scene.labels)));
+            socket.push(Payload::Text(text::events(lost, &events, &self.scene.names)));
         }
         if viewer.seen_boards != self.board_changes {
             viewer.seen_boards = self.board_changes;

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::percept::{Percept, SelfContact, Touch};
+use crate::percept::{Percept, SelfContact, TouchFrame, TouchTrails};
 use crate::scene::Plan;
 use crate::signal::{Pose, RawValue};
 
@@ -28,8 +28,10 @@ pub(super) struct Snapshot {
     pub(super) poses: Vec<(u32, Pose)>,
     /// Of the fields in contact, in their order.
     pub(super) percepts: Vec<Percept>,
-    /// Of these fields, in their order.
-    pub(super) touches: Vec<(u32, Touch)>,
+    /// Of the whole body; none where none are looked for.
+    pub(super) touches: TouchFrame,
+    /// Where these were.
+    pub(super) trails: TouchTrails,
     /// Between links, where they are asked for and known.
     pub(super) self_contacts: Vec<SelfContact>,
     pub(super) self_contacts_are_known: bool,
@@ -49,7 +51,8 @@ impl Snapshot {
             baselines: Vec::new(),
             poses: Vec::new(),
             percepts: Vec::with_capacity(plan.fields.len()),
-            touches: Vec::new(),
+            touches: TouchFrame::default(),
+            trails: TouchTrails::default(),
             self_contacts: Vec::new(),
             self_contacts_are_known: false,
         };

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::log::{Event, EventKind};
+use super::log::{About, Event, EventKind};
 use super::readings::Reading;
 use super::scale::Scale;
 use crate::signal::BoardHealth;
@@ -11,19 +11,45 @@ pub(super) fn scale(scale: Scale) -> String {
     json!({"type": "scale", "max": scale.max, "from": scale.from.word()}).to_string()
 }
 
-/// Events after those that are no longer known; fields are called `labels`.
-pub(super) fn events(lost: u64, events: &[Event], labels: &[String]) -> String {
+/// What people call what events are about.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Names {
+    pub(super) fields: Vec<String>,
+    pub(super) links: Vec<String>,
+}
+
+/// Events after those that are no longer known.
+pub(super) fn events(lost: u64, events: &[Event], names: &Names) -> String {
     let event = |event: &Event| {
-        let label = event.field.and_then(|field| labels.get(field as usize)).map_or("", String::as_str);
-        let text = match (&event.text, event.kind) {
-            (Some(text), _) => text.clone(),
-            (None, EventKind::Onset) => format!("{label} is touched"),
-            (None, EventKind::Release) => format!("{label} is released"),
-            (None, _) => label.to_owned(),
+        let (field, touch, link) = match event.about {
+            About::Run => (None, None, None),
+            About::Field(field) => (Some(field), None, None),
+            About::Touch { id, link } => (None, Some(id), Some(link)),
         };
-        json!({"seq": event.seq, "t_s": event.t_s, "kind": event.kind.word(), "field": event.field, "text": text})
+        json!({
+            "seq": event.seq,
+            "t_s": event.t_s,
+            "kind": event.kind.word(),
+            "field": field,
+            "touch": touch,
+            "link": link,
+            "text": event.text.clone().unwrap_or_else(|| said(event, names)),
+        })
     };
     json!({"type": "events", "lost": lost, "events": events.iter().map(event).collect::<Vec<Value>>()}).to_string()
+}
+
+/// What an event says whose kind says all.
+fn said(event: &Event, names: &Names) -> String {
+    let name = |names: &[String], index: u32| names.get(index as usize).cloned().unwrap_or_default();
+    let is_onset = event.kind == EventKind::Onset;
+    match event.about {
+        About::Run => String::new(),
+        About::Field(field) if is_onset => format!("{} is touched", name(&names.fields, field)),
+        About::Field(field) => format!("{} is released", name(&names.fields, field)),
+        About::Touch { id, link } if is_onset => format!("touch {id} begins on {}", name(&names.links, link)),
+        About::Touch { id, link } => format!("touch {id} ends on {}", name(&names.links, link)),
+    }
 }
 
 pub(super) fn boards(boards: &[BoardHealth]) -> String {

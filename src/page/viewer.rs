@@ -199,7 +199,7 @@ impl Viewer {
             skipped: u32::try_from(self.skipped).unwrap_or(u32::MAX),
             latency_ms: self.latencies.percentiles_ms(),
             fields: snapshot.percepts.len() as u32,
-            touches: snapshot.touches.len() as u32,
+            touches: snapshot.touches.touches.len() as u32,
             samples: self.trail.samples() as u32,
             newest_event: u32::try_from(newest_event).unwrap_or(u32::MAX),
             columns: if percepts { self.columns } else { 0 },
@@ -220,7 +220,7 @@ impl Viewer {
             self.write_percepts(&mut to, current);
         }
         if touches {
-            write_touches(&mut to, current);
+            current.touch_places().write(&mut to, &snapshot.touches, &snapshot.trails, snapshot.t_s);
         }
         if self_contacts {
             write_self_contacts(&mut to, current);
@@ -270,23 +270,6 @@ fn value(percept: &Percept, column: &Column, current: &Current) -> [f32; 3] {
     let is_place = column.output == Outputs::POSITION && current.is_in_world(percept);
     let from = if is_place { current.origin() } else { [0.0; 3] };
     std::array::from_fn(|i| (value[i] - from[i]) as f32)
-}
-
-fn write_touches(to: &mut Writer, current: &Current) {
-    let snapshot = current.snapshot();
-    for (field, touch) in &snapshot.touches {
-        let of = snapshot.percepts.binary_search_by_key(&(*field as usize), |percept| percept.field);
-        let in_world = of.is_ok_and(|at| current.is_in_world(&snapshot.percepts[at]));
-        let from = if in_world { current.origin() } else { [0.0; 3] };
-        to.u32(*field);
-        to.u32(touch.id as u32);
-        to.f32(touch.total as f32);
-        to.u32(touch.active);
-        [f32::NAN; 2].into_iter().for_each(|x| to.f32(x));
-        let position = touch.position.to_array();
-        (0..3).for_each(|i| to.f32((position[i] - from[i]) as f32));
-    }
-    to.pad();
 }
 
 fn write_self_contacts(to: &mut Writer, current: &Current) {

@@ -180,7 +180,7 @@ pub struct FieldShare {
 }
 
 /// The touches of a frame.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct TouchFrame {
     /// The oldest first.
     pub touches: Vec<Touch>,
@@ -189,6 +189,27 @@ pub struct TouchFrame {
     pub(crate) links: Vec<LinkShare>,
     pub(crate) fields: Vec<FieldShare>,
     pub(crate) taxels: Vec<u32>,
+}
+
+impl Clone for TouchFrame {
+    fn clone(&self) -> Self {
+        Self {
+            touches: self.touches.clone(),
+            released: self.released.clone(),
+            links: self.links.clone(),
+            fields: self.fields.clone(),
+            taxels: self.taxels.clone(),
+        }
+    }
+
+    // In memory that is used again.
+    fn clone_from(&mut self, other: &Self) {
+        self.touches.clone_from(&other.touches);
+        self.released.clone_from(&other.released);
+        self.links.clone_from(&other.links);
+        self.fields.clone_from(&other.fields);
+        self.taxels.clone_from(&other.taxels);
+    }
 }
 
 impl TouchFrame {

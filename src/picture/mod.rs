@@ -16,7 +16,7 @@ use glam::DVec3;
 
 pub use drawn::Picture;
 pub use moments::{Moments, Times};
-pub use touch::{Moment, TouchPicture};
+pub use touch::{MarkedTouch, Moment, TouchPicture};
 pub use view::View;
 
 use self::colour::{PALETTE, PAPER, linear};

@@ -1,11 +1,11 @@
-//! Pictures of a recorded touch: which of its frames they show, and what is drawn of each.
+//! Pictures of recorded touches: which of its frames they show, and what is drawn of each.
 
-use super::{Moment, Options, Picture, TouchPicture, View};
-use crate::body::Body;
+use super::{MarkedTouch, Moment, Options, Picture, TouchPicture, View};
+use crate::body::{Body, Modality};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::Field;
-use crate::percept::Percept;
+use crate::percept::{Touch, TouchFrame, TouchTrails};
 use crate::signal::{Frame, Quantity};
 
 /// Pictures of an animation at most: each is held in memory.
@@ -56,7 +56,7 @@ impl Times {
 struct Shown {
     t_s: f64,
     pressures: Vec<Option<f64>>,
-    percepts: Vec<(usize, Percept)>,
+    touches: Vec<MarkedTouch>,
 }
 
 /// What pictures show of a recording.
@@ -68,21 +68,23 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Runs all `frames` of the recording called `name` through `engine`, whose places are in the fields' anchors, and keeps what
-    /// is shown of `times`; `fields` are those of `body`.
+    /// Runs all `frames` of the recording called `name` through `engine`, which looks for touches of `body` ([`crate::Scene::touches`])
+    /// and leaves them in their links' frames, and keeps what is shown of `times`.
     ///
     /// # Errors
     /// What reading and computing say; there is no frame at these times, or there are too many.
     pub fn of(
         engine: &mut Engine,
         body: &Body,
-        fields: &[Field],
         times: Times,
         name: &str,
         frames: impl Iterator<Item = Result<Frame>>,
     ) -> Result<Self> {
         times.check()?;
-        let marked = marked(engine, fields);
+        engine.keep_touch_taxels(true);
+        let is_of_skin = |taxel: &usize| body.taxels[*taxel].modality == Modality::Pressure;
+        let of_skin: Vec<usize> = (0..body.taxels.len()).filter(is_of_skin).collect();
+        let mut trails = TouchTrails::default();
         let (from_s, to_s) = match times {
             Times::MostPressed => (f64::NEG_INFINITY, f64::INFINITY),
             Times::At(t_s) => (f64::NEG_INFINITY, t_s),
@@ -93,9 +95,9 @@ impl Moments {
         let mut list = Vec::new();
         for frame in frames {
             let frame = frame?;
-            let percepts = engine.process_one(&frame)?;
-            let of_frame: Vec<(usize, Percept)> =
-                percepts.touched(0).filter_map(|percept| Some((marked[percept.field]?, percept))).collect();
+            engine.process_one(&frame)?;
+            let found = engine.percepts().touches(0);
+            found.iter().for_each(|found| trails.follow(frame.t_s, found));
             engine.pressures(&frame, &mut list);
             let sum: f64 = list.iter().map(|&(_, pressure)| pressure).sum();
             max_pressure = list.iter().map(|&(_, pressure)| pressure).fold(max_pressure, f64::max);
@@ -128,7 +130,8 @@ impl Moments {
                     pressures[taxel] = Some(pressure);
                 }
             }
-            shown.push(Shown { t_s: frame.t_s, pressures, percepts: of_frame });
+            let touches = found.map_or_else(Vec::new, |found| marked(found, &trails, &of_skin));
+            shown.push(Shown { t_s: frame.t_s, pressures, touches });
         }
         if shown.is_empty() {
             return Err(Error::usage("the recording has no frames at that time").at(name));
@@ -164,13 +167,13 @@ impl Moments {
         }
         let picture = TouchPicture::new(body, fields, &options, ids)?;
         let mut pictures = Vec::with_capacity(self.shown.len());
-        for (index, Shown { t_s, pressures, percepts }) in self.shown.iter().enumerate() {
+        for (index, Shown { t_s, pressures, touches }) in self.shown.iter().enumerate() {
             let pressures: Vec<Option<f64>> = pressures.iter().map(|p| p.map(|p| p * factor)).collect();
             pictures.push(picture.draw(&Moment {
                 pressures: &pressures,
                 max_pressure,
                 unit,
-                percepts,
+                touches,
                 t_s: Some(*t_s),
             })?);
             if !progress((index + 1) as f64 / self.shown.len() as f64) {
@@ -181,15 +184,12 @@ impl Moments {
     }
 }
 
-/// By field of the engine's plan, its index in `fields` if it is marked: the largest fields with charts, and fields without
-/// children in none of those.
-fn marked(engine: &Engine, fields: &[Field]) -> Vec<Option<usize>> {
-    let above = |index: usize| std::iter::successors(fields[index].parent, |&parent| fields[parent].parent);
-    let index = |name: &str| {
-        let index = fields.iter().position(|field| field.name == name)?;
-        let is_leaf = fields.iter().all(|field| field.parent != Some(index));
-        let within_another = above(index).any(|parent| fields[parent].chart.is_ok());
-        ((fields[index].chart.is_ok() || is_leaf) && !within_another).then_some(index)
+/// The touches of a frame with their trails; `of_skin` are the taxels of the skin's nodes.
+fn marked(found: &TouchFrame, trails: &TouchTrails, of_skin: &[usize]) -> Vec<MarkedTouch> {
+    let of_touch = |touch: &Touch| MarkedTouch {
+        touch: touch.clone(),
+        taxels: found.taxels(touch).iter().map(|&node| of_skin[node as usize]).collect(),
+        trail: trails.of(touch.id).filter_map(|point| Some((point.link?, point.position))).collect(),
     };
-    engine.plan().fields().map(|(name, _)| index(name)).collect()
+    found.touches.iter().map(of_touch).collect()
 }

@@ -20,6 +20,8 @@ const RADIUS_SHARE: f64 = 0.40;
 const MAX_RADIUS_RATIO: f64 = 2.0;
 /// Radius of the dark rim, in radii.
 pub(super) const RIM: f64 = 1.16;
+/// Radius of the rim of a taxel that is part of a touch, in radii.
+const TOUCHED_RIM: f64 = 1.32;
 /// Offset of discs towards the eye, in radii, so that a curved surface does not hide them.
 const LIFT: f64 = 0.6;
 /// Fields with taxels nearer than this many typical distances are neighbours.
@@ -100,12 +102,21 @@ impl Dots {
         pairs
     }
 
-    /// The discs in `colours`, relative to `middle`, unlit: a colour is what the legend says.
-    pub(super) fn flat_slices(&self, colours: &[[u8; 3]], middle: DVec3, rims: bool) -> Vec<Slice> {
+    /// The discs in `colours`, relative to `middle`, unlit: a colour is what the legend says. Those that `touched` has a colour for have a
+    /// wide rim of it.
+    pub(super) fn flat_slices(
+        &self,
+        colours: &[[u8; 3]],
+        touched: &[Option<[u8; 3]>],
+        middle: DVec3,
+        rims: bool,
+    ) -> Vec<Slice> {
         let mut slices = Vec::with_capacity(2 * colours.len());
-        for (taxel, &colour) in colours.iter().enumerate() {
-            if rims {
-                slices.push(self.slice(taxel, middle, (RIM, LIFT), colour::RIM, (0.0, TAU)));
+        for (taxel, (&colour, touched)) in colours.iter().zip(touched).enumerate() {
+            match touched {
+                Some(rim) => slices.push(self.slice(taxel, middle, (TOUCHED_RIM, LIFT + 0.05), *rim, (0.0, TAU))),
+                None if rims => slices.push(self.slice(taxel, middle, (RIM, LIFT), colour::RIM, (0.0, TAU))),
+                None => {}
             }
             let slice = self.slice(taxel, middle, (1.0, LIFT + 0.1), colour, (0.0, TAU));
             slices.push(Slice { colour: [slice.colour[0], slice.colour[1], slice.colour[2], 0.0], ..slice });

@@ -1,4 +1,4 @@
-//! Pictures of a touch: pressures on the taxels of a body, and on them what the fields in contact report.
+//! Pictures of touches: pressures on the taxels of a body, and a mark for each touch of the whole body.
 
 use glam::DVec3;
 use plotters::prelude::*;
@@ -9,26 +9,39 @@ use super::edges::Lines;
 use super::labels::{INK, Labels};
 use super::{Options, Picture, Prepared, stem};
 use crate::backend::gpu::raster;
-use crate::body::{BODY_FROM_WORLD, Body};
+use crate::body::Body;
 use crate::colours::pressure_colours;
 use crate::error::Result;
 use crate::field::Field;
 use crate::ink::{self, FAMILY, cannot};
-use crate::percept::Percept;
+use crate::percept::Touch;
 
 /// A taxel that feels nothing.
 const IDLE: [u8; 3] = [0xD6, 0xD6, 0xD4];
 /// A taxel whose value is missing or not used.
 const UNUSED: [u8; 3] = [0xFF, 0xFF, 0xFF];
-/// Length of the line of an orientation to either side, and of the longer half axis, in shares of the field's radius.
-const LINE_SHARE: f64 = 0.6;
-const ELLIPSE_SHARE: f64 = 0.4;
+/// Half axes of an ellipse, in standard deviations: about the edge of what presses evenly.
+const ELLIPSE_SIGMAS: f64 = 2.0;
 /// Time whose motion the arrow shows, s.
 const ARROW_S: f64 = 0.25;
 /// Points of an ellipse.
 const CORNERS: usize = 48;
+/// Width of a trail, pixels, and how opaque its oldest part is.
+const TRAIL_WIDTH: u32 = 3;
+const OLDEST_OPACITY: f64 = 0.15;
 /// Marks are drawn in views that the touch faces by at least this cosine.
 const MIN_FACING: f64 = 0.15;
+
+/// A touch of the whole body on a picture.
+#[derive(Clone, Debug)]
+pub struct MarkedTouch {
+    /// The touch, its place in the frame of its link.
+    pub touch: Touch,
+    /// Its taxels, by their index in the body.
+    pub taxels: Vec<usize>,
+    /// Where it was in the last second, the oldest first: a link, and a place in its frame.
+    pub trail: Vec<(u32, DVec3)>,
+}
 
 /// What is touched at one time.
 #[derive(Clone, Debug)]
@@ -39,8 +52,8 @@ pub struct Moment<'a> {
     pub max_pressure: Option<f64>,
     /// Unit of P.
     pub unit: &'a str,
-    /// The percepts to mark, each with the index of its field, places in the field's anchor.
-    pub percepts: &'a [(usize, Percept)],
+    /// The touches to mark.
+    pub touches: &'a [MarkedTouch],
     /// Time, s.
     pub t_s: Option<f64>,
 }
@@ -48,7 +61,6 @@ pub struct Moment<'a> {
 /// A body and its views, ready to draw touches on.
 pub struct TouchPicture<'a> {
     body: &'a Body,
-    fields: &'a [Field],
     prepared: Prepared,
     ids: bool,
     edges: Option<Lines>,
@@ -63,7 +75,7 @@ impl<'a> TouchPicture<'a> {
         let key = vec![(None, "0.00 s".to_owned())];
         let prepared = Prepared::new(body, fields, options, &title(body), key)?;
         let edges = options.edges.then(|| prepared.edges(body));
-        Ok(Self { body, fields, prepared, ids, edges })
+        Ok(Self { body, prepared, ids, edges })
     }
 
     /// A picture of `moment`.
@@ -81,7 +93,11 @@ impl<'a> TouchPicture<'a> {
         let taxels: Vec<[u8; 3]> = moment.pressures.iter().map(colour).collect();
         let usual = self.prepared.usual_radius();
         let mut drawing = self.prepared.drawing(linear(PAPER));
-        drawing.slices = dots.flat_slices(&taxels, *middle, usual > 2.0);
+        let mut touched = vec![None; taxels.len()];
+        for marked in moment.touches {
+            marked.taxels.iter().for_each(|&taxel| touched[taxel] = Some(own_colour(&marked.touch)));
+        }
+        drawing.slices = dots.flat_slices(&taxels, &touched, *middle, usual > 2.0);
         let mut pixels = raster::draw(&drawing)?;
         if let Some(lines) = &self.edges {
             lines.draw(*size, &mut pixels)?;
@@ -102,7 +118,7 @@ impl<'a> TouchPicture<'a> {
         Ok(Picture { size: *size, pixels })
     }
 
-    /// Draws the marks of the percepts, and ids.
+    /// Draws the marks of the touches, and ids of taxels.
     fn mark(&self, moment: &Moment<'_>, pixels: &mut [u8]) -> Result<()> {
         ink::font()?;
         let Prepared { size: [width, height], middle, arrangement, dots, views, .. } = &self.prepared;
@@ -121,22 +137,30 @@ impl<'a> TouchPicture<'a> {
                     }
                 }
             }
-            for (number, (field, percept)) in moment.percepts.iter().enumerate() {
-                let [r, g, b] = PALETTE[number % PALETTE.len()];
-                let Some(mark) = Mark::new(self.body, &self.fields[*field], percept) else { continue };
+            for marked in moment.touches {
+                let [r, g, b] = own_colour(&marked.touch);
+                let colour = RGBColor(r, g, b);
+                let mark = Mark::new(self.body, marked, dots.mean_radius());
                 if mark.normal.dot(towards) < MIN_FACING {
                     continue;
                 }
+                for (line, opacity) in mark.trail_lines() {
+                    let line: Vec<(i32, i32)> = line.into_iter().map(pixel).collect();
+                    let style = colour.mix(opacity).stroke_width(TRAIL_WIDTH);
+                    area.draw(&PathElement::new(line, style)).map_err(cannot)?;
+                }
                 for (line, width) in mark.lines() {
                     let line: Vec<(i32, i32)> = line.into_iter().map(pixel).collect();
-                    for (colour, width) in [(WHITE, width + 3), (RGBColor(r, g, b), width)] {
+                    for (colour, width) in [(WHITE, width + 3), (colour, width)] {
                         area.draw(&PathElement::new(line.clone(), colour.stroke_width(width))).map_err(cannot)?;
                     }
                 }
-                let at = pixel(mark.place);
-                for (radius, colour) in [(7, WHITE), (5, RGBColor(r, g, b)), (2, WHITE)] {
-                    area.draw(&Circle::new(at, radius, colour.filled())).map_err(cannot)?;
+                let (x, y) = pixel(mark.place);
+                for (radius, colour) in [(7, WHITE), (5, colour), (2, WHITE)] {
+                    area.draw(&Circle::new((x, y), radius, colour.filled())).map_err(cannot)?;
                 }
+                let style = (FAMILY, 15).into_font().color(&INK).pos(Pos::new(HPos::Left, VPos::Bottom));
+                area.draw_text(&marked.touch.id.to_string(), &style, (x + 8, y - 6)).map_err(cannot)?;
             }
         }
         area.present().map_err(cannot)
@@ -147,67 +171,108 @@ fn title(body: &Body) -> String {
     stem(&body.name).to_owned()
 }
 
-/// What marks a percept, in the body.
+/// A touch keeps its colour as long as it lasts.
+fn own_colour(touch: &Touch) -> [u8; 3] {
+    PALETTE[(touch.id % PALETTE.len() as u64) as usize]
+}
+
+/// What marks a touch, in the body at rest.
 struct Mark {
     place: DVec3,
     normal: DVec3,
-    /// Directions of +u and +v; none without a chart.
-    axes: Option<[DVec3; 2]>,
-    orientation: Option<f64>,
-    /// Direction and anisotropy of the principal axis.
-    axis: Option<(f64, f64)>,
+    /// Half axes of the ellipse: along and across the principal axis.
+    half_axes: Option<[DVec3; 2]>,
     /// Motion in [`ARROW_S`], m.
     motion: Option<DVec3>,
-    radius_m: f64,
+    /// The oldest first, up to the place.
+    trail: Vec<DVec3>,
+    /// Radius of a usual taxel, m.
+    taxel_m: f64,
 }
 
 impl Mark {
-    fn new(body: &Body, field: &Field, percept: &Percept) -> Option<Self> {
-        let body_from_anchor = field.anchor.map_or(BODY_FROM_WORLD, |link| body.links[link].body_from_link);
-        let turned = |direction: DVec3| body_from_anchor.transform_vector3(direction);
-        let axes = field.chart.as_ref().ok().map(|chart| [chart.u_in_anchor, chart.v_in_anchor].map(turned));
-        let motion = axes
-            .zip(percept.direction)
-            .zip(percept.speed)
-            .map(|(([u, v], direction), speed)| speed * ARROW_S * (u * direction.cos() + v * direction.sin()));
-        Some(Self {
-            place: body_from_anchor.transform_point3(DVec3::from_array(percept.position?)),
-            normal: turned(DVec3::from_array(percept.normal?)),
-            axes,
-            orientation: percept.orientation,
-            axis: percept.principal_axis.zip(percept.anisotropy),
-            motion,
-            radius_m: field.radius_m(),
-        })
+    fn new(body: &Body, MarkedTouch { touch, trail, .. }: &MarkedTouch, taxel_m: f64) -> Self {
+        let body_from = |link: u32| body.links[link as usize].body_from_link;
+        let body_from_link = body_from(touch.link);
+        let normal = body_from_link.transform_vector3(touch.normal);
+        let half_axes = touch.principal_axis.zip(touch.spread_m).map(|(axis, [along, across])| {
+            let axis = body_from_link.transform_vector3(axis);
+            [ELLIPSE_SIGMAS * along * axis, ELLIPSE_SIGMAS * across * normal.cross(axis).normalize_or_zero()]
+        });
+        let place = body_from_link.transform_point3(touch.position);
+        let were = trail.iter().map(|&(link, place)| body_from(link).transform_point3(place));
+        Self {
+            place,
+            normal,
+            half_axes,
+            motion: touch.velocity.map(|velocity| ARROW_S * body_from_link.transform_vector3(velocity)),
+            trail: were.chain([place]).collect(),
+            taxel_m,
+        }
     }
 
-    /// Lines with their widths in pixels: the orientation, the ellipse and the arrow.
+    /// The parts of the trail, each with how opaque it is.
+    fn trail_lines(&self) -> Vec<([DVec3; 2], f64)> {
+        let parts = self.trail.len().saturating_sub(1);
+        let opacity = |part: usize| OLDEST_OPACITY + (1.0 - OLDEST_OPACITY) * (part + 1) as f64 / parts as f64;
+        self.trail.windows(2).enumerate().map(|(part, ends)| ([ends[0], ends[1]], opacity(part))).collect()
+    }
+
+    /// Lines with their widths in pixels: the axis with its ellipse, and the arrow.
     fn lines(&self) -> Vec<(Vec<DVec3>, u32)> {
-        let Some([u, v]) = self.axes else { return Vec::new() };
-        let at = |angle: f64| u * angle.cos() + v * angle.sin();
         let mut lines = Vec::new();
-        if let Some(angle) = self.orientation {
-            let way = LINE_SHARE * self.radius_m * at(angle);
-            lines.push((vec![self.place - way, self.place + way], 3));
-        }
-        if let Some((angle, anisotropy)) = self.axis {
-            // λ₁/λ₂ = (1 + a)/(1 − a), and half axes go as the roots.
-            let long = ELLIPSE_SHARE * self.radius_m;
-            let short = long * ((1.0 - anisotropy) / (1.0 + anisotropy)).max(0.0).sqrt();
+        if let Some([along, across]) = self.half_axes {
             let corner = |i: usize| {
                 let turn = std::f64::consts::TAU * i as f64 / CORNERS as f64;
-                let across = at(angle + std::f64::consts::FRAC_PI_2);
-                self.place + long * turn.cos() * at(angle) + short * turn.sin() * across
+                self.place + turn.cos() * along + turn.sin() * across
             };
+            lines.push((vec![self.place - along, self.place + along], 3));
             lines.push(((0..=CORNERS).map(corner).collect(), 1));
         }
-        if let Some(motion) = self.motion.filter(|motion| motion.length() > 0.1 * self.radius_m) {
-            let tip = self.place + motion.clamp_length_max(1.5 * self.radius_m);
-            let back = -0.18 * self.radius_m * motion.normalize();
+        if let Some(motion) = self.motion.filter(|motion| motion.length() > 0.5 * self.taxel_m) {
+            let tip = self.place + motion;
+            let back = -(0.3 * motion.length()).min(self.taxel_m) * motion.normalize();
             let side = 0.7 * self.normal.cross(back);
             lines.push((vec![self.place, tip], 3));
             lines.push((vec![tip + back + side, tip, tip + back - side], 3));
         }
         lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mark() -> Mark {
+        let place = DVec3::new(1.0, 0.0, 0.0);
+        let half_axes = Some([DVec3::new(0.0, 0.02, 0.0), DVec3::new(0.0, 0.0, 0.01)]);
+        let trail = (0..5).map(|i| DVec3::new(0.6 + 0.1 * f64::from(i), 0.0, 0.0)).collect();
+        let motion = Some(DVec3::new(0.0, 0.0, 0.1));
+        Mark { place, normal: DVec3::X, half_axes, motion, trail, taxel_m: 0.005 }
+    }
+
+    #[test]
+    fn a_trail_fades_towards_its_beginning() {
+        let lines = mark().trail_lines();
+        assert_eq!(lines.len(), 4);
+        assert!(lines.windows(2).all(|pair| pair[0].1 < pair[1].1 && pair[0].0[1] == pair[1].0[0]), "{lines:?}");
+        assert_eq!((lines[3].1, lines[3].0[1]), (1.0, mark().place));
+        assert!(Mark { trail: vec![DVec3::X], ..mark() }.trail_lines().is_empty());
+    }
+
+    #[test]
+    fn an_ellipse_goes_through_the_ends_of_its_axis_and_an_arrow_points_where_the_touch_goes() {
+        let lines = mark().lines();
+        assert_eq!(lines.len(), 4);
+        let (axis, ellipse) = (&lines[0].0, &lines[1].0);
+        assert!((axis[1] - ellipse[0]).length() < 1e-12 && (axis[0] - ellipse[CORNERS / 2]).length() < 1e-12);
+        assert!(ellipse.iter().all(|corner| (corner.x - 1.0).abs() < 1e-12), "in the tangent plane");
+        assert_eq!(lines[2].0[1], DVec3::new(1.0, 0.0, 0.1));
+        assert!(lines[3].0.iter().all(|end| end.z <= 0.1 && end.z > 0.09), "{:?}", lines[3]);
+        // What hardly moves has no arrow, and what has no axis no ellipse.
+        let still = Mark { motion: Some(DVec3::new(0.0, 0.002, 0.0)), ..mark() };
+        assert_eq!(still.lines().len(), 2);
+        assert!(Mark { half_axes: None, motion: None, ..mark() }.lines().is_empty());
     }
 }

@@ -110,6 +110,11 @@ impl Touches {
         }
     }
 
+    /// From now on gives the taxels of touches too.
+    pub(crate) fn keep_taxels(&mut self) {
+        self.options.outputs |= TouchOutputs::TAXELS;
+    }
+
     /// The skin.
     #[must_use]
     pub fn skin(&self) -> &Skin {

@@ -48,6 +48,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
         "parts.test.js",
         "browser.test.js",
         "look.test.js",
+        "touches.test.js",
         "self_contacts.test.js",
         "hidden.test.js",
     ])

@@ -87,7 +87,7 @@ impl Run {
 
     pub(super) fn viewer(&self) -> Viewer {
         let mut socket = self.own_socket();
-        say(&mut socket, &json!({"type": "hello", "version": 2, "token": self.token, "after_event": null}));
+        say(&mut socket, &json!({"type": "hello", "version": 3, "token": self.token, "after_event": null}));
         Viewer { socket, texts: Vec::new() }
     }
 
@@ -148,7 +148,7 @@ impl Viewer {
     /// The next frame, said to be drawn.
     pub(super) fn frame(&mut self) -> Vec<u8> {
         let frame = self.binary();
-        assert_eq!((frame[0], frame[1]), (2, 2));
+        assert_eq!((frame[0], frame[1]), (2, 3));
         say(&mut self.socket, &json!({"type": "drawn", "seq": u32_at(&frame, 4)}));
         frame
     }
@@ -171,37 +171,44 @@ fn a_page_gets_the_scene_and_then_every_frame_that_it_draws() {
     let mut run = Run::start(&["--outputs", "total,centroid,position,touches"]);
     let mut viewer = run.viewer();
     let mesh = viewer.binary();
-    assert_eq!((mesh[0], mesh[1]), (1, 2));
+    assert_eq!((mesh[0], mesh[1]), (1, 3));
     let [vertices, triangles, taxels, links] = [4, 8, 12, 16].map(|at| u32_at(&mesh, at) as usize);
     assert_eq!(mesh.len(), 20 + 28 * vertices + 12 * triangles + 40 * taxels + 28 * links);
     let welcome = viewer.text("welcome").unwrap().clone();
     assert_eq!((taxels, links), (40, welcome["links"].as_array().unwrap().len()));
     assert_eq!((&welcome["mode"], &welcome["source"]), (&"live".into(), &"bundled touch".into()));
     assert_eq!(welcome["columns"].as_array().unwrap().len(), 3);
+    assert!(welcome["touches"] == true && welcome["touch_flags"][0] == "one_taxel", "{welcome}");
     assert_eq!(welcome["colours"].as_array().unwrap().len(), 256);
     say(&mut viewer.socket, &json!({"type": "columns", "columns": ["total"]}));
     say(&mut viewer.socket, &json!({"type": "taxel", "taxel": 4}));
     let series = json!([{"field": 0, "column": "total", "component": 0}]);
     say(&mut viewer.socket, &json!({"type": "series", "series": series}));
-    let (mut contacts, mut samples, mut last) = (0, 0, 0);
+    let (mut contacts, mut touches, mut samples, mut last) = (0, 0, 0, 0);
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(6) {
         let frame = viewer.frame();
         assert_eq!(u32_at(&frame, 4), last + 1);
         last += 1;
         contacts += u32_at(&frame, 36);
+        touches += u32_at(&frame, 40);
         samples += u32_at(&frame, 44);
-        // Six bytes a taxel, and what is in contact and plotted.
-        let most = 64 + 6 * taxels + 56 * u32_at(&frame, 36) as usize + 48 * u32_at(&frame, 40) as usize;
+        // Six bytes a taxel, and what is in contact and plotted; of a touch its values, taxels, shares and trail.
+        let of_touch = 112 + 4 * taxels + 8 * (links + 13) + 20 * 34;
+        let most = 64 + 6 * taxels + 56 * u32_at(&frame, 36) as usize + of_touch * u32_at(&frame, 40) as usize;
         assert!(frame.len() <= most + 24 * u32_at(&frame, 44) as usize + 32, "{}", frame.len());
         if last > 20 && contacts > 0 && samples > 0 && viewer.text("events").is_some() {
             assert!(f32_at(&frame, 28) > 0.0 && f32_at(&frame, 32) >= f32_at(&frame, 28));
             break;
         }
     }
-    assert!(contacts > 0 && samples > 0, "{contacts} contacts, {samples} samples in {last} frames");
+    assert!(
+        contacts > 0 && touches > 0 && samples > 0,
+        "{contacts} contacts, {touches} touches, {samples} samples in {last} frames"
+    );
     let events = viewer.text("events").expect("a touch begins and ends")["events"].clone();
     assert!(["onset", "release"].iter().any(|kind| events[0]["kind"] == **kind) && events[0]["seq"] == 1, "{events}");
+    assert!(events[0]["touch"].is_u64() && events[0]["link"].is_u64() && events[0]["field"].is_null(), "{events}");
     assert!(viewer.text("taxel").is_some_and(|taxel| taxel["health"] == "good" && taxel["taxel"] == 4));
     assert_eq!(run.interrupt(), Some(0));
     assert_eq!(closed(viewer.socket), u16::from(CloseCode::Away));
@@ -284,7 +291,7 @@ fn messages_are_the_pages_or_the_connection_ends() {
         |token: &str, version: u32| json!({"type": "hello", "version": version, "token": token, "after_event": 0});
     let wrong = format!("{}0", &run.token[..31]);
     let wrong = if wrong == run.token { format!("{}1", &run.token[..31]) } else { wrong };
-    for first in [hello(&wrong, 2), hello("", 2), hello(&run.token, 1), json!({"type": "play"}), json!(7)] {
+    for first in [hello(&wrong, 3), hello("", 3), hello(&run.token, 2), json!({"type": "play"}), json!(7)] {
         let mut socket = run.own_socket();
         say(&mut socket, &first);
         assert_eq!(closed(socket), 1008, "{first}");
@@ -296,7 +303,7 @@ fn messages_are_the_pages_or_the_connection_ends() {
     for (message, code) in [
         (Message::text("{\"type\":\"quit\"}"), 1008),
         (Message::text("{\"type\":\"taxel\",\"taxel\":40}"), 1008),
-        (Message::text(hello(&run.token, 2).to_string()), 1008),
+        (Message::text(hello(&run.token, 3).to_string()), 1008),
         (Message::text(" ".repeat((64 << 10) + 1)), 1009),
         (Message::binary(vec![0; 4]), 1003),
     ] {

@@ -109,6 +109,9 @@ fn a_chart_is_drawn_flat() {
 const LEAST: [u8; 3] = [0x26, 0x2F, 0x8B];
 const MOST: [u8; 3] = [0xFA, 0xEE, 0x76];
 
+/// The colour of the touch whose id is 5.
+const SKY: [u8; 3] = [0x56, 0xB4, 0xE9];
+
 #[test]
 fn a_touch_is_drawn_at_a_time_and_as_an_animation() {
     let source = concat!("csv:", env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
@@ -120,6 +123,9 @@ fn a_touch_is_drawn_at_a_time_and_as_an_animation() {
         let (before, after) = (rest.of_colour(colour), touched.of_colour(colour));
         assert!(before > 10 && after > before + 100, "{colour:?}: {before} and {after} pixels");
     }
+    // The fifth touch of the recording: rims of its taxels, its ellipse and its trail.
+    let (before, after) = (rest.of_colour(SKY), touched.of_colour(SKY));
+    assert!(after > before + 150, "{before} and {after} pixels of the touch");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
     let range = ["--from", "2", "--to", "3", "--rate", "5", "-o", text_of(&path)];

@@ -6,6 +6,7 @@ import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 import {
+  bare,
   browser,
   coloursAt,
   folder,
@@ -34,10 +35,7 @@ test("the first picture comes soon, and a taxel has the legend's colour of its p
   ]) {
     await seek(page, t);
     await page.keyboard.press(key);
-    // Without what lies on top of the discs.
-    for (const off of ["n", "m", "m", "m"]) {
-      await page.keyboard.press(off);
-    }
+    await bare(page);
     await page.waitForTimeout(800);
     const expected = await page.evaluate(() => {
       const { model } = window.somatic;
@@ -218,7 +216,7 @@ test("a page of another origin gets nothing", async () => {
       new Promise((done) => {
         const socket = new WebSocket(`ws://127.0.0.1:${port}/socket`);
         socket.onopen = () =>
-          socket.send(JSON.stringify({ type: "hello", version: 2, token, after_event: null }));
+          socket.send(JSON.stringify({ type: "hello", version: 3, token, after_event: null }));
         socket.onmessage = () => done("a message");
         socket.onclose = () => done("nothing");
       }),

@@ -5,6 +5,7 @@ import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 import {
+  bare,
   browser,
   coloursAt,
   folder,
@@ -249,7 +250,8 @@ test("ten thousand taxels are drawn, each in its colour", async () => {
   assert.ok(rate > 0.3, `${rate} frames/s`);
   (await page.evaluate(() => window.somatic.model.status.playing)) && (await page.keyboard.press(" "));
   await seek(page, 1);
-  for (const key of ["5", "n", "m", "m", "m"]) await page.keyboard.press(key);
+  await page.keyboard.press("5");
+  await bare(page);
   await page.waitForTimeout(2000);
   await picture(page, "sheet.png");
   const expected = await page.evaluate(() => {

@@ -1,8 +1,10 @@
 // Parts of the page that need no browser.
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { Choices, MARKS } from "../../src/page/web/choices.js";
 import { Camera, PRESETS } from "../../src/page/web/camera.js";
 import { addRect, changedRects } from "../../src/page/web/dirty.js";
+import { PALETTE } from "../../src/page/web/dom.js";
 import {
   scaleFor,
   seconds,
@@ -14,6 +16,7 @@ import {
 } from "../../src/page/web/format.js";
 import { poseToRows, toWorld } from "../../src/page/web/math.js";
 import { Model } from "../../src/page/web/model.js";
+import { touchInWorld } from "../../src/page/web/places.js";
 import { byPixel } from "../../src/page/web/plot.js";
 import { colourIndex, fillColours } from "../../src/page/web/taxels.js";
 
@@ -125,6 +128,127 @@ test("no peak is lost where many samples share a pixel", () => {
   const { least, most } = byPixel({ colour: "", ring: { t, v, begin: 0, size: 1000 } }, how, 50);
   assert.equal(Math.max(...most), 9);
   assert.equal(Math.min(...least), 1);
+});
+
+/** A touch as a frame has it, with what a test needs. */
+const touch = (id, more = {}) => ({
+  id,
+  link: 0,
+  frame: 0,
+  flags: 0,
+  active: 1,
+  age: 1,
+  total: 3,
+  force: NaN,
+  peak: 2,
+  anisotropy: NaN,
+  position: [0, 0, 0],
+  normal: [0, 0, 1],
+  axis: [NaN, NaN, NaN],
+  spread: [NaN, NaN],
+  velocity: [NaN, NaN, NaN],
+  taxels: new Uint32Array(0),
+  links: [],
+  fields: [],
+  trail: [],
+  ...more,
+});
+
+test("a touch is marked where its link is, and its trail where that was", () => {
+  const model = new Model();
+  model.rows = new Float32Array(24);
+  const s = Math.SQRT1_2;
+  // The first link is turned by 90° about z and moved; the second is only moved.
+  poseToRows([1, 0, 0, 0, 0, s, s, 0, 5, 0, 0, 0, 0, 1], 0, model.rows);
+  poseToRows([1, 0, 0, 0, 0, s, s, 0, 5, 0, 0, 0, 0, 1], 1, model.rows);
+  const marked = touchInWorld(
+    model,
+    touch(3, {
+      position: [0.5, 0, 0],
+      axis: [1, 0, 0],
+      spread: [0.02, 0.01],
+      velocity: [0.1, 0, 0],
+      trail: [
+        { ago: 0.5, frame: 1, position: [0, 0, 0.25] },
+        { ago: 0.25, frame: 0xffffffff, position: [7, 8, 9] },
+      ],
+    }),
+  );
+  const same = (a, b) => a.forEach((x, i) => near(x, b[i]));
+  same(marked.point, [1, 0.5, 0]);
+  same(marked.normal, [0, 0, 1]);
+  // Two standard deviations along and across.
+  same(marked.halfAxes[0], [0, 0.04, 0]);
+  same(marked.halfAxes[1].map(Math.abs), [0.02, 0, 0]);
+  same(marked.motion, [0, 0.02, 0]);
+  same(marked.trail[0].point, [0, 5, 0.25]);
+  assert.deepEqual(marked.trail[1], { ago: 0.25, point: [7, 8, 9] });
+  const plain = touchInWorld(model, touch(4));
+  assert.deepEqual([plain.halfAxes, plain.motion, plain.trail], [null, null, []]);
+});
+
+test("a touch keeps its colour until it ends, and names its load and flags", () => {
+  const model = new Model();
+  model.begin({
+    run: "a",
+    quantity: "Pa",
+    fields: [],
+    columns: [],
+    flags: [],
+    touches: true,
+    touch_flags: ["one_taxel", null, "young"],
+    scale: { max: 1, from: "" },
+  });
+  const colours = (...ids) => {
+    model.apply({ touches: ids.map((id) => touch(id)) });
+    return ids.map((id) => model.touchColour(id));
+  };
+  assert.deepEqual(colours(4, 7), [0, 1]);
+  assert.deepEqual(colours(7, 8, 9), [1, 0, 2]);
+  assert.deepEqual(colours(), []);
+  model.apply({ touches: [touch(5, { taxels: new Uint32Array([3, 8]), flags: 0b111, total: 1500 })] });
+  assert.equal(model.touchOf(8)?.id, 5);
+  assert.equal(model.touchOf(4), null);
+  assert.deepEqual(model.touchFlags(model.touch(5)), ["one_taxel", "young"]);
+  assert.equal(model.touchLoadText(model.touch(5)), "1.50 kPa");
+  assert.equal(model.touchLoadText(touch(6, { force: 2.5 })), "2.50 N");
+  // A frame without the section has the touches of the one before.
+  model.apply({ touches: null });
+  assert.equal(model.touches.length, 1);
+});
+
+test("taxels of a touch have rims of its colour, and the field that is chosen has its own", () => {
+  globalThis.matchMedia ??= () => ({ matches: true, addEventListener() {} });
+  const model = new Model();
+  model.begin({
+    run: "a",
+    quantity: "Pa",
+    fields: [{ members: [2, 4], letter: null, parent: null, chart: {} }],
+    columns: [],
+    flags: [],
+    touches: true,
+    touch_flags: [],
+    scale: { max: 1, from: "" },
+  });
+  model.apply({
+    touches: [touch(1, { taxels: new Uint32Array([1, 2]) }), touch(2, { taxels: new Uint32Array([3]) })],
+  });
+  const choices = new Choices();
+  choices.forget(true);
+  assert.deepEqual(choices.offered, [...MARKS]);
+  const rims = choices.rings(model);
+  assert.deepEqual([...rims.keys()], [1, 2, 3]);
+  assert.deepEqual([rims.get(1), rims.get(3)], [PALETTE[0], PALETTE[1]]);
+  assert.deepEqual(choices.marked(model), [], "fields have no marks then");
+  choices.choose(0);
+  assert.notDeepEqual(choices.rings(model).get(2), PALETTE[0]);
+  choices.choose(null);
+  choices.nextMarks();
+  assert.equal(choices.marks, "whole fields");
+  assert.equal(choices.rings(model).size, 0);
+  // A run without touches offers none.
+  choices.forget(false);
+  assert.deepEqual([choices.marks, choices.offered.length], ["whole fields", MARKS.length - 1]);
 });
 
 test("an absent column says why", () => {

@@ -77,6 +77,12 @@ export async function seek(page, t) {
   await page.waitForTimeout(300);
 }
 
+/** Takes off what lies on top of the discs: labels and marks. */
+export async function bare(page) {
+  await page.keyboard.press("n");
+  while ((await page.locator("#marks-choice").inputValue()) !== "none") await page.keyboard.press("m");
+}
+
 export async function picture(page, name) {
   if (!PICTURES) return;
   mkdirSync(PICTURES, { recursive: true });

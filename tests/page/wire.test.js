@@ -25,7 +25,7 @@ function writer(bytes) {
 
 function head(w, { sections, fields = 0, touches = 0, samples = 0, columns = 0, answers = 0 }) {
   w.u8(2);
-  w.u8(2);
+  w.u8(3);
   w.u16(sections);
   w.u32(7);
   w.u64(123456789012);
@@ -36,6 +36,21 @@ function head(w, { sections, fields = 0, touches = 0, samples = 0, columns = 0, 
   for (const value of [fields, touches, samples, 42, columns]) w.u32(value);
   w.f32(21.5);
   w.u32(answers);
+}
+
+/** A touch with one place in its trail, by the table of the protocol: 132 bytes, and what it lists. */
+function putTouch(w, { id, frame, force, taxels, links, fields }) {
+  for (const x of [id, 0, frame, 5, 9, taxels.length, links.length, fields.length, 1]) w.u32(x);
+  for (const x of [0.5, 10, force, 7, 0.25]) w.f32(x);
+  for (const x of [1, 2, 3, 0, 0, 1, 0, 1, 0, 0.5, 0.25, 4, 5, 6]) w.f32(x);
+  for (const taxel of taxels) w.u32(taxel);
+  for (const [index, share] of [...links, ...fields]) {
+    w.u32(index);
+    w.f32(share);
+  }
+  w.f32(0.25);
+  w.u32(frame);
+  for (const x of [7, 8, 9]) w.f32(x);
 }
 
 const scene = { taxels: 3, links: 1, components: [1, 2, 3] };
@@ -57,7 +72,7 @@ test("a frame with nothing but its head", () => {
 });
 
 test("a frame with all sections, each padded to 8 bytes", () => {
-  const w = writer(64 + 16 + 32 + 56 + 40 + 32);
+  const w = writer(64 + 16 + 32 + 56 + 160 + 32);
   head(w, { sections: 31, fields: 2, touches: 1, samples: 2, columns: 0b101, answers: 4 });
   for (const p of [0, 1.5, NaN]) w.f32(p);
   for (const state of [0, 4, 1]) w.u8(state);
@@ -68,11 +83,7 @@ test("a frame with all sections, each padded to 8 bytes", () => {
   for (const x of [10, 20]) w.f32(x);
   for (const x of [1, 2, 3, 4, 5, 6]) w.f32(x);
   w.pad();
-  w.u32(5);
-  w.u32(77);
-  w.f32(10);
-  w.u32(2);
-  for (const x of [0.25, -0.5, 1, 2, 3]) w.f32(x);
+  putTouch(w, { id: 77, frame: 0, force: NaN, taxels: [0, 2], fields: [[5, 0.75]], links: [[0, 1]] });
   w.pad();
   for (const t of [2.25, 2.5]) w.f64(t);
   for (const x of [1, 2, 3, NaN]) w.f32(x);
@@ -86,9 +97,30 @@ test("a frame with all sections, each padded to 8 bytes", () => {
   assert.deepEqual([...frame.percepts.columns.keys()], [0, 2]);
   assert.deepEqual([...frame.percepts.columns.get(0)], [10, 20]);
   assert.deepEqual([...frame.percepts.columns.get(2)], [1, 2, 3, 4, 5, 6]);
-  assert.deepEqual(frame.touches, [
-    { field: 5, identity: 77, total: 10, active: 2, centroid: [0.25, -0.5], position: [1, 2, 3] },
-  ]);
+  assert.equal(frame.touches.length, 1);
+  const [touch] = frame.touches;
+  assert.deepEqual([touch.id, touch.link, touch.frame, touch.flags, touch.active], [77, 0, 0, 5, 9]);
+  assert.deepEqual([touch.age, touch.total, touch.peak, touch.anisotropy], [0.5, 10, 7, 0.25]);
+  assert.ok(Number.isNaN(touch.force));
+  assert.deepEqual(
+    [touch.position, touch.normal],
+    [
+      [1, 2, 3],
+      [0, 0, 1],
+    ],
+  );
+  assert.deepEqual(
+    [touch.axis, touch.spread, touch.velocity],
+    [
+      [0, 1, 0],
+      [0.5, 0.25],
+      [4, 5, 6],
+    ],
+  );
+  assert.deepEqual([...touch.taxels], [0, 2]);
+  assert.deepEqual(touch.links, [{ index: 0, share: 1 }]);
+  assert.deepEqual(touch.fields, [{ index: 5, share: 0.75 }]);
+  assert.deepEqual(touch.trail, [{ ago: 0.25, frame: 0, position: [7, 8, 9] }]);
   assert.equal(frame.samples.answers, 4);
   assert.deepEqual([...frame.samples.t], [2.25, 2.5]);
   assert.deepEqual(
@@ -98,6 +130,34 @@ test("a frame with all sections, each padded to 8 bytes", () => {
       [3, NaN],
     ],
   );
+});
+
+test("touches stand one after the other, whatever each lists", () => {
+  const w = writer(64 + 3 * 132 + 12 + 8 + 16);
+  head(w, { sections: 8, touches: 3 });
+  putTouch(w, { id: 1, frame: 0xffffffff, force: 2, taxels: [], links: [], fields: [] });
+  putTouch(w, {
+    id: 2,
+    frame: 0,
+    force: 2,
+    taxels: [2, 1, 0],
+    links: [[0, 0.5]],
+    fields: [
+      [1, 1],
+      [2, 1],
+    ],
+  });
+  putTouch(w, { id: 9, frame: 0, force: 2, taxels: [], links: [], fields: [] });
+  const { touches } = decodeFrame(w.buffer, scene);
+  assert.deepEqual(
+    touches.map((touch) => [touch.id, touch.frame, touch.force, [...touch.taxels], touch.fields.length]),
+    [
+      [1, 0xffffffff, 2, [], 0],
+      [2, 0, 2, [2, 1, 0], 2],
+      [9, 0, 2, [], 0],
+    ],
+  );
+  assert.deepEqual(touches[2].trail[0].position, [7, 8, 9]);
 });
 
 test("a frame that ends too early is an error", () => {
@@ -118,7 +178,7 @@ test("another version is an error", () => {
 test("a mesh", () => {
   const w = writer(20 + 3 * 28 + 12 + 40 + 28);
   w.u8(1);
-  w.u8(2);
+  w.u8(3);
   w.u16(0);
   for (const count of [3, 1, 1, 1]) w.u32(count);
   for (let i = 0; i < 18; i++) w.f32(i);
@@ -142,7 +202,7 @@ test("a mesh", () => {
 test("a history", () => {
   const w = writer(32 + 16);
   w.u8(3);
-  w.u8(2);
+  w.u8(3);
   w.u16(0);
   for (const value of [5, 2, 1]) w.u32(value);
   w.f64(1);
@@ -159,7 +219,7 @@ test("a history", () => {
 test("outgoing messages", () => {
   assert.deepEqual(JSON.parse(say.hello("ab", null)), {
     type: "hello",
-    version: 2,
+    version: 3,
     token: "ab",
     after_event: null,
   });

@@ -1,4 +1,4 @@
-//! The touch that a picture shows.
+//! The touches that a picture shows.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use clap::Args;
 use somatic::field::Field;
 use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture};
 use somatic::scene::Coordinates;
-use somatic::{BackendKind, Body, Engine, Error, Frame, Result, Scene};
+use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
 
 use super::super::bar::Bar;
 use super::super::input::Input;
@@ -19,7 +19,7 @@ const RECORDINGS: [&str; 7] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv"]
 /// Which touch.
 #[derive(Args)]
 pub(super) struct Flags {
-    /// Show the pressures and percepts of this recording: csv:FILE, mcap:FILE or sim:FILE.toml.
+    /// Show the pressures and touches of this recording: csv:FILE, mcap:FILE or sim:FILE.toml.
     #[arg(long, value_name = "SOURCE", conflicts_with_all = ["uv", "fields"])]
     source: Option<String>,
 
@@ -90,7 +90,7 @@ impl Flags {
         times.check().map_err(|e| e.at("--rate"))?;
         if asked.sources.is_empty() {
             let pressures = vec![Some(0.0); body.taxels.len()];
-            let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", percepts: &[], t_s: None };
+            let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", touches: &[], t_s: None };
             return TouchPicture::new(body, fields, options, ids)?.draw(&moment)?.png();
         }
         let channels: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
@@ -100,7 +100,10 @@ impl Flags {
         }
         let mut source = input.open(&channels, asked)?;
         let engine_options = asked.options(body, &channels, 1)?;
-        let scene: Scene = engine_options.scene.clone().coordinates(Coordinates::Anchor);
+        // Pictures are of the body at rest, and show touches whatever else is computed.
+        let scene: Scene = engine_options.scene.clone().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor);
+        let touches = scene.touches.unwrap_or_default();
+        let scene = scene.touches(touches);
         let mut engine = Engine::new(body, engine_options.scene(scene).backend(BackendKind::Cpu))?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
         let width = source.taxels().len();
@@ -110,7 +113,7 @@ impl Flags {
             bar.show(source.progress().unwrap_or(0.0));
             source.next_frame(&mut frame).map(|is_there| is_there.then_some(frame)).transpose()
         });
-        let moments = Moments::of(&mut engine, body, fields, times, &input.name, frames)?;
+        let moments = Moments::of(&mut engine, body, times, &input.name, frames)?;
         source.notices().iter().for_each(|notice| say(notice));
         let mut bar = Bar::new("drawing");
         let pictures = moments.draw(body, fields, options, ids, |share| {

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use somatic::{Engine, EngineState, Result};
+use somatic::{Engine, EngineState, Percepts, Result};
 
 use super::recording::{CHUNK, Recording};
 
@@ -62,7 +62,7 @@ impl Checkpoints {
     }
 
     /// Brings `engine`, which has processed `done` frames of `recording`, to where it has processed `frames`, or a chunk
-    /// nearer; gives how many it has processed then. The percepts are those of an uninterrupted run, to the bit.
+    /// nearer; gives how many it has processed then. The percepts, which `passed` gets, are those of an uninterrupted run, to the bit.
     ///
     /// # Errors
     /// The device was lost.
@@ -70,10 +70,9 @@ impl Checkpoints {
         &self,
         engine: &mut Engine,
         recording: &Recording,
-        done: usize,
-        frames: usize,
+        (mut done, frames): (usize, usize),
+        passed: impl FnOnce(&Percepts),
     ) -> Result<usize> {
-        let mut done = done;
         let state = self.before(frames);
         if done > frames || (state.frames() as usize) > done {
             engine.restore(&state)?;
@@ -81,7 +80,7 @@ impl Checkpoints {
         }
         let next = frames.min(done + CHUNK);
         if next > done {
-            engine.process(&recording.frames[done..next])?;
+            passed(engine.process(&recording.frames[done..next])?);
         }
         Ok(next)
     }

@@ -96,7 +96,7 @@ impl<'a> Answering<'a> {
     /// Brings the engine to before frame `frame`.
     fn go_to(&mut self, frame: usize) -> Result<()> {
         loop {
-            self.done = self.checkpoints.advance(&mut self.engine, self.recording, self.done, frame)?;
+            self.done = self.checkpoints.advance(&mut self.engine, self.recording, (self.done, frame), |_| {})?;
             if self.done == frame {
                 return Ok(());
             }

@@ -40,7 +40,7 @@ Examples:
   somatic view robot.glb                          a body at rest
   somatic view touch.mcap                         a recording, with the body in it
   somatic view touch.csv --body robot.glb --calibration robot.toml
-  somatic view robot.scene.toml --outputs centroid,touches
+  somatic view robot.scene.toml --outputs touches,total
   somatic view touch.mcap --listen 127.0.0.1:8000
   ssh -L 7879:127.0.0.1:7879 robot                then open the address here, as a tunnel
   somatic run --source serial:/dev/ttyUSB0 --sink page      live boards
@@ -195,6 +195,7 @@ impl Opening<'_> {
         let recording = Arc::new(recording);
         let settled = settled(asked, Some(&input), &body, recording::CHUNK)?;
         let mut engine = Engine::new(&body, settled.options.clone())?;
+        engine.keep_touch_taxels(true);
         engine.set_channels(&recording.taxels).map_err(|e| e.at("header").at(&input.name))?;
         if !asked.quiet {
             engine.remarks().iter().for_each(|remark| say(remark));

@@ -170,8 +170,9 @@ impl Player {
     /// Comes nearer to frame `index`, and shows it once it is there.
     fn approach(&mut self, index: usize) -> Result<()> {
         let started = Instant::now();
-        let before = self.done;
-        self.done = self.shared.checkpoints.advance(&mut self.engine, &self.shared.recording, before, index)?;
+        let Self { engine, shared, publisher, .. } = self;
+        let way = (self.done, index);
+        self.done = shared.checkpoints.advance(engine, &shared.recording, way, |percepts| publisher.pass(percepts))?;
         if self.done < index {
             return Ok(());
         }

@@ -25,6 +25,7 @@ impl Shared {
     /// An engine of its own for one of them.
     pub(super) fn engine(&self) -> Result<Engine> {
         let mut engine = Engine::new(&self.body, self.options.clone())?;
+        engine.keep_touch_taxels(true);
         engine.set_channels(&self.recording.taxels)?;
         Ok(engine)
     }

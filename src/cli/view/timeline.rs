@@ -52,9 +52,15 @@ impl Timeline {
         let mut known = self.known();
         for frame in 0..percepts.frames() {
             known.until_s = known.until_s.max(percepts.t_s(frame));
-            // Without the output `peak`, that something is touched.
-            let peaks = percepts.touched(frame).map(|percept| percept.peak.or(percept.total).unwrap_or(1.0));
-            let Some(peak) = peaks.reduce(f64::max) else { continue };
+            let peak = match percepts.touches(frame) {
+                Some(found) => found.touches.iter().map(|touch| touch.peak).reduce(f64::max),
+                // Without the output `peak`, that something is touched.
+                None => {
+                    let peaks = percepts.touched(frame).map(|percept| percept.peak.or(percept.total).unwrap_or(1.0));
+                    peaks.reduce(f64::max)
+                }
+            };
+            let Some(peak) = peak else { continue };
             for most in &mut known.peaks[recording.bins(first + frame, self.start_s, self.bin_s, BINS)] {
                 *most = Some(most.map_or(peak, |most| most.max(peak)));
             }

@@ -48,7 +48,7 @@ impl Reader<'_> {
 
 pub(super) fn decode_mesh(bytes: &[u8]) -> Value {
     let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [1, 2, 0, 0]);
+    assert_eq!(from.bytes(), [1, 3, 0, 0]);
     let [v, t, n, l] = [0; 4].map(|_| from.u32());
     let mesh = json!({
         "position": from.f32s(3 * v), "normal": from.f32s(3 * v), "link": from.u32s(v), "corners": from.u32s(3 * t),
@@ -63,7 +63,7 @@ pub(super) fn decode_mesh(bytes: &[u8]) -> Value {
 pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
     let mut from = Reader(bytes, 0);
     let [kind, version, sections, zero] = from.bytes();
-    assert_eq!((kind, version, zero), (2, 2, 0));
+    assert_eq!((kind, version, zero), (2, 3, 0));
     let mut frame = json!({"seq": from.u32()});
     frame["frame"] = u64::from_le_bytes(from.bytes()).into();
     frame["t"] = from.f64().into();
@@ -96,13 +96,7 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
         frame["percepts"] = percepts;
     }
     if sections & 8 != 0 {
-        let mut touch = |_| {
-            let [field, identity] = [0; 2].map(|_| from.u32());
-            let (total, active) = (from.f32(), from.u32());
-            json!({"field": field, "identity": identity, "total": total, "active": active, "centroid": from.f32s(2),
-                   "position": from.f32s(3)})
-        };
-        frame["touches"] = (0..touches).map(&mut touch).collect::<Vec<_>>().into();
+        frame["touches"] = (0..touches).map(|_| touch(&mut from)).collect::<Vec<_>>().into();
         from.pad();
     }
     if sections & 32 != 0 {
@@ -129,9 +123,27 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
     frame
 }
 
+fn touch(from: &mut Reader<'_>) -> Value {
+    let [id, link, frame, flags, active, taxels, links, fields, points] = [0; 9].map(|_| from.u32());
+    let mut touch = json!({"id": id, "link": link, "frame": frame, "flags": flags, "active": active});
+    for name in ["age", "total", "force", "peak", "anisotropy"] {
+        touch[name] = from.f32();
+    }
+    for (name, count) in [("position", 3), ("normal", 3), ("axis", 3), ("spread", 2), ("velocity", 3)] {
+        touch[name] = from.f32s(count).into();
+    }
+    touch["taxels"] = from.u32s(taxels).into();
+    for (name, count) in [("links", links), ("fields", fields)] {
+        touch[name] = (0..count).map(|_| json!({"index": from.u32(), "share": from.f32()})).collect();
+    }
+    let point = |_| json!({"ago": from.f32(), "frame": from.u32(), "position": from.f32s(3)});
+    touch["trail"] = (0..points).map(point).collect();
+    touch
+}
+
 pub(super) fn decode_history(bytes: &[u8]) -> Value {
     let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [3, 2, 0, 0]);
+    assert_eq!(from.bytes(), [3, 3, 0, 0]);
     let [id, bins, series] = [0; 3].map(|_| from.u32());
     let (begin, end) = (from.f64(), from.f64());
     let ends: Vec<[Vec<Value>; 2]> = (0..series).map(|_| [from.f32s(bins), from.f32s(bins)]).collect();

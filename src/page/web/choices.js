@@ -2,8 +2,14 @@
 
 import { Observed, PALETTE } from "./dom.js";
 
-/** Which fields have marks on the body. */
-export const MARKS = /** @type {const} */ (["whole fields", "smallest fields", "chosen field", "none"]);
+/** What has marks on the body. The first is there where touches are looked for. */
+export const MARKS = /** @type {const} */ ([
+  "touches",
+  "whole fields",
+  "smallest fields",
+  "chosen field",
+  "none",
+]);
 
 export class Choices extends Observed {
   constructor() {
@@ -24,8 +30,12 @@ export class Choices extends Observed {
     this.hoveredTaxel = null;
     /** @type {string | null} */
     this.letter = null;
+    /** @type {(typeof MARKS[number])[]} */
+    this.offered = [...MARKS];
     /** @type {typeof MARKS[number]} */
-    this.marks = "whole fields";
+    this.marks = "touches";
+    /** The touch that the user has clicked, by its id. @type {number | null} */
+    this.touch = null;
     /** The body is translucent and hidden taxels show through it. */
     this.xray = false;
     this.body = true;
@@ -40,8 +50,16 @@ export class Choices extends Observed {
     return this.chosen ?? this.followed;
   }
 
-  /** Another body: nothing of it is chosen yet. */
-  forget() {
+  /**
+   * Another body: nothing of it is chosen yet.
+   * @param {boolean} hasTouches whether touches are looked for
+   */
+  forget(hasTouches) {
+    this.offered = hasTouches ? [...MARKS] : MARKS.slice(1);
+    this.marks = this.offered[0];
+    this.tell("offered");
+    this.tell("look");
+    this.touch = null;
     this.chosen = this.followed = this.hoveredField = this.hoveredTaxel = null;
     this.tell("field");
   }
@@ -50,6 +68,26 @@ export class Choices extends Observed {
   choose(field) {
     this.chosen = field;
     this.tell("field");
+  }
+
+  /** @param {number | null} id */
+  chooseTouch(id) {
+    this.touch = id;
+    this.tell("touch");
+  }
+
+  /** What has marks next. */
+  nextMarks() {
+    this.marks = this.offered[(this.offered.indexOf(this.marks) + 1) % this.offered.length];
+    this.tell("look");
+  }
+
+  /**
+   * Whether touches have marks.
+   * @param {import("./model.js").Model} model
+   */
+  showsTouches(model) {
+    return this.marks === "touches" && !!model.welcome?.touches;
   }
 
   /** @param {number | null} field */
@@ -113,13 +151,13 @@ export class Choices extends Observed {
       const above = new Set(touched.map((f) => fields[f].parent));
       for (const f of touched) if (fields[f].chart && !above.has(f)) marked.add(f);
     }
-    if (this.marks !== "none" && this.chosen !== null && model.inContact.has(this.chosen))
-      marked.add(this.chosen);
+    const areOfFields = this.marks !== "none" && this.marks !== "touches";
+    if (areOfFields && this.chosen !== null && model.inContact.has(this.chosen)) marked.add(this.chosen);
     return [...marked];
   }
 
   /**
-   * Colours of the rings by taxel: the field that is chosen or hovered, or all whole fields.
+   * Colours of the rings by taxel: each touch has its own, and so has the field that is chosen or hovered, or all whole fields.
    * @param {import("./model.js").Model} model
    */
   rings(model) {
@@ -134,6 +172,11 @@ export class Choices extends Observed {
         colour++;
       });
     }
+    if (this.showsTouches(model))
+      for (const touch of model.touches) {
+        const colour = PALETTE[model.touchColour(touch.id) % PALETTE.length];
+        for (const taxel of touch.taxels) rings.set(taxel, colour);
+      }
     const accent = this.dark ? [126, 226, 214] : [0, 104, 96];
     for (const f of [this.chosen, this.hoveredField])
       if (f !== null) for (const taxel of fields[f]?.members ?? []) rings.set(taxel, accent);

@@ -110,7 +110,11 @@ export class Inspector {
   click(x, y) {
     const { marks, choices, picker, model, onPercept } = this.parts;
     const mark = marks.places.find((place) => Math.hypot(place.x - x, place.y - y) < 12);
-    if (mark) {
+    if (mark?.touch !== undefined) {
+      choices.chooseTouch(mark.touch);
+      return;
+    }
+    if (mark?.field !== undefined) {
       choices.choose(mark.field);
       onPercept(mark.field);
       return;
@@ -137,6 +141,7 @@ export class Inspector {
     this.tip.hidden = taxel === null || !welcome || !mesh;
     if (taxel === null || !welcome || !mesh) return;
     const value = model.taxelValue?.taxel === taxel ? model.taxelValue : null;
+    const touch = model.touchOf(taxel);
     const channel = welcome.channels?.[taxel];
     const link = welcome.links[mesh.taxelLink[taxel]]?.name ?? "world";
     const area = mesh.taxelArea[taxel];
@@ -153,6 +158,7 @@ export class Inspector {
           .map((f) => welcome.fields[f].label)
           .join(", ") || ABSENT,
       ],
+      ...(welcome.touches ? [["touch", touch ? `#${touch.id}` : ABSENT]] : []),
       ["raw", value && value.raw !== null ? short(value.raw) : ABSENT],
       [welcome.quantity === "N" ? "force" : "pressure", withUnit(model.pressure[taxel], "P", model.quantity)],
       ["state", value?.health ?? HEALTH[model.health[taxel]]],

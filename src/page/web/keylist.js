@@ -1,13 +1,12 @@
 /** Which key does what. */
 
-import { MARKS } from "./choices.js";
 import { byId } from "./dom.js";
 
 /**
  * @param {{camera: import("./camera.js").Camera, choices: import("./choices.js").Choices,
  *   fields: import("./fields.js").Fields, legend: import("./legend.js").Legend,
  *   timeline: import("./timeline.js").Timeline, look: (name: import("./camera.js").Preset) => void,
- *   lookAt: (field: number) => void, lookAtAll: () => void, moved: () => void, explain: () => void,
+ *   lookAt: (field: number) => void, lookAtAll: () => void, release: () => void, moved: () => void, explain: () => void,
  *   help: () => void}} page
  * @returns {import("./keys.js").Key[]}
  */
@@ -49,7 +48,7 @@ export function keyList(page) {
     { group: "Fields", keys: ["["], does: "previous field", act: () => fields.step(-1) },
     { group: "Fields", keys: ["/"], does: "search", act: () => fields.search.focus() },
     { group: "Fields", keys: ["e"], does: "explain the percept", act: page.explain },
-    { group: "Fields", keys: ["Escape"], does: "follow the touch", act: () => choices.choose(null) },
+    { group: "Fields", keys: ["Escape"], does: "follow the touch", act: page.release },
     { group: "Picture", keys: ["x"], does: "see through the body", act: () => choices.toggle("xray") },
     { group: "Picture", keys: ["b"], does: "body on and off", act: () => choices.toggle("body") },
     { group: "Picture", keys: ["d"], does: "taxels on and off", act: () => choices.toggle("taxels") },
@@ -58,11 +57,8 @@ export function keyList(page) {
     {
       group: "Picture",
       keys: ["m"],
-      does: "which fields have marks",
-      act: () => {
-        choices.marks = MARKS[(MARKS.indexOf(choices.marks) + 1) % MARKS.length];
-        choices.tell("look");
-      },
+      does: "what has marks",
+      act: () => choices.nextMarks(),
     },
     { group: "Picture", keys: ["a"], does: "autoscale or fixed scale", act: () => legend.toggle() },
     { group: "Recording", keys: [" "], does: "play and pause", act: () => timeline.togglePlay() },
@@ -75,6 +71,7 @@ export function keyList(page) {
     { group: "Recording", keys: [">"], does: "faster", act: () => timeline.faster(1) },
     { group: "Recording", keys: ["<"], does: "slower", act: () => timeline.faster(-1) },
     { group: "Recording", keys: ["l"], does: "link to this moment", act: () => void timeline.copyLink() },
+    { group: "Panels", keys: ["u"], does: "touches", act: fold("touches-panel") },
     { group: "Panels", keys: ["i"], does: "fields", act: fold("fields-panel") },
     { group: "Panels", keys: ["v"], does: "percept", act: fold("percept-panel") },
     { group: "Panels", keys: ["c"], does: "chart", act: fold("chart-panel") },

@@ -35,6 +35,7 @@ export class Log {
       const field = event.field === null ? null : welcome?.fields[event.field];
       row.append(make("time", "", seconds(event.t_s)), make("span", "event-kind", event.kind));
       if (field) row.append(make("b", "", field.label));
+      if (event.touch !== null) row.append(make("b", "", `#${event.touch}`));
       row.append(make("span", "event-text", event.text));
       row.addEventListener("click", () => {
         if (event.field !== null) this.choose(event.field);

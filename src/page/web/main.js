@@ -3,7 +3,7 @@
 import { Boards } from "./boards.js";
 import { Camera, chooseDirection } from "./camera.js";
 import { ChartPanel } from "./chart.js";
-import { Choices, MARKS } from "./choices.js";
+import { Choices } from "./choices.js";
 import { SelfContactsPanel } from "./self_contacts.js";
 import { atMostEvery, byId, setText } from "./dom.js";
 import { PerceptPanel } from "./explain.js";
@@ -22,6 +22,7 @@ import { Plots } from "./plots.js";
 import { Connection, readAddress } from "./socket.js";
 import { Status } from "./status.js";
 import { Timeline } from "./timeline.js";
+import { TouchPanel } from "./touch_panel.js";
 import { View } from "./view.js";
 import { say } from "./wire.js";
 
@@ -45,7 +46,8 @@ const chart = new ChartPanel(
   model,
   choices,
 );
-const selfContacts = new SelfContactsPanel(model, (field) => choices.choose(field));
+const touches = new TouchPanel(model, choices, (touch) => lookAtTaxels([...touch.taxels]));
+const selfContacts = new SelfContactsPanel(model);
 new Boards(model);
 new Log(
   model,
@@ -56,23 +58,25 @@ new Status(model, view);
 plots.onSeek = (t) => timeline.seek(t);
 
 /** @param {number} field */
-function pointsOf(field) {
-  const members = model.welcome?.fields[field]?.members ?? [];
-  return members.map((taxel) => taxelInWorld(model, taxel)?.point ?? camera.target);
+function lookAt(field) {
+  lookAtTaxels(model.welcome?.fields[field]?.members ?? []);
 }
 
-/** @param {number} field */
-function lookAt(field) {
-  const members = model.welcome?.fields[field]?.members ?? [];
+/** @param {number[]} members taxels */
+function lookAtTaxels(members) {
+  if (!members.length) return;
   const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? [0, 0, 0]);
   const mean = [0, 1, 2].map((k) => normals.reduce((sum, normal) => sum + normal[k], 0) / normals.length);
-  // A field whose taxels look one way is seen from that side; one that goes around the body from where we are.
+  // Taxels that look one way are seen from that side; those that go around the body from where we are.
   if (Math.hypot(...mean) > 0.6) {
     camera.yaw = Math.atan2(mean[1], mean[0]) + 0.25;
     camera.pitch = Math.max(-1.3, Math.min(1.3, Math.asin(mean[2] / Math.hypot(...mean)) + 0.2));
     camera.update();
   }
-  camera.frame(pointsOf(field), 0.24);
+  camera.frame(
+    members.map((taxel) => taxelInWorld(model, taxel)?.point ?? camera.target),
+    0.24,
+  );
   moved();
 }
 
@@ -139,7 +143,7 @@ connection.onScene = () => {
   const { welcome, mesh } = model;
   if (!welcome || !mesh) return;
   const body = `${welcome.body} ${welcome.fields.length} ${mesh.taxelId.length}`;
-  if (framed !== body) choices.forget();
+  if (framed !== body) choices.forget(welcome.touches);
   view.build();
   connection.send(say.columns(welcome.columns.map((column) => column.name)));
   plots.begin();
@@ -172,6 +176,7 @@ model.on("connection", () => {
 
 // Panels follow the frames at a pace that people can read, so that time is left for drawing.
 const updatePanels = atMostEvery(100, () => {
+  touches.update();
   fields.update();
   percept.update();
   selfContacts.update();
@@ -188,6 +193,8 @@ const updatePlots = atMostEvery(80, () => {
 
 model.on("frame", () => {
   if (model.frame?.pressure) view.taxelsChanged = true;
+  if (model.frame?.touches) view.ringsChanged = true;
+  if (choices.touch !== null && !model.touch(choices.touch)) choices.chooseTouch(null);
   choices.follow(model);
   showTouchedSide();
   view.request();
@@ -199,7 +206,7 @@ model.on("scale", () => {
   view.request();
   updatePanels();
 });
-choices.on("look field hover", () => {
+choices.on("look field hover touch", () => {
   view.ringsChanged = true;
   view.request();
   updatePanels();
@@ -224,7 +231,7 @@ view.onDraw = () => {
 
 new ResizeObserver(() => {
   camera.resize(stage.clientWidth, stage.clientHeight);
-  marks.drawn = marks.drawn || "resized";
+  marks.drawn = true;
   view.request();
   plots.draw();
   timeline.draw();
@@ -264,12 +271,14 @@ for (const button of document.querySelectorAll("[data-toggle]")) {
   show();
 }
 const marksBox = byId("marks-choice", HTMLSelectElement);
-for (const name of MARKS) marksBox.add(new Option(`Marks: ${name}`, name));
 marksBox.addEventListener("change", () => {
-  choices.marks = MARKS[marksBox.selectedIndex];
+  choices.marks = choices.offered[marksBox.selectedIndex];
   choices.tell("look");
 });
-choices.on("look", () => (marksBox.selectedIndex = MARKS.indexOf(choices.marks)));
+choices.on("offered", () =>
+  marksBox.replaceChildren(...choices.offered.map((name) => new Option(`Marks: ${name}`, name))),
+);
+choices.on("look offered", () => (marksBox.selectedIndex = choices.offered.indexOf(choices.marks)));
 
 const keys = new Keys(
   keyList({
@@ -281,6 +290,10 @@ const keys = new Keys(
     look,
     lookAt,
     lookAtAll,
+    release: () => {
+      choices.chooseTouch(null);
+      choices.choose(null);
+    },
     moved,
     explain: () => percept.ask(),
     help: () => keys.toggleHelp(),

@@ -48,8 +48,10 @@ export class Model extends Observed {
     this.percepts = null;
     /** Where a field in contact stands in `percepts`. @type {Map<number, number>} */
     this.inContact = new Map();
-    /** @type {import("./wire.js").Touch[]} */
+    /** Touches of the whole body, the oldest first. @type {import("./wire.js").Touch[]} */
     this.touches = [];
+    /** Colours of touches, by their ids: one keeps its own from onset to release. @type {Map<number, number>} */
+    this.touchColours = new Map();
     /** Touches of two links at one place. @type {import("./wire.js").SelfContacts} */
     this.selfContacts = noSelfContacts();
     /** The newest frame's head. @type {Frame | null} */
@@ -98,7 +100,7 @@ export class Model extends Observed {
     this.scale = welcome.scale;
     this.percepts = null;
     this.inContact = new Map();
-    this.touches = [];
+    this.setTouches([]);
     this.selfContacts = noSelfContacts();
     this.frame = null;
     this.boards = [];
@@ -144,7 +146,7 @@ export class Model extends Observed {
       this.percepts = frame.percepts;
       this.inContact = new Map(Array.from(frame.percepts.field, (field, k) => [field, k]));
     }
-    if (frame.touches) this.touches = frame.touches;
+    if (frame.touches) this.setTouches(frame.touches);
     if (frame.selfContacts) {
       this.selfContacts = frame.selfContacts;
       this.tell("selfContacts");
@@ -154,6 +156,59 @@ export class Model extends Observed {
       this.tell("samples");
     }
     this.tell("frame");
+  }
+
+  /** @param {import("./wire.js").Touch[]} touches */
+  setTouches(touches) {
+    this.touches = touches;
+    const present = new Set(touches.map((touch) => touch.id));
+    for (const id of this.touchColours.keys()) if (!present.has(id)) this.touchColours.delete(id);
+    for (const id of present) {
+      if (this.touchColours.has(id)) continue;
+      const used = new Set(this.touchColours.values());
+      let free = 0;
+      while (used.has(free)) free++;
+      this.touchColours.set(id, free);
+    }
+  }
+
+  /**
+   * The number of a touch's colour in the palette.
+   * @param {number} id
+   */
+  touchColour(id) {
+    return this.touchColours.get(id) ?? 0;
+  }
+
+  /** @param {number | null} id */
+  touch(id) {
+    return this.touches.find((touch) => touch.id === id) ?? null;
+  }
+
+  /**
+   * The touch that a taxel is part of.
+   * @param {number} taxel
+   */
+  touchOf(taxel) {
+    return this.touches.find((touch) => touch.taxels.includes(taxel)) ?? null;
+  }
+
+  /**
+   * How hard it presses as text: its force where that is known, else the sum of its pressures.
+   * @param {import("./wire.js").Touch} touch
+   */
+  touchLoadText(touch) {
+    if (Number.isFinite(touch.force)) return withUnit(touch.force, "N", this.quantity);
+    return withUnit(touch.total, "P", this.quantity);
+  }
+
+  /**
+   * Names of a touch's flags.
+   * @param {import("./wire.js").Touch} touch
+   */
+  touchFlags(touch) {
+    const names = this.welcome?.touch_flags ?? [];
+    return names.filter((name, bit) => name !== null && (touch.flags >>> bit) & 1).map(String);
   }
 
   largestPressure() {

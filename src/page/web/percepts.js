@@ -1,47 +1,19 @@
-/** Marks of percepts over the picture: place, identity, load, orientation, axis, motion, self-contacts. */
+/** Marks over the picture: of touches their place, id, load, normal, axis, motion and trail; of fields; of self-contacts. */
 
 import { cssColour, fitCanvas, paletteColour } from "./dom.js";
-import { withUnit } from "./format.js";
-import { dot, subtract, toWorld } from "./math.js";
-import {
-  axisEllipse,
-  motionArrow,
-  onPlane,
-  orientationLine,
-  positionInWorld,
-  tangentPlane,
-} from "./places.js";
+import { add, dot, scale, subtract, toWorld } from "./math.js";
+import { axisEllipse, motionArrow, onPlane, orientationLine, tangentPlane, touchInWorld } from "./places.js";
 import { NO_LINK } from "./wire.js";
 
 /** @typedef {{x: number, y: number}} Point */
+/** @typedef {{at: Point, text: string, colour: string, load: number}} Label */
 
 const LABELS_MAX = 6;
-
-/** Keeps the colour of a touch from onset to release. */
-export class IdentityColours {
-  constructor() {
-    /** @type {Map<string, number>} */
-    this.colours = new Map();
-  }
-
-  /** @param {import("./wire.js").Touch[]} touches */
-  update(touches) {
-    const present = new Set(touches.map((touch) => `${touch.field}:${touch.identity}`));
-    for (const key of this.colours.keys()) if (!present.has(key)) this.colours.delete(key);
-    for (const key of present) {
-      if (this.colours.has(key)) continue;
-      const used = new Set(this.colours.values());
-      let free = 0;
-      while (used.has(free)) free++;
-      this.colours.set(key, free);
-    }
-  }
-
-  /** @param {import("./wire.js").Touch} touch */
-  of(touch) {
-    return paletteColour(this.colours.get(`${touch.field}:${touch.identity}`) ?? 0);
-  }
-}
+/** Length of the line along a touch's normal, pixels. */
+const NORMAL_PX = 26;
+/** A trail goes back so long, s, and its oldest part is so opaque. */
+const TRAIL_S = 1;
+const OLDEST_OPACITY = 0.1;
 
 export class Marks {
   /**
@@ -55,57 +27,41 @@ export class Marks {
     this.model = model;
     this.camera = camera;
     this.choices = choices;
-    this.colours = new IdentityColours();
-    /** Where marks are, to be clicked. @type {{x: number, y: number, field: number}[]} */
+    /** Where marks are, to be clicked. @type {{x: number, y: number, field?: number, touch?: number}[]} */
     this.places = [];
-    this.drawn = "";
+    this.drawn = false;
   }
 
   draw() {
     const { model, camera, choices } = this;
     const marked = choices.marked(model);
+    const touches = choices.showsTouches(model) ? model.touches : [];
     const selfContacts = choices.marks === "none" ? [] : model.selfContacts.list;
     this.places = [];
-    if (!marked.length && !selfContacts.length && !this.drawn) return;
-    this.drawn = marked.join() || (selfContacts.length ? "selfContacts" : "");
+    const drawn = marked.length + touches.length + selfContacts.length > 0;
+    if (!drawn && !this.drawn) return;
+    this.drawn = drawn;
     const fitted = fitCanvas(this.canvas);
     if (!fitted) return;
     const { context } = fitted;
     context.lineCap = context.lineJoin = "round";
     this.halo = cssColour("halo");
-    const touches = model.touches.filter((touch) => marked.includes(touch.field));
-    this.colours.update(touches);
-    /** @type {{at: Point, text: string, colour: string, load: number}[]} */
+    /** @type {Label[]} */
     const labels = [];
+    for (const touch of touches) this.touch(context, touch, labels);
     for (const field of marked) {
       const plane = tangentPlane(model, field);
       if (!plane) continue;
-      const own = touches.filter((touch) => touch.field === field);
-      const colour = own.length ? this.colours.of(own[0]) : paletteColour(field);
+      const colour = paletteColour(field);
       const facing = !plane.normal || dot(plane.normal, subtract(camera.eye, plane.point)) > 0;
       // What lies behind the body is a faint ring only.
       context.globalAlpha = facing ? 1 : 0.3;
       if (facing) this.shapes(context, field, plane, colour);
-      const places = own.length
-        ? own.map((touch) => ({
-            at: camera.project(positionInWorld(model, field, touch.position)),
-            colour: this.colours.of(touch),
-            load: touch.total,
-            text: `#${touch.identity}  ${withUnit(touch.total, "P", model.quantity)}`,
-          }))
-        : [
-            {
-              at: camera.project(plane.point),
-              colour,
-              load: model.load(field),
-              text: model.loadText(field),
-            },
-          ];
-      for (const { at, colour: fill, text, load } of places) {
-        this.ring(context, at, fill, field === choices.field);
-        this.places.push({ x: at.x, y: at.y, field });
-        if (choices.labels && facing) labels.push({ at, text, colour: fill, load });
-      }
+      const at = camera.project(plane.point);
+      this.ring(context, at, colour, field === choices.field);
+      this.places.push({ x: at.x, y: at.y, field });
+      if (choices.labels && facing)
+        labels.push({ at, text: model.loadText(field), colour, load: model.load(field) });
     }
     context.globalAlpha = 1;
     for (const contact of selfContacts) this.contact(context, contact);
@@ -115,6 +71,67 @@ export class Marks {
     /** @type {Point[]} */
     const taken = [];
     for (const { at, text, colour } of labels) this.label(context, at, text, colour, taken);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {import("./wire.js").Touch} touch
+   * @param {Label[]} labels
+   */
+  touch(context, touch, labels) {
+    const { model, camera, choices } = this;
+    const colour = paletteColour(model.touchColour(touch.id));
+    const { point, normal, halfAxes, motion, trail } = touchInWorld(model, touch);
+    const at = camera.project(point);
+    if (at.depth <= 0) return;
+    const facing = dot(normal, subtract(camera.eye, point)) > 0;
+    if (facing) {
+      this.trail(context, [...trail, { ago: 0, point }], colour);
+      if (halfAxes) {
+        const [along, across] = halfAxes;
+        const round = Array.from({ length: 49 }, (_, i) => {
+          const [c, s] = [Math.cos((i * Math.PI) / 24), Math.sin((i * Math.PI) / 24)];
+          return camera.project(add(point, add(scale(along, c), scale(across, s))));
+        });
+        this.line(context, round, colour, 1.5, []);
+        this.line(context, [round[24], round[0]], colour, 2.25, []);
+      }
+      const end = camera.project(add(point, scale(normal, NORMAL_PX / camera.pixelsPerMetre(at.depth))));
+      this.line(context, [at, end], colour, 1.5, []);
+      this.dot(context, end, 2.4, colour);
+      if (motion) this.arrow(context, at, camera.project(add(point, motion)), colour);
+    }
+    // What lies behind the body is a faint ring only.
+    context.globalAlpha = facing ? 1 : 0.3;
+    this.ring(context, at, colour, touch.id === choices.touch);
+    context.globalAlpha = 1;
+    this.places.push({ x: at.x, y: at.y, touch: touch.id });
+    if (choices.labels && facing)
+      labels.push({ at, text: `#${touch.id}  ${model.touchLoadText(touch)}`, colour, load: touch.total });
+  }
+
+  /**
+   * Where a touch was, fading towards its beginning.
+   * @param {CanvasRenderingContext2D} context
+   * @param {{ago: number, point: import("./math.js").Vec3}[]} points the oldest first
+   * @param {string} colour
+   */
+  trail(context, points, colour) {
+    const places = points.map(({ point }) => this.camera.project(point));
+    context.strokeStyle = colour;
+    context.lineWidth = 3.5;
+    // Round ends would lie over each other.
+    context.lineCap = "butt";
+    for (let i = 1; i < places.length; i++) {
+      const fresh = 1 - Math.min(1, points[i].ago / TRAIL_S);
+      context.globalAlpha = OLDEST_OPACITY + (1 - OLDEST_OPACITY) * fresh;
+      context.beginPath();
+      context.moveTo(places[i - 1].x, places[i - 1].y);
+      context.lineTo(places[i].x, places[i].y);
+      context.stroke();
+    }
+    context.lineCap = "round";
+    context.globalAlpha = 1;
   }
 
   /**

@@ -6,8 +6,39 @@ import { IN_WORLD_BIT, NO_LINK } from "./wire.js";
 /** @typedef {import("./model.js").Model} Model */
 /** @typedef {import("./math.js").Vec3} Vec3 */
 
+/** The motion arrow ends where the touch would be after so long. */
+const ARROW_S = 0.2;
+/** An ellipse has half axes of so many standard deviations: about the edge of what presses evenly. */
+const ELLIPSE_SIGMAS = 2;
+
 /**
- * Where a percept's or touch's position is in the world.
+ * What marks a touch, in the world: its place and normal, the half axes of its ellipse, its motion in `ARROW_S`, and its trail.
+ * @param {Model} model
+ * @param {import("./wire.js").Touch} touch
+ */
+export function touchInWorld(model, touch) {
+  const { rows } = model;
+  const turned = (/** @type {number[]} */ direction) =>
+    direction.some(Number.isNaN) ? null : toWorld(rows, touch.frame, direction, 0);
+  const point = toWorld(rows, touch.frame, touch.position, 1);
+  const normal = toWorld(rows, touch.frame, touch.normal, 0);
+  const axis = turned(touch.axis);
+  const [along, across] = touch.spread.map((sigma) => ELLIPSE_SIGMAS * sigma);
+  const velocity = turned(touch.velocity);
+  return {
+    point,
+    normal,
+    halfAxes:
+      axis && !Number.isNaN(along)
+        ? [scale(axis, along), scale(unit(cross(normal, axis)), Math.max(across, 0.05 * along))]
+        : null,
+    motion: velocity && scale(velocity, ARROW_S),
+    trail: touch.trail.map(({ ago, frame, position }) => ({ ago, point: toWorld(rows, frame, position, 1) })),
+  };
+}
+
+/**
+ * Where a percept's position is in the world.
  * @param {Model} model
  * @param {number} field
  * @param {ArrayLike<number>} position
@@ -113,9 +144,6 @@ export function axisEllipse(model, f) {
   ];
   return { angle: axis[0], a, b };
 }
-
-/** The motion arrow ends where the touch would be after so long. */
-const ARROW_S = 0.2;
 
 /**
  * How far a field's centroid goes in `ARROW_S`, in the chart.

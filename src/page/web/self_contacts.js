@@ -8,11 +8,9 @@ import { withUnit } from "./format.js";
 export class SelfContactsPanel {
   /**
    * @param {import("./model.js").Model} model
-   * @param {(field: number) => void} choose
    */
-  constructor(model, choose) {
+  constructor(model) {
     this.model = model;
-    this.choose = choose;
     this.panel = byId("self-contacts-panel", HTMLElement);
     this.list = byId("self-contacts", HTMLElement);
     this.count = byId("self-contact-count", HTMLElement);
@@ -39,14 +37,12 @@ export class SelfContactsPanel {
     const { model } = this;
     const row = make("div", "contact");
     row.append(make("i"));
-    for (const { field, total } of contact.sides) {
-      const button = make("button", "contact-side", model.welcome?.fields[field]?.label ?? "");
-      button.title = "Choose this field";
-      button.addEventListener("click", () => this.choose(field));
-      row.append(button, make("span", "contact-total", withUnit(total, "P", model.quantity)));
+    for (const { link, total } of contact.sides) {
+      const name = make("span", "contact-side", model.welcome?.links[link]?.name ?? "");
+      row.append(name, make("span", "contact-total", withUnit(total, "P", model.quantity)));
     }
-    const angle = Number.isNaN(contact.angle) ? "" : ` · ${Math.round((contact.angle * 180) / Math.PI)}°`;
-    row.append(make("span", "contact-numbers", `${(contact.distance * 1e3).toFixed(1)} mm apart${angle}`));
+    const angle = Math.round((contact.angle * 180) / Math.PI);
+    row.append(make("span", "contact-numbers", `${(contact.distance * 1e3).toFixed(1)} mm apart · ${angle}°`));
     return row;
   }
 }

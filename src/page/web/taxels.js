@@ -222,6 +222,7 @@ export class Taxels {
     this.fill = new Uint8Array(4 * ROW * this.rows);
     this.before = new Uint8Array(4 * ROW * this.rows);
     this.ring = new Uint8Array(4 * ROW * this.rows);
+    this.ringBefore = new Uint8Array(4 * ROW * this.rows);
     this.fills = makeTexture(gl, gl.RGBA8, ROW, this.rows);
     this.rings = makeTexture(gl, gl.RGBA8, ROW, this.rows);
     // Four corners a taxel, each with all that the taxel has: software draws instances one by one, which is far slower.
@@ -273,14 +274,19 @@ export class Taxels {
   }
 
   /**
-   * Rings around taxels, to show which field they belong to.
+   * Rings around taxels, to show which touch or field they belong to.
    * @param {Map<number, number[]>} rings colour by taxel
+   * @param {(taxel: number) => import("./dirty.js").Rect | null} rectOf where a taxel is in the picture
+   * @param {{width: number, height: number, rects: number}} limits
+   * @returns where the picture changes
    */
-  updateRings(rings) {
+  updateRings(rings, rectOf, limits) {
+    [this.ring, this.ringBefore] = [this.ringBefore, this.ring];
     this.ring.fill(0);
     for (const [taxel, [r, g, b]] of rings) this.ring.set([r, g, b, 255], 4 * taxel);
     this.upload(this.rings, this.ring);
     this.findSpecial();
+    return changedRects(this.ringBefore, this.ring, rectOf, limits);
   }
 
   /**

@@ -1,6 +1,7 @@
 /** The picture in space: when it is drawn, at what detail, and what of it is kept between drawings. */
 
 import { Body } from "./body.js";
+import { addRect } from "./dirty.js";
 import { openContext, Poses, rendererOf, Target } from "./gl.js";
 import { taxelInWorld } from "./places.js";
 import { Taxels } from "./taxels.js";
@@ -110,7 +111,7 @@ export class View {
     const motion = [camera.version, model.poseVersion, width, height].join();
     const look = [choices.dark, how.solid, how.body, choices.taxels, model.frame !== null].join();
     const moved = this.drawn.motion !== "" && this.drawn.motion !== motion && !resized;
-    let whole = this.drawn.motion !== motion || this.drawn.look !== look || this.ringsChanged;
+    let whole = this.drawn.motion !== motion || this.drawn.look !== look;
     if (this.drawn.look !== look) this.taxelsChanged = true;
     if (this.drawn.motion !== motion || this.drawn.look !== look) {
       this.drawn = { motion, look };
@@ -130,12 +131,12 @@ export class View {
     const size = { width: body.width, height: body.height };
     /** @type {import("./dirty.js").Rect[]} */
     let rects = [];
-    if (this.taxelsChanged)
-      rects = parts.taxels.update(model, theme, (taxel) => this.rectOf(taxel, scale), {
-        ...size,
-        rects: parts.taxels.count > 3000 ? 2 : 4,
-      });
-    if (this.ringsChanged) parts.taxels.updateRings(choices.rings(model));
+    const limits = { ...size, rects: parts.taxels.count > 3000 ? 2 : 4 };
+    const rectOf = (/** @type {number} */ taxel) => this.rectOf(taxel, scale);
+    if (this.taxelsChanged) rects = parts.taxels.update(model, theme, rectOf, limits);
+    if (this.ringsChanged)
+      for (const rect of parts.taxels.updateRings(choices.rings(model), rectOf, limits))
+        addRect(rects, rect, limits.rects);
     this.taxelsChanged = this.ringsChanged = false;
     if (whole) rects = [{ x0: 0, y0: 0, x1: size.width, y1: size.height }];
     if (!rects.length && !resized) {

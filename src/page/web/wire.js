@@ -3,7 +3,7 @@
  * Nothing here touches the document, so it runs under node too.
  */
 
-export const VERSION = 2;
+export const VERSION = 3;
 /** Index of "no link": the world. */
 export const NO_LINK = 0xffffffff;
 /** Bit of a percept's `present`: its position is in the world, not in the frame of a link. */
@@ -21,14 +21,18 @@ export const HEALTH = ["good", "missing", "stale", "faulty", "saturated", "out o
  *   source: string, backend: {name: string, device: string, why: string}, quantity: string, scale: Scale,
  *   time: {start_s: number, end_s: number, frames: number} | null, origin: number[],
  *   links: {name: string, parent: number | null}[], channels: ([string | number, number] | null)[] | null, fields: Field[],
- *   columns: Column[], flags: (string | null)[], self_contacts: boolean, colours: number[][]}} Welcome
+ *   columns: Column[], flags: (string | null)[], touches: boolean, touch_flags: (string | null)[], self_contacts: boolean,
+ *   colours: number[][]}} Welcome
  * @typedef {{position: Float32Array, normal: Float32Array, link: Uint32Array, corners: Uint32Array, taxelId: Uint32Array,
  *   taxelLink: Uint32Array, taxelPosition: Float32Array, taxelNormal: Float32Array, taxelRadius: Float32Array,
  *   taxelArea: Float32Array, restPose: Float32Array}} Mesh
  * @typedef {{field: Uint32Array, flags: Uint32Array, present: Uint32Array, columns: Map<number, Float32Array>}} Percepts
- * @typedef {{field: number, identity: number, total: number, active: number, centroid: [number, number],
- *   position: [number, number, number]}} Touch
- * @typedef {{field: number, touch: number, total: number}} SelfContactSide
+ * @typedef {{index: number, share: number}} Share
+ * @typedef {{ago: number, frame: number, position: number[]}} TrailPoint
+ * @typedef {{id: number, link: number, frame: number, flags: number, active: number, age: number, total: number, force: number,
+ *   peak: number, anisotropy: number, position: number[], normal: number[], axis: number[], spread: number[],
+ *   velocity: number[], taxels: Uint32Array, links: Share[], fields: Share[], trail: TrailPoint[]}} Touch
+ * @typedef {{link: number, touch: number, total: number}} SelfContactSide
  * @typedef {{identity: number, sides: [SelfContactSide, SelfContactSide], position: [number, number, number], distance: number,
  *   angle: number}} SelfContact
  * @typedef {{known: boolean, list: SelfContact[]}} SelfContacts
@@ -38,7 +42,8 @@ export const HEALTH = ["good", "missing", "stale", "faulty", "saturated", "out o
  *   percepts: Percepts | null, touches: Touch[] | null, selfContacts: SelfContacts | null, samples: Samples | null}} Frame
  * @typedef {{id: number, from: number, to: number, bins: number, least: Float32Array[], most: Float32Array[]}} History
  * @typedef {{field: number, column: string, component: number}} Series
- * @typedef {{seq: number, t_s: number, kind: string, field: number | null, text: string}} Event
+ * @typedef {{seq: number, t_s: number, kind: string, field: number | null, touch: number | null, link: number | null,
+ *   text: string}} Event
  * @typedef {{name: string, state: string, rate_hz: number | null, frames: number, lost: number, age_s: number | null}} Board
  * @typedef {{type: "explain", field: number, frame: number, t_s: number, backend: string, flags: string[],
  *   members: {taxel: number, raw: number | null, pressure: number | null}[],
@@ -190,13 +195,7 @@ export function decodeFrame(buffer, scene) {
   }
   if (sections & TOUCHES) {
     frame.touches = [];
-    for (let i = 0; i < touches; i++) {
-      const [field, identity] = from.u32(2);
-      const [total] = from.f32(1);
-      const [active] = from.u32(1);
-      const [u, v, x, y, z] = from.f32(5);
-      frame.touches.push({ field, identity, total, active, centroid: [u, v], position: [x, y, z] });
-    }
+    for (let i = 0; i < touches; i++) frame.touches.push(touch(from));
     from.pad();
   }
   if (sections & SELF_CONTACTS) {
@@ -219,14 +218,50 @@ export function decodeFrame(buffer, scene) {
 
 /**
  * @param {Reader} from
+ * @returns {Touch}
+ */
+function touch(from) {
+  const [id, link, frame, flags, active, taxels, links, fields, points] = from.u32(9);
+  const values = from.f32(19);
+  const [age, total, force, peak, anisotropy] = values;
+  const part = (/** @type {number} */ at, /** @type {number} */ count) => [
+    ...values.subarray(at, at + count),
+  ];
+  const share = () => ({ index: from.u32(1)[0], share: from.f32(1)[0] });
+  const point = () => ({ ago: from.f32(1)[0], frame: from.u32(1)[0], position: [...from.f32(3)] });
+  return {
+    id,
+    link,
+    frame,
+    flags,
+    active,
+    age,
+    total,
+    force,
+    peak,
+    anisotropy,
+    position: part(5, 3),
+    normal: part(8, 3),
+    axis: part(11, 3),
+    spread: part(14, 2),
+    velocity: part(16, 3),
+    taxels: from.u32(taxels),
+    links: Array.from({ length: links }, share),
+    fields: Array.from({ length: fields }, share),
+    trail: Array.from({ length: points }, point),
+  };
+}
+
+/**
+ * @param {Reader} from
  * @returns {SelfContact}
  */
 function contact(from) {
   const [identity] = from.u32(1);
   const side = () => {
-    const [field, touch] = from.u32(2);
+    const [link, touch] = from.u32(2);
     const [total] = from.f32(1);
-    return { field, touch, total };
+    return { link, touch, total };
   };
   /** @type {[SelfContactSide, SelfContactSide]} */
   const sides = [side(), side()];
