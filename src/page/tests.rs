@@ -338,9 +338,9 @@ fn frames_hold_what_the_engine_computed() {
     let meeting = &messages["two links touch"]["selfContacts"];
     let contact = &meeting["list"][0];
     assert!(welcome["self_contacts"] == true && meeting["known"] == true, "{meeting}");
-    assert_eq!((&contact["sides"][0]["field"], &contact["sides"][1]["field"]), (&2.into(), &4.into()));
-    // Weights are 1 and 2: the totals are those of the one taxel on each side.
-    assert_eq!((&contact["sides"][0]["total"], &contact["sides"][1]["total"]), (&5.0.into(), &6.0.into()));
+    assert_eq!((&contact["sides"][0]["link"], &contact["sides"][1]["link"]), (&0.into(), &1.into()));
+    // Of the one taxel on each side.
+    assert_eq!((&contact["sides"][0]["total"], &contact["sides"][1]["total"]), (&5.0.into(), &3.0.into()));
     let origin = welcome["origin"].as_array().unwrap();
     for (axis, place) in [1.01, 0.0, -0.01].into_iter().enumerate() {
         let told = contact["position"][axis].as_f64().unwrap() + origin[axis].as_f64().unwrap();

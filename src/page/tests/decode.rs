@@ -104,7 +104,7 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
         let mut contact = |_| {
             let identity = from.u32();
             let sides: Vec<Value> =
-                (0..2).map(|_| json!({"field": from.u32(), "touch": from.u32(), "total": from.f32()})).collect();
+                (0..2).map(|_| json!({"link": from.u32(), "touch": from.u32(), "total": from.f32()})).collect();
             json!({"identity": identity, "sides": sides, "position": from.f32s(3), "distance": from.f32(), "angle": from.f32()})
         };
         let known = number != u32::MAX;
