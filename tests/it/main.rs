@@ -51,6 +51,7 @@ mod skipped;
 mod skips;
 mod state;
 mod sure;
+mod sure_on_skin;
 mod touch;
 mod validator;
 mod verify;
