@@ -82,10 +82,16 @@ fn a_ball_drawn_down_a_forearm_is_one_touch_with_place_speed_and_links() {
             assert!(vector(&touch["normal"]).angle_between(normal) < 0.5, "frame {number}: {touch} {normal}");
             placed += 1;
         }
-        // Simulated sensors feel newtons, but are not said to.
-        let total = touch["total"].as_f64().unwrap();
-        assert!((total / of(pressed[0], "force") - 1.0).abs() < 0.1, "frame {number}: {total}");
-        assert!(touch.get("force").is_none() && touch.get("wrench").is_none());
+        // Simulated sensors feel newtons, and their calibration says so.
+        let number_of = |name: &str| touch[name].as_f64().unwrap();
+        let force = number_of("force");
+        assert!((force / of(pressed[0], "force") - 1.0).abs() < 0.1, "frame {number}: {force}");
+        assert!((force / number_of("total") - 1.0).abs() < 1e-12, "{touch}");
+        assert!((number_of("mean_pressure") * number_of("area") / force - 1.0).abs() < 1e-9, "{touch}");
+        // The force on each link is at most the sum of the taxels' forces, which have directions of their own.
+        let wrenches = touch["wrench"].as_object().unwrap();
+        let pressed_by: f64 = wrenches.values().map(|wrench| vector(&wrench["force"]).length()).sum();
+        assert!(pressed_by <= force * (1.0 + 1e-9) && pressed_by > 0.5 * force, "{touch}");
         let links = touch["links"].as_object().unwrap();
         assert!((links.values().map(|share| share.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-12);
         let link = touch["link"].as_str().unwrap();
@@ -115,10 +121,7 @@ fn a_ball_drawn_down_a_forearm_is_one_touch_with_place_speed_and_links() {
     assert_eq!(released, ids.into_iter().collect::<Vec<_>>());
     let table = std::fs::read_to_string(at("touch.touches.csv")).unwrap();
     assert_eq!(table.lines().count(), 1 + compared);
-    assert!(
-        table.starts_with("t [s],frame,touch,age [s],link,in,total [count],force [N],peak [count],"),
-        "{table:.200}"
-    );
+    assert!(table.starts_with("t [s],frame,touch,age [s],link,in,total [N],force [N],peak [N],"), "{table:.200}");
 
     // A scene says from when on it counts.
     let scene = at("scene.toml");

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use somatic::Frame;
 use somatic::source::{SimulatedSource, Source as _};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Scene, TouchFlags, bundled, touch};
 
 /// A rod over an elbow, a strap and a pair.
 fn elbow() -> SimulatedSource {
@@ -80,6 +80,70 @@ fn a_taxel_feels_its_cell_or_its_area() {
     assert!((small / smaller / 2.0 - 1.0).abs() < 0.01, "{small} {smaller}");
     assert_eq!(touch("covers = \"area\"\narea_m2 = 1e-7")[4], smaller);
     assert_eq!(touch("covers = \"cell\"").iter().sum::<f64>(), cells);
+}
+
+/// Per frame of `numbers` the touches' summed force, N, and the truth's; each has a mean pressure and no doubt about units.
+fn forces(simulation: &mut SimulatedSource, numbers: impl Iterator<Item = u64>) -> Vec<(f64, f64)> {
+    let calibration = Calibration::parse(&simulation.calibration(), simulation.taxels()).unwrap();
+    let scene = Scene::default().outputs(Outputs::TOTAL).touches(touch::Options::default());
+    let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu);
+    let mut engine = Engine::new(simulation.body(), options).unwrap();
+    engine.set_channels(simulation.taxels()).unwrap();
+    assert!(engine.remarks().is_empty(), "{:?}", engine.remarks());
+    let compared = numbers.map(|number| {
+        let frame = read(simulation, number);
+        let truth: f64 = simulation.truth().iter().map(|truth| truth.force_newton).sum();
+        let touches = &engine.process_one(&frame).unwrap().touches(0).unwrap().touches;
+        assert!(!touches.is_empty());
+        let force = touches.iter().map(|touch| {
+            assert!(!touch.flags.contains(TouchFlags::NO_UNIT), "{touch:?}");
+            let force = touch.force_newton.unwrap();
+            assert!((touch.mean_pressure_pascal.unwrap() * touch.area_m2.unwrap() / force - 1.0).abs() < 1e-9);
+            force
+        });
+        (force.sum(), truth)
+    });
+    compared.collect()
+}
+
+#[test]
+fn touches_of_a_simulation_have_its_force() {
+    let near = |pairs: Vec<(f64, f64)>, share: f64| {
+        for (felt, truth) in pairs {
+            assert!((felt / truth - 1.0).abs() < share && truth > 1.0, "{felt} of {truth} N");
+        }
+    };
+    // A rod on the whole body, over an elbow, by sensors that cover their cells.
+    let mut simulation = elbow();
+    assert!(
+        simulation.calibration().contains("[all]\nsensors = \"cell\"\nunit = \"N\"\n"),
+        "{}",
+        simulation.calibration()
+    );
+    near(forces(&mut simulation, (12..36).step_by(4)), 0.01);
+    // The same by a converter: rounding and noise of some 40 taxels, and what their dead bands cut off at the rim.
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/simulations/elbow.toml")).unwrap();
+    let counts = "[sensor]\nkind = \"linear\"\noffset = 30.5\ngain = 2000\nbits = 16\nnoise_sigma = 2\n\n";
+    let first = text.find("[[touch]]").unwrap();
+    let text = format!("{}{counts}{}", &text[..first], &text[first..]);
+    let mut counted = SimulatedSource::from_text("elbow.toml", &text, Path::new("")).unwrap();
+    near(forces(&mut counted, (12..36).step_by(4)), 0.02);
+    // A ball on one link of sensors of one size without gaps: the mat's.
+    let mat = Body::from_bytes("mat", bundled::MAT).unwrap();
+    let side_m = mat.taxels[0].position_in_link.distance(mat.taxels[1].position_in_link);
+    let text = format!(
+        "rate_hz = 10\nduration_s = 1\n[layer]\nthickness_m = {side_m}\n[sensor]\nkind = \"linear\"\ngain = 100\nbits = 20\n\
+         noise_sigma = 1\noffset = 200.5\narea_m2 = {}\n[[touch]]\non = \"mat\"\nindenter = \"ball\"\nradius_m = {side_m}\n\
+         path = [[0, 0]]\nhold = {{ newton = 200 }}\n",
+        side_m * side_m
+    );
+    let mut simulation = SimulatedSource::on_body("mat", &text, mat).unwrap();
+    assert!(simulation.calibration().contains("sensors = \"equal\"\nunit = \"N\"\n"), "{}", simulation.calibration());
+    near(forces(&mut simulation, 0..5), 0.02);
+    // The paper's signals are no newtons.
+    let rod = SimulatedSource::open(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/simulations/rod.toml")).unwrap();
+    assert!(rod.calibration().contains("sensors = \"equal\"") && !rod.calibration().contains("unit"));
 }
 
 #[test]

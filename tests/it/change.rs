@@ -19,7 +19,7 @@ fn skin() -> Body {
 
 fn engine(body: &Body, kind: BackendKind, calibration: &str, letters: Vec<Letter>) -> somatic::Result<Engine> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let scene = Scene::default().letters(letters).outputs(Outputs::all());
+    let scene = Scene::default().letters(letters).outputs(Outputs::all() - Outputs::SELF_CONTACTS);
     let calibration = Some(Calibration::parse(calibration, &ids)?);
     Engine::new(body, Options::default().scene(scene).calibration(calibration).backend(kind).batch(32))
 }

@@ -156,3 +156,97 @@ fn the_speed_of_a_rod_is_that_of_its_fits() {
     );
     assert!(fits.len() > 60 && rms(&fits) < 4.0 && rms(&fits) < 0.4 * rms(&centroids) && young >= 10);
 }
+
+/// A ball that is drawn over the grid at 20 mm/s and a little to the side.
+const DRAWN: &str = "rate_hz = 100\nduration_s = 1.6\n[layer]\nthickness_m = 0.004\n[sensor]\nkind = \"ideal\"\nnoise_sigma = 0.005\n\
+    [[touch]]\non = \"grid\"\nindenter = \"ball\"\nradius_m = 0.0127\nhold = { newton = 5 }\n\
+    path = [[-0.016, -0.004], [0.016, 0.004]]\ntimes_s = [0, 1.6]\n";
+
+/// Without fits from frame 60 to 65, and from 80 to 120: only one taxel is pressed then.
+fn drawn() -> (Body, Calibration, Vec<Frame>) {
+    let body = grid();
+    let mut source = SimulatedSource::on_body("drawn", DRAWN, body.clone()).unwrap();
+    let calibration = Calibration::parse(&source.calibration(), source.taxels()).unwrap();
+    let (mut frames, mut frame) = (Vec::new(), Frame::missing(0.0, source.taxels().len()));
+    while source.next_frame(&mut frame).unwrap() {
+        if (60..65).contains(&frames.len()) || (80..120).contains(&frames.len()) {
+            let value = |value: &somatic::RawValue| value.number().unwrap_or(0.0);
+            let peak = frame.values.iter().map(value).fold(0.0, f64::max);
+            let lower = |own: &mut somatic::RawValue| {
+                if value(own) < peak {
+                    *own = somatic::RawValue::new(0.0);
+                }
+            };
+            frame.values.iter_mut().for_each(lower);
+        }
+        frames.push(frame.clone());
+    }
+    (body, calibration, frames)
+}
+
+#[test]
+fn a_fit_has_the_velocity_of_what_presses_and_the_same_bits_however_a_recording_is_cut() {
+    let (body, calibration, frames) = drawn();
+    let engine = |outputs: TouchOutputs| {
+        let asked = touch::Options { outputs, ..touch::Options::default() };
+        let scene = Scene::default().outputs(Outputs::TOTAL).touches(asked);
+        let options =
+            Options::default().scene(scene).calibration(calibration.clone()).backend(BackendKind::Cpu).batch(256);
+        Engine::new(&body, options).unwrap()
+    };
+    let asked = TouchOutputs::USUAL | TouchOutputs::FIT;
+    let whole = engine(asked).process(&frames).unwrap().clone();
+    // u runs along the link's x and v along its −z.
+    let right = DVec3::new(0.02, 0.0, -0.005);
+    let (mut squares, mut compared, mut without) = (0.0, 0, 0);
+    for frame in 0..frames.len() {
+        let [touch] = &whole.touches(frame).unwrap().touches[..] else { panic!("frame {frame}") };
+        assert_eq!(touch.id, 1, "frame {frame}");
+        let velocity = touch.fit.and_then(|fit| fit.velocity);
+        let is_young_fit = touch.flags.contains(TouchFlags::YOUNG_FIT);
+        assert_eq!(touch.flags.contains(TouchFlags::YOUNG), frame < 20, "frame {frame}");
+        let has_fits = !(60..65).contains(&frame) && !(80..120).contains(&frame);
+        assert!(has_fits || (touch.fit.is_none() && !is_young_fit), "frame {frame}: {touch:?}");
+        if touch.fit.is_none() {
+            without += usize::from(has_fits);
+            continue;
+        }
+        match frame {
+            0..20 => assert!(velocity.is_none() && !is_young_fit, "frame {frame}"),
+            120..140 => assert!(velocity.is_none() && is_young_fit, "frame {frame}"),
+            // If the first of these had no fit.
+            20..25 | 140..145 => {}
+            _ => assert!(velocity.is_some() && !is_young_fit, "frame {frame}"),
+        }
+        if let Some(velocity) = velocity {
+            assert!(velocity.y.abs() < 1e-9, "on the skin: {velocity}");
+            (squares, compared) = (squares + velocity.distance_squared(right), compared + 1);
+        }
+    }
+    let rms = (squares / f64::from(compared)).sqrt();
+    println!("velocity of {compared} fits: {:.2} mm/s of 20.6 off", 1e3 * rms);
+    assert!(compared > 60 && without < 12 && rms < 0.15 * right.length(), "{compared} {without} {rms}");
+
+    let mut alone = engine(asked);
+    for (index, frame) in frames.iter().enumerate() {
+        assert_eq!(alone.process_one(frame).unwrap().touches(0), whole.touches(index), "frame {index}");
+    }
+    for cut in [11, 50, 63, 90, 125] {
+        let mut first = engine(asked);
+        first.process(&frames[..cut]).unwrap();
+        let state = first.state().unwrap();
+        let mut second = engine(asked);
+        second.restore(&state).unwrap();
+        let rest = second.process(&frames[cut..]).unwrap();
+        for index in cut..frames.len() {
+            assert_eq!(rest.touches(index - cut), whole.touches(index), "cut at {cut}, frame {index}");
+        }
+    }
+    // What nobody asks for is absent, with its flag.
+    let plain = engine(TouchOutputs::USUAL | TouchOutputs::FIT_PLACE).process(&frames).unwrap().clone();
+    for frame in 0..frames.len() {
+        let touches = &plain.touches(frame).unwrap().touches;
+        let velocity = touches.iter().find_map(|touch| touch.fit.and_then(|fit| fit.velocity));
+        assert!(velocity.is_none() && touches.iter().all(|touch| !touch.flags.contains(TouchFlags::YOUNG_FIT)));
+    }
+}

@@ -52,6 +52,7 @@ mod skipped;
 mod skips;
 mod state;
 mod sure;
+mod sure_on_skin;
 mod touch;
 mod validator;
 mod verify;

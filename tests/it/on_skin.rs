@@ -228,6 +228,32 @@ fn a_taxel_in_no_field_is_touched_too_and_drift_does_not_take_its_touch_away() {
 }
 
 #[test]
+fn taxels_weigh_as_their_sensors_cover_their_cells() {
+    let mut body = hand();
+    let frame = frames(&body, 1).remove(0);
+    let position = |body: &Body, keys: &str| {
+        let mut engine = engine(body, scene(), Some(&format!("[all]\n{keys}\n")), BackendKind::Cpu);
+        (of(engine.process_one(&frame).unwrap(), 0)[0].position, engine.remarks())
+    };
+    let [cell, equal] = ["sensors = \"cell\"", "sensors = \"equal\""].map(|keys| position(&body, keys).0);
+    assert!(cell.distance(equal) > 1e-5, "{cell} {equal}");
+    assert_eq!([position(&body, "").0, position(&body, "unit = \"N\"").0], [equal, cell]);
+    assert_eq!(position(&body, "unit = \"N\"\nsensors = \"equal\"").0, equal);
+    let pascal = |keys: &str| position(&body, &format!("unit = \"Pa\"\n{keys}")).0;
+    assert_eq!([pascal(""), pascal("sensors = \"cell\"")], [equal; 2], "a pressure always weighs by its cell");
+    // Buttons of one size, as the layout has it: there is nothing to ask.
+    assert!(position(&body, "").1.is_empty());
+    body.taxels[3].area *= 2.0;
+    let said = position(&body, "").1;
+    assert!(said.len() == 1 && said[0].contains("`sensors = \"equal\"`"), "{said:?}");
+    for known in ["sensors = \"equal\"", "sensors = \"cell\"", "unit = \"N\"", "unit = \"Pa\""] {
+        assert!(position(&body, known).1.is_empty(), "{known}");
+    }
+    let without = engine(&body, Scene::default(), None, BackendKind::Cpu);
+    assert!(without.remarks().is_empty(), "without touches there is nothing to weigh");
+}
+
+#[test]
 fn touches_are_of_pressures() {
     let body = hand();
     let scene = scene().letters(vec![Letter { receptor: Receptor::Change, ..Letter::default() }]);
