@@ -114,7 +114,10 @@ impl Dots {
         let mut slices = Vec::with_capacity(2 * colours.len());
         for (taxel, (&colour, touched)) in colours.iter().zip(touched).enumerate() {
             match touched {
-                Some(rim) => slices.push(self.slice(taxel, middle, (TOUCHED_RIM, LIFT + 0.05), *rim, (0.0, TAU))),
+                // A lift is in radii of the slice: the disc stays in front.
+                Some(rim) => {
+                    slices.push(self.slice(taxel, middle, (TOUCHED_RIM, LIFT / TOUCHED_RIM), *rim, (0.0, TAU)));
+                }
                 None if rims => slices.push(self.slice(taxel, middle, (RIM, LIFT), colour::RIM, (0.0, TAU))),
                 None => {}
             }

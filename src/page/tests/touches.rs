@@ -90,11 +90,11 @@ fn a_trail_leads_through_every_frame_and_ends_with_its_touch() {
     let ages: Vec<f64> = trail.iter().map(|point| number(&point["ago"])).collect();
     assert!(ages.is_sorted_by(|a, b| a > b) && ages[0] <= 1.0 && ages[0] > 0.94, "{ages:?}");
     assert!((24..=34).contains(&ages.len()), "of viewers who see one frame too: {}", ages.len());
-    // It moves along x, 20 mm in two seconds.
+    // It moves along x, 10 mm in two seconds, by the areas of both cells not evenly.
     let places: Vec<f64> = trail.iter().map(|point| number(&point["position"][0])).collect();
     assert!(places.is_sorted(), "{places:?}");
     let way = number(&touch["position"][0]) - places[0];
-    assert!(way > 0.005 && way < 0.015, "{way}");
+    assert!(way > 0.002 && way < 0.01, "{way}");
     assert!(trail.iter().all(|point| point["frame"] == 0));
     // A jump back: what came later is no part of it. Frames on the way are passed through.
     let (state, again) = (bench.engine.percepts().clone(), bench.frame(1.0, values(0.5)));
