@@ -37,7 +37,8 @@ fn words() -> Value {
     list_of(&json!({"type": "string"}))
 }
 
-fn object(properties: Map<String, Value>) -> Value {
+fn object<'n>(properties: impl IntoIterator<Item = (&'n str, Value)>) -> Value {
+    let properties: Map<String, Value> = properties.into_iter().map(|(name, of)| (name.to_owned(), of)).collect();
     json!({"type": "object", "properties": properties})
 }
 
@@ -88,8 +89,7 @@ fn touch() -> Value {
         ("wrench", wrench),
         ("flags", words()),
     ];
-    let all = head.into_iter().chain(columns).chain(tail);
-    object(all.map(|(name, of)| (name.to_owned(), of)).collect())
+    object(head.into_iter().chain(columns).chain(tail))
 }
 
 fn field() -> Value {
@@ -111,8 +111,7 @@ fn field() -> Value {
         ),
         ("flags", words()),
     ];
-    let all = head.into_iter().chain(columns).chain(tail);
-    object(all.map(|(name, of)| (name.to_owned(), of)).collect())
+    object(head.into_iter().chain(columns).chain(tail))
 }
 
 fn self_contact() -> Value {
@@ -129,7 +128,7 @@ fn self_contact() -> Value {
         ("distance", described("number", "Between the two places, m.")),
         ("angle", described("number", "Between the normals, rad.")),
     ];
-    object(properties.map(|(name, of)| (name.to_owned(), of)).into_iter().collect())
+    object(properties)
 }
 
 #[cfg(test)]

@@ -58,7 +58,8 @@ fn limbs_that_send_frames_are_one_skin_whose_touches_are_found_once() {
     let fields = SIDES.map(|(field, _)| field);
     let whole = undistributed(&place, &fields);
     let sides = fields.map(|field| undistributed(&place, &[field]));
-    assert_eq!(whole, [taxels_of(fields[0]).into_iter().chain(taxels_of(fields[1])).map(u64::from).collect()]);
+    let all: BTreeSet<u64> = fields.iter().flat_map(|field| taxels_of(field)).map(u64::from).collect();
+    assert_eq!(whole, [all]);
     assert!(sides.iter().all(|side| side.len() == 1 && *side != whole), "one side is another touch");
 
     let outputs = ["--outputs", "touches,touches.taxels,total"];

@@ -117,8 +117,8 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
     let wrenches = of("/left/somatic/wrench/fore_arm");
     let of_link: BTreeMap<u64, f64> = wrenches.iter().map(|wrench| (stamp_ns(wrench), pull(wrench))).collect();
     assert!(wrenches.len() == times.len() && of_link.len() == percepts[0].len(), "{} wrenches", wrenches.len());
-    let of_touches: BTreeMap<u64, Vec<f64>> =
-        of("/left/somatic/touch_wrenches").iter().fold(BTreeMap::new(), |mut all, wrench| {
+    let of_touches =
+        of("/left/somatic/touch_wrenches").iter().fold(BTreeMap::<u64, Vec<f64>>::new(), |mut all, wrench| {
             all.entry(stamp_ns(wrench)).or_default().push(pull(wrench));
             all
         });
