@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use somatic::signal::Quantity;
-use somatic::sink::{FieldNames, Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableName, TableWish};
+use somatic::sink::{FieldNames, Flow, InputFrames, News, Session, Sink, SinkSpec, SinkTarget, TableName};
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Precision, Result};
 
 use self::serve::{give, give_lines, opened, serve};
@@ -103,8 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
     let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
     let input = Input::named(&asked)?;
-    let table =
-        TableWish::new(asked.outputs(), asked.touches().is_some(), arguments.wide).on_stdout(arguments.table)?;
+    let table = asked.tables(arguments.wide).on_stdout(arguments.table)?;
     if arguments.table.is_some() && !sinks.iter().any(SinkSpec::is_table_on_stdout) {
         return Err(Error::usage("--table is for a table on standard output; add --sink csv:-"));
     }

@@ -191,6 +191,9 @@ impl Engine {
         post.finish(&raw, &mut self.percepts, &mut self.post, Some(&mut *self.backend))?;
         if let Some(on_skin) = &mut self.on_skin {
             on_skin.find((&self.plan, &self.links), frames, &raw, self.intake.stale(), &mut self.percepts);
+            if let Some(check) = &mut check {
+                check.take_several(&raw, &self.percepts);
+            }
         }
         if let Some(check) = &mut check {
             check.finish(&post, &raw, first_bound)?;

@@ -8,7 +8,7 @@ use super::post::{Post, PostFieldState, PostState};
 use crate::backend::bounds::{BoundedReference, CellBound};
 use crate::backend::{BackendState, FieldState, RawBatch};
 use crate::error::Result;
-use crate::percept::{Outputs, Percepts, Precision};
+use crate::percept::{Flags, Outputs, Percepts, Precision};
 use crate::scene::Plan;
 use crate::signal::Frame;
 use crate::stage::limit::Limit;
@@ -104,6 +104,14 @@ impl Check {
         Ok(())
     }
 
+    /// Takes from `percepts` which fields several touches are on: touches are made once, of the backend's own pressures.
+    pub(super) fn take_several(&mut self, raw: &RawBatch<'_>, percepts: &Percepts) {
+        let cells = raw.first * percepts.fields()..(raw.first + raw.frames) * percepts.fields();
+        for (right, flags) in self.right.flags[cells.clone()].iter_mut().zip(&percepts.flags[cells]) {
+            *right |= *flags & Flags::SEVERAL;
+        }
+    }
+
     /// Adds the bounds of motion in the world, which hang on those of positions, to `bounds`. `before` is what was kept of each
     /// field's position before this frame.
     fn bound_world_motion(&mut self, dt_s: f64, before: &[world_motion::Memory], bounds: &mut [CellBound]) {
@@ -149,7 +157,7 @@ mod tests {
     use crate::backend::agreement::{Agreement, compare};
     use crate::body::Body;
     use crate::engine::{Engine, Options};
-    use crate::percept::{COLUMNS, Column, Flags, Measure, Outputs, Percept, Store, Values};
+    use crate::percept::{COLUMNS, Column, Measure, Outputs, Percept, Store, Values};
     use crate::scene::Scene;
     use crate::signal::{Pose, RawValue};
     use crate::stage::limit::Limit;

@@ -304,8 +304,8 @@ fn a_contact_under_pressures_in_pascal_has_its_force_in_newtons() {
     let (pitch, text) = (5e-3, presses(1.7e-3, [0.0; 2], INDENTERS[0], ""));
     let with = |unit: &str| {
         let edit = |calibration: String| {
-            assert!(calibration.contains("[all]\n"), "{calibration}");
-            calibration.replacen("[all]\n", &format!("[all]\nunit = \"{unit}\"\n"), 1)
+            assert!(calibration.contains("unit = \"N\"\n"), "{calibration}");
+            calibration.replacen("unit = \"N\"", &format!("unit = \"{unit}\""), 1)
         };
         fitted_under(OrientationBy::Fit, &grid(pitch, 6), &text, "grid", edit).percepts
     };

@@ -30,7 +30,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("scene", vec!["error", "length", "percept", "signal", "body", "field", "stage", "touch"]),
         ("backend", [&below_backend[..], &["parallel"]].concat()),
         ("engine", [&below_backend[..], &["backend", "parallel", "touch"]].concat()),
-        ("gains", [&below_backend[..], &["backend", "engine"]].concat()),
+        ("gains", [&below_backend[..], &["backend", "engine", "touch"]].concat()),
         ("wire", vec!["error"]),
         ("limb", vec!["error", "signal", "wire"]),
         ("recording", vec!["error", "output", "signal", "body"]),

@@ -244,7 +244,8 @@ fn taxels_weigh_as_their_sensors_cover_their_cells() {
     // Buttons of one size, as the layout has it: there is nothing to ask.
     assert!(position(&body, "").1.is_empty());
     body.taxels[3].area *= 2.0;
-    let said = position(&body, "").1;
+    assert!(position(&body, "").1.is_empty(), "nobody has begun to calibrate");
+    let said = position(&body, "gain = 0.5").1;
     assert!(said.len() == 1 && said[0].contains("`sensors = \"equal\"`"), "{said:?}");
     for known in ["sensors = \"equal\"", "sensors = \"cell\"", "unit = \"N\"", "unit = \"Pa\""] {
         assert!(position(&body, known).1.is_empty(), "{known}");

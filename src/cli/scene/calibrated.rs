@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::scene::AskedOutputs;
 use somatic::signal::Quantity;
+use somatic::sink::TableWish;
 use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{Body, Calibration, Error, Outputs, Receptor, Result, touch};
 
@@ -36,6 +37,11 @@ impl RunOptions {
         let is_in_vain =
             self.outputs.is_empty() && !self.letters.is_empty() && !self.letters.contains(&Receptor::Sustained);
         (!is_in_vain).then(|| self.touch.unwrap_or_default().options(outputs))
+    }
+
+    /// What tables have of that.
+    pub(in crate::cli) fn tables(&self, wide: bool) -> TableWish {
+        TableWish::new(self.outputs(), self.touches().is_some(), wide)
     }
 
     /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation and an export
