@@ -15,7 +15,8 @@ pub(super) fn text(seen: &Inspection) -> String {
     let taxel = |index: usize| {
         let taxel = &body.taxels[index];
         let node = skin.taxels().binary_search_by_key(&taxel.id, |node| node.id).ok().map(|node| &skin.taxels()[node]);
-        let mean_normal = node.map(|node| skin.link_from_body(node.link).transform_vector3(node.mean_normal).to_array());
+        let mean_normal =
+            node.map(|node| skin.link_from_body(node.link).transform_vector3(node.mean_normal).to_array());
         json!({
             "id": taxel.id,
             "link": link(taxel.link),
