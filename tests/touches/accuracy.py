@@ -5,12 +5,12 @@
 BODY is a file, or hand, mat or humanoid. Prints a table and, last, a JSON object. What was simulated stays in FOLDER, and is used
 again. --seconds stops simulating after that time; what is done is measured.
 
-**Presses** are at random places of the skin: balls, fingertips, rods, and straps that wrap, of sizes for 13.8 mm from taxel to taxel,
-times --size [default: the body's spacing by that]. The same indenters with the same forces press a flat sheet of taxels that are
+**Presses** are at random places of the skin: balls, fingertips, rods, and straps that wrap, of sizes for cells of (16.2 mm)²,
+times --size [default: the root of the body's mean cell, its spacing, by 16.2 mm]. The same indenters with the same forces press a flat sheet of taxels that are
 scattered alike, as many on a square metre. σ of the layer is half a spacing. Sensors feel the force on their cells; they have 10
 bits, noise of 1.5 % of the press's largest value, and are 0 up to six σ, as `simulate` has it. Touches of three taxels and more
-count. Errors of position are distances from the truth's place; those of axes angles to the truth's axis, of touches with an
-anisotropy of at least 0.4 that are not wrapped. A touch is good if the RMS angle of its taxels' normals is under 35° and under 15 %
+count. Errors of position are distances from the truth's place; those of axes angles to the truth's axis in its tangent plane, of touches
+with an anisotropy of at least 0.4 that are not wrapped. A touch is good if the RMS angle of its taxels' normals is under 35° and under 15 %
 of its taxels have fewer than five edges.
 
 **Strokes** are rods' and balls' of 20 to 80 mm; each should be one identity from onset to release.
@@ -41,6 +41,12 @@ def degrees(a, b):
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), abs(a @ b))))
 
 
+def turned(vector, normal, other):
+    """`vector` turned as the plane across `normal` is turned to that across `other`, on the shortest way."""
+    axis, cos = np.cross(normal, other), normal @ other
+    return vector * cos + np.cross(axis, vector) + axis * (axis @ vector) / (1 + cos)
+
+
 def quantiles(values):
     return [float(np.median(values)), float(np.quantile(values, 0.95))] if len(values) else [None, None]
 
@@ -63,17 +69,22 @@ def judge(skin, truth, touches):
     found["touches"], found["links"] = len(touches), len({link for touch in touches for link in touch["links"]})
     found["ids"] = [touch["id"] for touch in touches]
     if truth["axis"] is not None and main.get("principal_axis") and not found["wrapped"] and main["anisotropy"] >= ANISOTROPY:
-        found["axis"] = degrees(body(main["link"], main["principal_axis"], False), body(truth["link"], truth["axis"], False))
+        # The axis lies in the plane of the taxel in the middle, the truth's in that of its place.
+        base = nodes[np.linalg.norm(skin.at[nodes] - found["at"], axis=1).argmin()]
+        axis, normal = body(main["link"], main["principal_axis"], False), body(truth["link"], truth["normal"], False)
+        if skin.mean_normal[base] @ normal > 0:
+            found["axis"] = degrees(turned(axis, skin.mean_normal[base], normal), body(truth["link"], truth["axis"], False))
     return found
 
 
-def press(scene, count, rng, inner=None):
-    """Presses and what was found of them, by press."""
+def random_presses(scene, count, seed, inner=None):
+    """Presses at random places; one seed gives the same indenters and forces on every body."""
+    shapes, places = np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2])
     presses = []
     for index in range(count):
         kind = KINDS[index % 4]
-        shape, newton = indenter(kind, scene.size, rng)
-        presses.append(Press(kind, shape, [random_place(scene.skin, rng, inner)], newton))
+        shape, newton = indenter(kind, scene.size, shapes)
+        presses.append(Press(kind, shape, [random_place(scene.skin, places, inner)], newton))
     return presses
 
 
@@ -81,8 +92,7 @@ def presses(scene, flat, arguments):
     spacing = spacing_of(scene.skin)
     found = {}
     for name, of, inner in (("body", scene, None), ("flat", flat, 0.3)):
-        rng = np.random.default_rng(arguments.seed)
-        of.press(press(of, arguments.presses, rng, inner), arguments.seconds)
+        of.press(random_presses(of, arguments.presses, arguments.seed, inner), arguments.seconds)
         found[name] = of.found(np.random.default_rng(arguments.seed + 1), noise=0.015, judge=judge)
     result = {"presses": len(found["body"]), "flat": len(found["flat"]), "spacing_mm": 1e3 * spacing}
     counted = {name: [one for one in of if one["active"] >= 3] for name, of in found.items()}
@@ -189,7 +199,7 @@ def main():
     listed = folder / f"{body.stem}.json"
     listed.write_text(somatic("inspect", body, "--json"))
     skin = Skin(body, listed)
-    size = arguments.size or spacing_of(skin) / 0.0138
+    size = arguments.size or spacing_of(skin) / 0.0162
     began = time.time()
     result = {"body": body.stem, "size": size}
     if arguments.presses:

@@ -38,7 +38,7 @@ def spacing_of(skin):
 
 
 def indenter(kind, size, rng):
-    """Keys of an indenter `size` times as large as for taxels 13.8 mm apart, and its force."""
+    """Keys of an indenter `size` times as large as for cells of (16.2 mm)², and its force."""
     between = lambda low, high: float(rng.uniform(low, high) * size)
     newton = float(rng.uniform(2, 12) * size**2)
     angle = f"angle_deg = {rng.uniform(0, 180):.3f}\n"
@@ -55,7 +55,7 @@ def indenter(kind, size, rng):
         case "pair":
             radius = between(0.007, 0.010)
             # The contact's width is about that of the pressure under the layer.
-            width = 2 * (2 * radius * 0.0015 * size) ** 0.5 + 0.0138 * size
+            width = 2 * (2 * radius * 0.0015 * size) ** 0.5 + 0.0162 * size
             return f'indenter = "pair"\nradius_m = {radius:.6f}\napart_m = {rng.uniform(1.5, 4) * width / 2:.6f}\n' + angle, newton
     raise ValueError(kind)
 
@@ -213,7 +213,7 @@ class Scene:
             for row in csv.DictReader(file):
                 vector = lambda *keys: [float(row[key]) for key in keys] if row[keys[0]] else None
                 found.setdefault(int(row["frame"]), []).append({
-                    "link": row["link"], "place": vector("x", "y", "z"),
+                    "link": row["link"], "place": vector("x", "y", "z"), "normal": vector("nx", "ny", "nz"),
                     "axis": vector("principal_axis_x", "principal_axis_y", "principal_axis_z"),
                 })
         return found
