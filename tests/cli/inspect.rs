@@ -21,7 +21,14 @@ fn json_has_the_keys_that_others_lean_on() {
     let taxels = body["taxels"].as_array().unwrap();
     assert_eq!(taxels.len(), 40);
     for taxel in taxels {
-        assert_eq!(keys(taxel), ["id", "link", "position", "normal", "area", "modality"]);
+        assert_eq!(keys(taxel), ["id", "link", "position", "normal", "area", "modality", "cell", "mean_normal"]);
+        assert!(
+            taxel["cell"].as_f64().unwrap() > taxel["area"].as_f64().unwrap(),
+            "sensors are 5 mm wide, 12 mm apart: {taxel}"
+        );
+        let square =
+            |key: &str| taxel[key].as_array().unwrap().iter().map(|it| it.as_f64().unwrap().powi(2)).sum::<f64>();
+        assert!((square("mean_normal") - 1.0).abs() < 1e-9, "{taxel}");
         assert_eq!((taxel["position"].as_array().unwrap().len(), &taxel["modality"]), (3, &json!("pressure")));
     }
     let others = ["findings", "lint", "near_at_rest", "coverage", "edges", "islands", "without_edge", "few_edges"];

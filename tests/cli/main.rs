@@ -67,6 +67,7 @@ mod skips;
 mod sources;
 mod tables;
 mod touches;
+mod touches_oracle;
 mod tradeoff;
 #[cfg(unix)]
 mod tune;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use somatic::body::Body;
 use somatic::field::TaxelGraph;
+use somatic::touch::{Reading, Skin};
 
 /// Neighbours of a taxel of which it has fewer at the end of the skin only.
 const FEW: usize = 3;
@@ -24,6 +25,11 @@ impl SkinGraph {
     pub(super) fn new(graph: TaxelGraph, body: &Body) -> Self {
         let islands = graph.islands(body);
         Self { graph, islands }
+    }
+
+    /// What touches are found in.
+    pub(super) fn skin(&self, body: &Body) -> Skin {
+        Skin::new(body, &self.graph, |_| Reading::default())
     }
 
     /// Ids of the pressure taxels with fewer than `number` neighbours, and at least `least`.

@@ -11,8 +11,12 @@ use super::inspection::Inspection;
 pub(super) fn text(seen: &Inspection) -> String {
     let Inspection { body, fields, .. } = seen;
     let link = |index: usize| body.links[index].name.as_str();
+    let skin = seen.graph.skin(body);
     let taxel = |index: usize| {
         let taxel = &body.taxels[index];
+        let node = skin.taxels().binary_search_by_key(&taxel.id, |node| node.id).ok().map(|node| &skin.taxels()[node]);
+        let mean_normal =
+            node.map(|node| skin.link_from_body(node.link).transform_vector3(node.mean_normal).to_array());
         json!({
             "id": taxel.id,
             "link": link(taxel.link),
@@ -20,6 +24,8 @@ pub(super) fn text(seen: &Inspection) -> String {
             "normal": taxel.normal_in_link.to_array(),
             "area": taxel.area,
             "modality": taxel.modality.name(),
+            "cell": node.map(|node| node.cell_m2),
+            "mean_normal": mean_normal,
         })
     };
     let mut whole = json!({
