@@ -25,7 +25,7 @@ fn random(flags: &[&str]) -> Option<Value> {
     let threads = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"].map(|name| (name, "1"));
     let output = Command::new(python).args(arguments).args(flags).envs(threads).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
-    let text = String::from_utf8(output.stdout).unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
     eprintln!("{}{text}", stderr(&output));
     Some(serde_json::from_str(&text).unwrap())
 }
