@@ -28,7 +28,7 @@ fn seen(command: &str, typed: &str) -> Option<(String, Option<i32>)> {
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
     if !typed.is_empty() {
-        std::thread::sleep(Duration::from_secs(1));
+        std::thread::sleep(Duration::from_secs(2));
         stdin.write_all(typed.as_bytes()).unwrap();
     }
     let output = child.wait_with_output().unwrap();

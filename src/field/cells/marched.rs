@@ -64,11 +64,13 @@ pub(super) struct Marched<'a> {
     /// Per vertex its longest edge, m.
     longest_m: Vec<f64>,
     queue: BinaryHeap<Coming>,
+    /// Nothing is farther from a point than this, m.
+    reach_m: f64,
 }
 
 impl<'a> Marched<'a> {
-    /// On those triangles of `topology` for which `is_marched` is true.
-    pub(super) fn new(topology: &'a Topology, is_marched: impl Fn(u32) -> bool) -> Self {
+    /// On those triangles of `topology` for which `is_marched` is true, as far as `reach_m` from a point.
+    pub(super) fn new(topology: &'a Topology, is_marched: impl Fn(u32) -> bool, reach_m: f64) -> Self {
         let vertices = topology.positions.len();
         let mut first = vec![0_u32; vertices + 1];
         let edges = || (0..topology.triangles.len() as u32).filter(|&triangle| is_marched(triangle));
@@ -91,7 +93,7 @@ impl<'a> Marched<'a> {
             next[from] += 1;
         }
         let near = if leaving.is_empty() { Vec::new() } else { vec![Near::default(); vertices] };
-        Self { topology, coming: near.clone(), near, first, leaving, longest_m, queue: BinaryHeap::new() }
+        Self { topology, coming: near.clone(), near, first, leaving, longest_m, queue: BinaryHeap::new(), reach_m }
     }
 
     /// Adds the point `site` in a triangle, with its distances to the corners.
@@ -130,12 +132,12 @@ impl<'a> Marched<'a> {
 
     /// Whether `site` is the first from there at `vertex`, and near enough to count.
     fn arrive(&mut self, vertex: u32, site: u32, distance_m: f64) -> bool {
-        let reach_m = self.longest_m[vertex as usize];
+        let beyond_m = self.longest_m[vertex as usize];
         let near = &mut self.near[vertex as usize];
         let count = near.count as usize;
         // Beyond the triangles at a border nothing is to be known of the point on the other side.
-        let is_far = count > 0 && distance_m > near.distances_m[0] + reach_m;
-        if count == KEPT || is_far || near.to(site).is_some() {
+        let is_far = count > 0 && distance_m > near.distances_m[0] + beyond_m;
+        if count == KEPT || is_far || distance_m > self.reach_m || near.to(site).is_some() {
             return false;
         }
         (near.sites[count], near.distances_m[count], near.count) = (site, distance_m, near.count + 1);

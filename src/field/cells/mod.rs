@@ -85,7 +85,8 @@ impl Cells {
         Self::made(topology, places, MARCHED_PER_POINT, None)
     }
 
-    /// The same with [`Self::surface`].
+    /// The same with [`Self::surface`], of what is no farther from a point than points are apart where they are farthest: bare surface
+    /// around a skin is in no cell.
     pub(crate) fn with_surface(topology: &Topology, places: &[SurfacePlace]) -> Self {
         Self::made(topology, places, MARCHED_PER_POINT, Some(Parts::default()))
     }
@@ -117,12 +118,13 @@ impl Cells {
         let is_fine = fine_parts(topology, starts.iter().map(|&start| places[start].triangle), marched_per_point);
         let is_fine = |triangle: u32| is_fine[topology.part[triangle as usize] as usize];
         let spacing = Spacing::of(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
+        let reach_m = if parts_of_cells.is_some() { spacing.largest_m() } else { f64::INFINITY };
         let most = CUTS_PER_TRIANGLE * topology.triangles.len() + CUTS_PER_POINT * starts.len();
         let refined = refine(topology, spacing.shortest_edge(), |p| spacing.edge_at(p), most);
         match refined {
             None => {
                 let starts = starts.iter().map(|&start| (start, places[start])).collect();
-                cells.divide(topology, starts, is_fine, parts_of_cells.as_mut());
+                cells.divide(topology, (starts, reach_m), is_fine, parts_of_cells.as_mut());
                 cells.surface =
                     parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(topology, |triangle| triangle, topology));
             }
@@ -141,7 +143,7 @@ impl Cells {
                 };
                 let parent = |part: u32| refined.parent[cut.given[part as usize] as usize];
                 let starts = starts.iter().filter_map(|&start| within(start)).collect();
-                cells.divide(&cut, starts, |part| is_fine(parent(part)), parts_of_cells.as_mut());
+                cells.divide(&cut, (starts, reach_m), |part| is_fine(parent(part)), parts_of_cells.as_mut());
                 cells.surface = parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(&cut, parent, topology));
             }
         }
@@ -151,19 +153,20 @@ impl Cells {
         cells
     }
 
-    /// Divides `topology` among `starts`: points, each with its place. Parts whose triangles are fine are marched over.
+    /// Divides what of `topology` is within `reach_m` of `starts`: points, each with its place. Parts whose triangles are fine are marched
+    /// over.
     fn divide(
         &mut self,
         topology: &Topology,
-        starts: Vec<(usize, SurfacePlace)>,
+        (starts, reach_m): (Vec<(usize, SurfacePlace)>, f64),
         is_fine: impl Fn(u32) -> bool,
         mut parts: Option<&mut Parts>,
     ) {
         let most = WINDOWS_PER_TRIANGLE * topology.triangles.len() + WINDOWS_PER_POINT * starts.len();
         let most = most.clamp(MIN_WINDOWS, MAX_WINDOWS);
-        let mut waves = Waves::extending(topology, f64::INFINITY, most);
+        let mut waves = Waves::extending(topology, reach_m, most);
         let mut is_reached = vec![false; topology.parts()];
-        let mut marched = Marched::new(topology, &is_fine);
+        let mut marched = Marched::new(topology, &is_fine, reach_m);
         let mut is_marched = vec![false; topology.parts()];
         for (triangle, &part) in (0..).zip(&topology.part) {
             is_marched[part as usize] |= is_fine(triangle);

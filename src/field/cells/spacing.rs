@@ -32,6 +32,12 @@ impl Spacing {
         Self { tree, nearest_m, least_m }
     }
 
+    /// The largest distance of a point to its nearest other, m; infinite where no two are apart.
+    pub(super) fn largest_m(&self) -> f64 {
+        let largest_m = self.nearest_m.iter().copied().filter(|m| m.is_finite()).fold(0.0, f64::max);
+        if largest_m > 0.0 { largest_m } else { f64::INFINITY }
+    }
+
     /// Maximum length of an edge anywhere, m.
     pub(super) fn shortest_edge(&self) -> f64 {
         EDGE_SHARE * self.least_m

@@ -282,3 +282,25 @@ fn the_surface_in_triangles_is_that_of_the_cells() {
         assert!(Cells::new(&topology, &places).surface.is_empty());
     }
 }
+
+#[test]
+fn bare_surface_around_a_skin_is_in_no_cell() {
+    // Points on a tenth of a sheet, 0.02 apart, with coarse triangles and with fine ones, which are marched over.
+    for columns in [2, 150] {
+        let topology = sheet(columns, columns, |p| p.extend(0.0));
+        let at = |i: u32| DVec3::new(0.011 + 0.02 * f64::from(i % 5), 0.013 + 0.02 * f64::from(i / 5), 0.0);
+        let points: Vec<DVec3> = (0..25).map(at).collect();
+        let cells = Cells::with_surface(&topology, &places(&topology, &points));
+        let far = |corners: &[DVec3; 3]| {
+            let middle = corners.iter().sum::<DVec3>() / 3.0;
+            points.iter().map(|point| point.distance(middle)).fold(f64::INFINITY, f64::min)
+        };
+        let farthest = cells.surface.iter().map(|(_, corners)| far(corners)).fold(0.0, f64::max);
+        assert!(farthest < 0.04, "{columns}: {farthest}");
+        // One in the middle has all of its cell; the skin is a hundredth of the sheet.
+        assert!((cells.areas[12] / 4e-4 - 1.0).abs() < 0.03, "{columns}: {}", cells.areas[12]);
+        let all: f64 = cells.areas.iter().sum();
+        assert!(all > 0.01 && all < 0.03, "{columns}: {all}");
+        assert!((Cells::new(&topology, &places(&topology, &points)).areas.iter().sum::<f64>() - 1.0).abs() < 1e-6);
+    }
+}
