@@ -247,9 +247,10 @@ fn book() -> Book {
     };
     bench.process(&[posed]);
     add_frame(&mut book, &mut bench, &mut viewer, "posed, and what is wrong with taxels");
-    // The hand where the arm is: its first taxel lies on the arm's first.
-    let at = |x: f64, z: f64| Pose { translation: DVec3::new(x, 0.0, z), rotation: DQuat::IDENTITY };
-    let pose = vec![("arm".to_owned(), at(1.0, 0.0)), ("hand".to_owned(), at(0.99, 0.01))];
+    // The hand where the arm is, turned over: its first taxel lies on the arm's first and faces it.
+    let at =
+        |x: f64, z: f64, turn: f64| Pose { translation: DVec3::new(x, 0.0, z), rotation: DQuat::from_rotation_x(turn) };
+    let pose = vec![("arm".to_owned(), at(1.0, 0.0, 0.0)), ("hand".to_owned(), at(0.99, -0.03, std::f64::consts::PI))];
     let meeting = Frame { pose, ..bench.frame(0.08, [5.0, 0.0, 0.0, 3.0, 0.0]) };
     bench.process(&[meeting]);
     add_frame(&mut book, &mut bench, &mut viewer, "two links touch");

@@ -286,7 +286,8 @@ fn the_surface_in_triangles_is_that_of_the_cells() {
 #[test]
 fn bare_surface_around_a_skin_is_in_no_cell() {
     // Points on a tenth of a sheet, 0.02 apart, with coarse triangles and with fine ones, which are marched over.
-    for columns in [2, 150] {
+    // Triangles that are reached in part are in a cell.
+    for (columns, most) in [(2, 0.06), (150, 0.035)] {
         let topology = sheet(columns, columns, |p| p.extend(0.0));
         let at = |i: u32| DVec3::new(0.011 + 0.02 * f64::from(i % 5), 0.013 + 0.02 * f64::from(i / 5), 0.0);
         let points: Vec<DVec3> = (0..25).map(at).collect();
@@ -296,11 +297,11 @@ fn bare_surface_around_a_skin_is_in_no_cell() {
             points.iter().map(|point| point.distance(middle)).fold(f64::INFINITY, f64::min)
         };
         let farthest = cells.surface.iter().map(|(_, corners)| far(corners)).fold(0.0, f64::max);
-        assert!(farthest < 0.04, "{columns}: {farthest}");
+        assert!(farthest < most, "{columns}: {farthest}");
         // One in the middle has all of its cell; the skin is a hundredth of the sheet.
         assert!((cells.areas[12] / 4e-4 - 1.0).abs() < 0.03, "{columns}: {}", cells.areas[12]);
         let all: f64 = cells.areas.iter().sum();
-        assert!(all > 0.01 && all < 0.03, "{columns}: {all}");
+        assert!(all > 0.01 && all < 0.05, "{columns}: {all}");
         assert!((Cells::new(&topology, &places(&topology, &points)).areas.iter().sum::<f64>() - 1.0).abs() < 1e-6);
     }
 }
