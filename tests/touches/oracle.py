@@ -300,7 +300,11 @@ class Comparison:
         for one in choices:
             off = {}
             told_spread, spread = touch.get("spread"), one.get("spread")
-            if (told_spread is None) != (spread is None) or (spread is not None and np.abs(np.array(told_spread) - spread).max() > SAME * 1e-2):
+            # Moments are rounded in proportion to the larger one; a root makes much of little.
+            squares = None if told_spread is None or spread is None else np.array([told_spread, spread]) ** 2
+            if (told_spread is None) != (spread is None) or (
+                squares is not None and np.abs(squares[0] - squares[1]).max() > 1e-11 * squares.max()
+            ):
                 off["spread"] = (told_spread, spread)
             anisotropy, told = one.get("anisotropy"), touch.get("anisotropy")
             if (told is None) != (anisotropy is None) or (told is not None and abs(told - anisotropy) > 10 * SAME):

@@ -37,6 +37,10 @@ const MIN_WINDOWS: usize = 500_000;
 /// Parts of a surface with more triangles than this for each point are marched over instead of covered by windows.
 const MARCHED_PER_POINT: usize = 400;
 
+/// How far cells of a surface reach that is asked for, in distances of a point to its nearest other where that is largest: over the
+/// side of a thin part that has points on its faces alone.
+const REACH: f64 = 2.0;
+
 /// Polygons with less of a triangle than this are rounding errors.
 const MIN_SHARE: f64 = 1e-12;
 
@@ -85,8 +89,7 @@ impl Cells {
         Self::made(topology, places, MARCHED_PER_POINT, None)
     }
 
-    /// The same with [`Self::surface`], of what is no farther from a point than points are apart where they are farthest: bare surface
-    /// around a skin is in no cell.
+    /// The same with [`Self::surface`], of what is within [`REACH`] of a point: bare surface around a skin is in no cell.
     pub(crate) fn with_surface(topology: &Topology, places: &[SurfacePlace]) -> Self {
         Self::made(topology, places, MARCHED_PER_POINT, Some(Parts::default()))
     }
@@ -118,7 +121,7 @@ impl Cells {
         let is_fine = fine_parts(topology, starts.iter().map(|&start| places[start].triangle), marched_per_point);
         let is_fine = |triangle: u32| is_fine[topology.part[triangle as usize] as usize];
         let spacing = Spacing::of(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
-        let reach_m = if parts_of_cells.is_some() { spacing.largest_m() } else { f64::INFINITY };
+        let reach_m = if parts_of_cells.is_some() { REACH * spacing.largest_m() } else { f64::INFINITY };
         let most = CUTS_PER_TRIANGLE * topology.triangles.len() + CUTS_PER_POINT * starts.len();
         let refined = refine(topology, spacing.shortest_edge(), |p| spacing.edge_at(p), most);
         match refined {

@@ -287,7 +287,7 @@ fn the_surface_in_triangles_is_that_of_the_cells() {
 fn bare_surface_around_a_skin_is_in_no_cell() {
     // Points on a tenth of a sheet, 0.02 apart, with coarse triangles and with fine ones, which are marched over.
     // Triangles that are reached in part are in a cell.
-    for (columns, most) in [(2, 0.06), (150, 0.035)] {
+    for (columns, most) in [(2, 0.09), (150, 0.055)] {
         let topology = sheet(columns, columns, |p| p.extend(0.0));
         let at = |i: u32| DVec3::new(0.011 + 0.02 * f64::from(i % 5), 0.013 + 0.02 * f64::from(i / 5), 0.0);
         let points: Vec<DVec3> = (0..25).map(at).collect();
@@ -301,7 +301,7 @@ fn bare_surface_around_a_skin_is_in_no_cell() {
         // One in the middle has all of its cell; the skin is a hundredth of the sheet.
         assert!((cells.areas[12] / 4e-4 - 1.0).abs() < 0.03, "{columns}: {}", cells.areas[12]);
         let all: f64 = cells.areas.iter().sum();
-        assert!(all > 0.01 && all < 0.05, "{columns}: {all}");
+        assert!(all > 0.01 && all < 0.1, "{columns}: {all}");
         assert!((Cells::new(&topology, &places(&topology, &points)).areas.iter().sum::<f64>() - 1.0).abs() < 1e-6);
     }
 }
