@@ -97,10 +97,7 @@ impl Wish<'_> {
         if let Some(read) = read {
             let touches = somatic::touch::Options::default();
             let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).coordinates(Coordinates::Anchor);
-            let options_of_engine = somatic::Options::default()
-                .scene(scene)
-                .backend(BackendKind::Cpu)
-                .batch(1);
+            let options_of_engine = somatic::Options::default().scene(scene).backend(BackendKind::Cpu).batch(1);
             let options_of_engine = match self.calibration {
                 Some(calibration) => options_of_engine.calibration(calibration.inner.clone()),
                 None => options_of_engine,

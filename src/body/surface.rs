@@ -261,6 +261,11 @@ impl Line {
         // Beyond the tolerance of a triangle's sides, and rounding.
         let margin =
             (high - low).max_element() * 1e-6 + low.abs().max(high.abs()).max(self.p.abs()).max_element() * 1e-12;
+        // Most boxes are beside it: that is cheaper to see.
+        let around = self.direction.abs() * self.reach + DVec3::splat(margin);
+        if (low - self.p).cmpgt(around).any() || (self.p - high).cmpgt(around).any() {
+            return false;
+        }
         let (mut from, mut to) = (-self.reach - margin, self.reach + margin);
         for axis in 0..3 {
             let [a, b] = [low[axis] - margin - self.p[axis], high[axis] + margin - self.p[axis]];
