@@ -38,7 +38,8 @@ pub(super) struct TopicKind {
     pub(super) kind: BagType,
     /// Whether it is only there where something is told.
     pub(super) is_optional: bool,
-    /// Whether a frame has several of its messages: one for each touch.
+    /// Whether a frame has several of its messages: one for each touch. Bags have room for all.
+    #[cfg_attr(not(feature = "ros2"), allow(dead_code, reason = "live topics alone have a depth"))]
     pub(super) has_several: bool,
 }
 
