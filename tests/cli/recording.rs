@@ -748,7 +748,8 @@ fn another_library_reads_the_same() {
     assert!(shown.len() > 20 && shown.len() <= felt.len());
     for entity in shown {
         let known = felt.iter().any(|touch| {
-            entity["id"] == touch["id"].to_string()
+            let id = touch["id"].to_string();
+            entity["id"] == id
                 && entity["frame_id"] == touch["in"]
                 && entity["sphere"] == touch["position"]
                 && entity["arrows"] == 1
