@@ -6,7 +6,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use somatic::output::OutputPaths;
-use somatic::sink::{Flow, SinkSpec, TableWish};
+use somatic::sink::{Flow, SinkSpec};
 use somatic::source::{Cut, SourceSpec, VendorOptions};
 use somatic::{BackendKind, Engine, Error, Frame};
 
@@ -89,7 +89,7 @@ pub(crate) fn run<'py>(
         let label = label.unwrap_or_else(|| file.display().to_string());
         let mut session = about.session(&label, all_fields, true);
         session.is_recorded = true;
-        let target = sink.target(&mut OutputPaths::new(force, [&file]), &[], TableWish::new(about.outputs, false))?;
+        let target = sink.target(&mut OutputPaths::new(force, [&file]), &[], about.tables(false))?;
         let mut sink = target.open(&session)?;
         let mut frames = vec![Frame::missing(0.0, source.taxels().len()); BATCH];
         let mut count = 0;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use somatic::recording::CALIBRATION;
 use somatic::signal::Quantity;
-use somatic::sink::{FieldNames, RecordPart, Session};
+use somatic::sink::{FieldNames, RecordPart, Session, TableWish};
 use somatic::{Body, Engine, Outputs, Plan, Precision};
 
 /// The run that percepts are of.
@@ -23,6 +23,11 @@ pub(crate) struct Run {
 }
 
 impl Run {
+    /// What tables of its percepts have.
+    pub(crate) fn tables(&self, wide: bool) -> TableWish {
+        TableWish::new(self.outputs, self.plan.touch_outputs().is_some(), wide)
+    }
+
     pub(crate) fn new(
         engine: &Engine,
         body: &Arc<Body>,

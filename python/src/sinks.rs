@@ -6,7 +6,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use somatic::Error;
 use somatic::output::OutputPaths;
-use somatic::sink::{Flow, Sink, SinkSpec, TableWish};
+use somatic::sink::{Flow, Sink, SinkSpec};
 
 use crate::error::{OrRaise, usage};
 use crate::percepts::PyPercepts;
@@ -98,7 +98,7 @@ impl File {
     fn start(&self, run: &Run) -> Result<Box<dyn Sink + Send>, Error> {
         let mut session = run.session("Python", self.all_fields, true);
         session.header = self.header;
-        let table = TableWish::new(run.outputs, self.wide);
+        let table = run.tables(self.wide);
         let none: [PathBuf; 0] = [];
         self.spec.target(&mut OutputPaths::new(self.force, none), &[], table)?.open(&session)
     }
