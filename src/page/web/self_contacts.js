@@ -42,7 +42,9 @@ export class SelfContactsPanel {
       row.append(name, make("span", "contact-total", withUnit(total, "P", model.quantity)));
     }
     const angle = Math.round((contact.angle * 180) / Math.PI);
-    row.append(make("span", "contact-numbers", `${(contact.distance * 1e3).toFixed(1)} mm apart · ${angle}°`));
+    row.append(
+      make("span", "contact-numbers", `${(contact.distance * 1e3).toFixed(1)} mm apart · ${angle}°`),
+    );
     return row;
   }
 }
