@@ -11,8 +11,8 @@ use rstar::{AABB, RTree};
 use super::model::Body;
 use super::surface::{Hit, Line, SurfaceIndex, Triangle};
 
-/// Searches in one link's frame before search indices of surfaces are made there: one takes as long as a search without it.
-const SEARCHES_WITHOUT_INDEX: u32 = 2;
+/// Searches in one link's frame before search indices of surfaces are made there, which takes as long.
+const SEARCHES_WITHOUT_INDEX: u32 = 16;
 
 /// Triangles as the mesh has them, with their numbers and whether the link's frame mirrors them.
 type TriangleTree = RTree<GeomWithData<CachedEnvelope<Triangle>, (u32, bool)>>;

@@ -8,6 +8,8 @@ use crate::scene::Plan;
 pub struct Rung {
     /// The outputs of all up to here.
     pub outputs: Outputs,
+    /// Whether touches are among them.
+    pub touches: bool,
     /// Which of [`Plan::explain`] they are; what is timed is shown at the last.
     pub stages: std::ops::Range<usize>,
 }
@@ -17,17 +19,18 @@ pub struct Rung {
 #[must_use]
 pub fn ladder(plan: &Plan) -> Vec<Rung> {
     let mut rungs: Vec<Rung> = Vec::new();
-    let mut outputs = Outputs::empty();
+    let (mut outputs, mut touches) = (Outputs::empty(), false);
     let explained = plan.explain();
     for (index, stage) in explained.iter().enumerate() {
         let asked = plan.outputs() & stage.gives;
-        let is_contact = stage.name == "contact";
-        if !(stage.runs && (is_contact || !asked.is_empty())) {
+        let (is_contact, is_touches) = (stage.name == "contact", stage.name == "touches");
+        if !(stage.runs && (is_contact || is_touches || !asked.is_empty())) {
             continue;
         }
+        touches |= is_touches;
         outputs |= if is_contact && asked.is_empty() { Outputs::TOTAL } else { asked };
         let first = rungs.last().map_or(0, |rung| rung.stages.end);
-        rungs.push(Rung { outputs, stages: first..index + 1 });
+        rungs.push(Rung { outputs, touches, stages: first..index + 1 });
     }
     rungs
 }
@@ -54,7 +57,8 @@ mod tests {
             let above = &explained[rungs.last().unwrap().stages.end..];
             assert!(above.iter().all(|stage| !stage.runs), "{outputs:?}: {above:?}");
             assert!(rungs.last().unwrap().outputs.contains(outputs), "{outputs:?}");
-            assert!(rungs.windows(2).all(|pair| pair[0].outputs != pair[1].outputs));
+            let what = |rung: &Rung| (rung.outputs, rung.touches);
+            assert!(rungs.windows(2).all(|pair| what(&pair[0]) != what(&pair[1])));
         }
     }
 }

@@ -231,7 +231,7 @@ impl ReferencePercepts {
     fn new(body: &Body, options: &Options, played: &TestFrames) -> Result<Self> {
         let fitted = if has_layer(options) { Outputs::FIT } else { Outputs::empty() };
         let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS | fitted;
-        let scene = Scene { outputs, knobs: Knobs::default(), ..options.scene.clone() };
+        let scene = Scene { outputs, knobs: Knobs::default(), touches: None, ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
         let mut engine = Engine::new(body, options)?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
@@ -264,7 +264,8 @@ impl Trial {
         }
         // Orientations are compared at their centroids.
         let outputs = options.scene.outputs | Outputs::CENTROID;
-        let scene = Scene { knobs, outputs, ..options.scene.clone() };
+        // Touches are the same whatever the knobs.
+        let scene = Scene { knobs, outputs, touches: None, ..options.scene.clone() };
         let mut engine = Engine::in_charts(body, recharted, Options { scene, backend, batch, ..options.clone() })?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
         let (times_us, errors) = (Vec::new(), ErrorSamples::default());

@@ -116,7 +116,7 @@ impl<'a> Truths<'a> {
     /// The scene in which percepts are held against the truth.
     fn scene(&self, knobs: Knobs) -> Scene {
         let outputs = self.options.scene.outputs & (Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) | Outputs::CENTROID;
-        Scene { knobs, outputs, letters: vec![Letter::default()], ..self.options.scene.clone() }
+        Scene { knobs, outputs, touches: None, letters: vec![Letter::default()], ..self.options.scene.clone() }
     }
 
     /// Calls `on` with the number of each frame, what it reports of each field that is touched, and the truth.

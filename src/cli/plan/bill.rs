@@ -62,9 +62,10 @@ impl Bill {
         let plan = engine.plan();
         let knobs = Combination { backend: kind, knobs: plan.knobs() };
         let rungs = ladder(plan);
-        let made = |outputs: Outputs| -> Result<Engine> {
+        let made = |outputs: Outputs, touches: bool| -> Result<Engine> {
             let mut options = options.clone().backend(kind);
             options.scene.outputs = outputs;
+            options.scene.touches = options.scene.touches.filter(|_| touches);
             if !outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) {
                 // A way to an orientation is for those that have one.
                 options.scene.knobs.orientation_by = OrientationBy::AsAsked;
@@ -73,8 +74,8 @@ impl Bill {
         };
         let planned = plan.explain().into_iter();
         let mut stages: Vec<Stage> = planned.map(|planned| Stage { planned, measured_us: None }).collect();
-        let mut engines = rungs.iter().map(|rung| made(rung.outputs)).collect::<Result<Vec<_>>>()?;
-        let compared = (kind != BackendKind::Reference).then(|| made(plan.outputs())).transpose()?;
+        let mut engines = rungs.iter().map(|rung| made(rung.outputs, rung.touches)).collect::<Result<Vec<_>>>()?;
+        let compared = (kind != BackendKind::Reference).then(|| made(plan.outputs(), true)).transpose()?;
         engines.extend(compared);
         let (mut played, on) = played(asked, recorded, body, batch, &mut engines)?;
         let mut compared = (kind != BackendKind::Reference).then(|| engines.pop()).flatten();

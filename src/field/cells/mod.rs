@@ -28,11 +28,14 @@ use crate::body::{NONE, Topology, area_vector, point_tree};
 const CUTS_PER_TRIANGLE: usize = 4;
 const CUTS_PER_POINT: usize = 60;
 
-/// Number of windows at which a surface counts as too rough: in all, per triangle, and where there are few of these.
+/// Number of windows at which a surface counts as too rough, and is marched over: in all, per triangle, and where there are few of these.
 const MAX_WINDOWS: usize = 40_000_000;
 const WINDOWS_PER_TRIANGLE: usize = 40;
 const WINDOWS_PER_POINT: usize = 10_000;
 const MIN_WINDOWS: usize = 500_000;
+
+/// The same per triangle and point where the surface of cells is asked for, which is so at each start: a second for thousands of points.
+const AT_START: [usize; 2] = [10, 300];
 
 /// Parts of a surface with more triangles than this for each point are marched over instead of covered by windows.
 const MARCHED_PER_POINT: usize = 400;
@@ -84,7 +87,7 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// The cells of `places` on `topology`. On a surface that is too rough nothing is in a cell.
+    /// The cells of `places` on `topology`. Where a surface is too fine or too rough for windows, areas are within 2 %.
     pub(crate) fn new(topology: &Topology, places: &[SurfacePlace]) -> Self {
         Self::made(topology, places, MARCHED_PER_POINT, None)
     }
@@ -157,7 +160,7 @@ impl Cells {
     }
 
     /// Divides what of `topology` is within `reach_m` of `starts`: points, each with its place. Parts whose triangles are fine are marched
-    /// over.
+    /// over, and so is all where windows are too many.
     fn divide(
         &mut self,
         topology: &Topology,
@@ -165,7 +168,9 @@ impl Cells {
         is_fine: impl Fn(u32) -> bool,
         mut parts: Option<&mut Parts>,
     ) {
-        let most = WINDOWS_PER_TRIANGLE * topology.triangles.len() + WINDOWS_PER_POINT * starts.len();
+        let [per_triangle, per_point] =
+            if parts.is_some() { AT_START } else { [WINDOWS_PER_TRIANGLE, WINDOWS_PER_POINT] };
+        let most = per_triangle * topology.triangles.len() + per_point * starts.len();
         let most = most.clamp(MIN_WINDOWS, MAX_WINDOWS);
         let mut waves = Waves::extending(topology, reach_m, most);
         let mut is_reached = vec![false; topology.parts()];
@@ -176,7 +181,7 @@ impl Cells {
         }
         // By triangle: the points in it, with the distances to its corners.
         let mut within: Vec<(u32, Candidate)> = Vec::new();
-        for (point, place) in starts {
+        for &(point, place) in &starts {
             let start = Start::new(topology, place.inward(), DVec3::X);
             for wedge in &start.wedges {
                 let squared = wedge.corners.map(DVec2::length_squared);
@@ -195,7 +200,14 @@ impl Cells {
         within.sort_by_key(|(triangle, candidate)| (*triangle, candidate.site));
         marched.run();
         if !waves.run() {
-            is_reached.iter_mut().zip(&is_marched).for_each(|(is_reached, is_marched)| *is_reached &= is_marched);
+            is_marched.fill(true);
+            marched = Marched::new(topology, |_| true, reach_m);
+            for (point, place) in starts {
+                for wedge in Start::new(topology, place.inward(), DVec3::X).wedges {
+                    marched.add(wedge.triangle, point as u32, wedge.corners.map(DVec2::length));
+                }
+            }
+            marched.run();
         }
         // Per edge the point that all of it belongs to on this side, if it is no border yet.
         let mut owner = vec![NONE; topology.across.len()];
