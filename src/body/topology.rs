@@ -16,7 +16,7 @@ const MIN_HEIGHT: f64 = 1e-9;
 
 /// Hashes whole numbers of a mesh, millions at once: three times as fast as the standard hasher, which guards against keys that are
 /// chosen to collide.
-pub(crate) type QuickHasher = rustc_hash::FxBuildHasher;
+pub(crate) type QuickHasher = foldhash::fast::FixedState;
 
 /// No triangle, vertex or part.
 pub const NONE: u32 = u32::MAX;
