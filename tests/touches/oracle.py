@@ -273,7 +273,9 @@ class Comparison:
         limit = np.linalg.norm(skin.at[members] - mean, axis=1).min()
         if away > limit + 1e-5:
             wrong["position"] = ("a taxel is nearer to the mean", away, limit)
-        best = skin.surface.nearest(mean, limit + 1e-4)
+        # Their cells are on the parts of the surface that they are on; inside a body others may be nearer.
+        parts = np.unique(skin.part[members])
+        best = skin.surface.nearest(mean, limit + 1e-4, parts)
         if best is None:
             return
         if away < np.linalg.norm(best - mean) - 1e-7:
@@ -287,7 +289,7 @@ class Comparison:
         if gaps[members].min() < 0.8 * others.min(initial=np.inf):
             self.excluded["_placed"] += 1
             if np.linalg.norm(position - best) > 1e-6:
-                near = skin.surface.nearest(mean, limit)
+                near = skin.surface.nearest(mean, limit, parts)
                 if near is not None and abs(away - np.linalg.norm(best - mean)) < 1e-9:
                     self.exclude({"nearest point"})
                 else:

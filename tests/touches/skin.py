@@ -111,6 +111,8 @@ class Skin:
             for node in members:
                 self.fields_of[node].append(name)
         self.surface = Surface(glb.triangles())
+        is_bare = len(self.surface.corners) == 0
+        self.part = None if is_bare else np.array([self.surface.part_at(place) for place in self.at])
         gaps = np.linalg.norm(self.at[:, None] - self.at[None], axis=2) if len(taxels) < 3000 else None
         if gaps is not None:
             np.fill_diagonal(gaps, np.inf)
@@ -158,17 +160,44 @@ class Surface:
         self.normals = across[sound] / np.linalg.norm(across[sound], axis=1)[:, None]
         self.middles = self.corners.mean(axis=1)
         self.radii = np.linalg.norm(self.corners - self.middles[:, None], axis=2).max(axis=1, initial=0)
+        self.part = parts(self.corners)
+
+    def part_at(self, place):
+        """The connected part of the surface that is nearest to `place`."""
+        within = np.linalg.norm(self.middles - place, axis=1).min() + 1e-9
+        near = self.near(place, within)
+        return self.part[near[np.linalg.norm(nearest_on(self.corners[near], place) - place, axis=1).argmin()]]
 
     def near(self, place, within):
         return np.flatnonzero(np.linalg.norm(self.middles - place, axis=1) <= within + self.radii)
 
-    def nearest(self, place, within):
-        """The point of the surface that is nearest to `place`, at most `within` away."""
+    def nearest(self, place, within, on=None):
+        """The point of the surface, or of its parts `on`, that is nearest to `place`, at most `within` away."""
         near = self.near(place, within)
+        if on is not None:
+            near = near[np.isin(self.part[near], on)]
         if len(near) == 0:
             return None
         found = nearest_on(self.corners[near], place)
         return found[np.linalg.norm(found - place, axis=1).argmin()]
+
+
+def parts(corners):
+    """Per triangle the number of the connected part that it is in: triangles are connected where they have a corner in common."""
+    _, corner = np.unique(np.round(corners.reshape(-1, 3), 7), axis=0, return_inverse=True)
+    corner = corner.reshape(-1, 3)
+    up = np.arange(corner.max(initial=-1) + 1)
+
+    def root(one):
+        while up[one] != one:
+            up[one] = up[up[one]]
+            one = up[one]
+        return one
+
+    for first, *others in corner.tolist():
+        for other in others:
+            up[root(other)] = root(first)
+    return np.array([root(first) for first in corner[:, 0].tolist()], int)
 
 
 def nearest_on(corners, p):
