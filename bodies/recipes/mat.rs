@@ -25,57 +25,120 @@ fn position(row: u32, column: u32) -> DVec3 {
     DVec3::new(from_middle(column, COLUMNS), THICKNESS, from_middle(row, ROWS))
 }
 
-/// A slab: the same outline at several heights, drawn in where the edges are rounded, closed by a fan at each end.
-fn slab() -> MeshData {
+/// Rows, or columns, of taxels in one square of the faces' grids.
+const TAXELS_A_SQUARE: u32 = 4;
+/// Squares of a face's grid, along x and z.
+const SQUARES: [u32; 2] = [COLUMNS / TAXELS_A_SQUARE, ROWS / TAXELS_A_SQUARE];
+
+/// A point of a slab's outline.
+#[derive(Clone, Copy)]
+struct Corner {
+    /// The middle of its arc; beside a side, the point `CORNER` further in. x and z, m.
+    centre: [f64; 2],
+    outward: [f64; 2],
+    /// The vertex of a face's grid, by column and row, that triangles join it with.
+    inner: [u32; 2],
+}
+
+/// Where vertex `index` of a face's grid lies along x (0) or z (1), m. The grid covers the taxels' cells.
+fn along(axis: usize, index: u32) -> f64 {
+    PITCH * f64::from(TAXELS_A_SQUARE) * (f64::from(index) - f64::from(SQUARES[axis]) / 2.0)
+}
+
+/// A quarter of a circle: sine and cosine of angles from 0 to 90°.
+fn quarter(steps: u32) -> impl DoubleEndedIterator<Item = (f64, f64)> {
+    (0..=steps).map(move |k| {
+        let angle = f64::from(k) / f64::from(steps) * std::f64::consts::FRAC_PI_2;
+        (libm::sin(angle), libm::cos(angle))
+    })
+}
+
+/// The outline, once around from +x over +z: rounded corners, and points beside the grid's lines along the sides.
+fn outline() -> Vec<Corner> {
     let half = [PITCH * f64::from(COLUMNS) / 2.0 + BORDER, PITCH * f64::from(ROWS) / 2.0 + BORDER];
-    let quarter = |steps: u32| {
-        (0..=steps).map(move |k| {
-            let angle = f64::from(k) / f64::from(steps) * std::f64::consts::FRAC_PI_2;
-            (libm::sin(angle), libm::cos(angle))
-        })
-    };
-    // From the middle of the underside outward, up, and in again: (inset, height, how far the normal looks up).
+    let mut outline = Vec::new();
+    for (corner, [x, z]) in [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].into_iter().enumerate() {
+        let centre = [x * (half[0] - CORNER), z * (half[1] - CORNER)];
+        let inner = [if x > 0.0 { SQUARES[0] } else { 0 }, if z > 0.0 { SQUARES[1] } else { 0 }];
+        let mut arc: Vec<[f64; 2]> = quarter(6).map(|(sin, cos)| [x * cos, z * sin]).collect();
+        // Each second arc runs the other way, so that the outline goes round once.
+        if corner % 2 == 1 {
+            arc.reverse();
+        }
+        outline.extend(arc.into_iter().map(|outward| Corner { centre, outward, inner }));
+        // The side that follows, to the next corner: across the mat after the first and third corner, along it after the others.
+        let axis = corner % 2;
+        let mut lines: Vec<u32> = (1..SQUARES[axis]).collect();
+        if corner < 2 {
+            lines.reverse();
+        }
+        let mut outward = [0.0; 2];
+        outward[1 - axis] = [z, x][axis];
+        outline.extend(lines.into_iter().map(|line| {
+            let (mut centre, mut inner) = (centre, inner);
+            (centre[axis], inner[axis]) = (along(axis, line), line);
+            Corner { centre, outward, inner }
+        }));
+    }
+    outline
+}
+
+/// A slab: the same outline at several heights, drawn in where the edges are rounded, closed by a grid at each end. Its squares
+/// keep triangles short: geodesic distances from a taxel cross few of them.
+fn slab() -> MeshData {
+    // From the underside outward, up, and in again: (inset, height, how far the normal looks out, and up).
     let mut rings: Vec<(f64, f64, f64, f64)> =
         quarter(4).map(|(sin, cos)| (EDGE * (1.0 - sin), EDGE * (1.0 - cos), sin, -cos)).collect();
     rings.extend(quarter(4).map(|(sin, cos)| (EDGE * (1.0 - cos), THICKNESS - EDGE * (1.0 - sin), cos, sin)));
-    let mut outline: Vec<([f64; 2], [f64; 2])> = Vec::new();
-    for (corner, (x, z)) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].into_iter().enumerate() {
-        let arc: Vec<[f64; 2]> = quarter(6).map(|(sin, cos)| [x * cos, z * sin]).collect();
-        let centre = [x * (half[0] - CORNER), z * (half[1] - CORNER)];
-        // Each second arc runs the other way, so that the outline goes round once.
-        let arc: Box<dyn Iterator<Item = [f64; 2]>> =
-            if corner % 2 == 0 { Box::new(arc.into_iter()) } else { Box::new(arc.into_iter().rev()) };
-        outline.extend(arc.map(|outward| (centre, outward)));
-    }
+    let outline = outline();
     let mut mesh = MeshData::default();
     let mut vertex = |position: DVec3, normal: DVec3| {
         mesh.positions.push(position.as_vec3().to_array());
         mesh.normals.push(normal.as_vec3().to_array());
         mesh.positions.len() as u32 - 1
     };
-    let bottom = vertex(DVec3::ZERO, DVec3::NEG_Y);
-    let top = vertex(DVec3::Y * THICKNESS, DVec3::Y);
+    let [underside, upside] = [(0.0, DVec3::NEG_Y), (THICKNESS, DVec3::Y)].map(|(height, normal)| {
+        let first = vertex(DVec3::new(along(0, 0), height, along(1, 0)), normal);
+        for place in 1..(SQUARES[0] + 1) * (SQUARES[1] + 1) {
+            let [column, row] = [place % (SQUARES[0] + 1), place / (SQUARES[0] + 1)];
+            vertex(DVec3::new(along(0, column), height, along(1, row)), normal);
+        }
+        first
+    });
     let mut loops: Vec<Vec<u32>> = Vec::new();
     for (inset, height, out, up) in rings {
         let radius = CORNER - inset;
-        let corners = outline.iter().map(|(centre, outward)| {
+        let corners = outline.iter().map(|Corner { centre, outward, .. }| {
             let place = DVec3::new(centre[0] + outward[0] * radius, height, centre[1] + outward[1] * radius);
             vertex(place, DVec3::new(outward[0] * out, up, outward[1] * out))
         });
         loops.push(corners.collect());
     }
-    let around =
-        |ring: &[u32]| -> Vec<(u32, u32)> { ring.iter().copied().zip(ring.iter().copied().cycle().skip(1)).collect() };
-    for (a, b) in around(&loops[0]) {
-        mesh.triangles.push([bottom, a, b]);
-    }
+    let after = |k: usize| (k + 1) % outline.len();
     for pair in loops.windows(2) {
-        for ((a, b), (c, d)) in around(&pair[0]).into_iter().zip(around(&pair[1])) {
+        for k in 0..outline.len() {
+            let [a, b, c, d] = [pair[0][k], pair[0][after(k)], pair[1][k], pair[1][after(k)]];
             mesh.triangles.extend([[a, c, b], [b, c, d]]);
         }
     }
-    for (a, b) in around(&loops[loops.len() - 1]) {
-        mesh.triangles.push([top, b, a]);
+    for (first, ring, is_upside) in [(underside, &loops[0], false), (upside, &loops[loops.len() - 1], true)] {
+        let at = |[column, row]: [u32; 2]| first + row * (SQUARES[0] + 1) + column;
+        let mut add = |[a, b, c]: [u32; 3]| mesh.triangles.push(if is_upside { [a, c, b] } else { [a, b, c] });
+        for k in 0..outline.len() {
+            let [inner, next] = [outline[k].inner, outline[after(k)].inner].map(at);
+            add([inner, ring[k], ring[after(k)]]);
+            if inner != next {
+                add([inner, ring[after(k)], next]);
+            }
+        }
+        for row in 0..SQUARES[1] {
+            for column in 0..SQUARES[0] {
+                let [near, right] = [at([column, row]), at([column + 1, row])];
+                let [up, far] = [at([column, row + 1]), at([column + 1, row + 1])];
+                add([near, right, far]);
+                add([near, far, up]);
+            }
+        }
     }
     mesh
 }

@@ -19,7 +19,7 @@ source = ${JSON.stringify(example("gripper-touch.csv"))}
 joints = ${JSON.stringify(example("gripper.urdf"))}
 joint_states = ${JSON.stringify(example("gripper-joints.csv"))}
 up = "z"
-outputs = ["total", "position", "self_contacts"]
+outputs = ["total", "position", "touches", "self_contacts"]
 `;
   writeFileSync(join(folder, "gripper.scene.toml"), scene);
   const server = await view("gripper.scene.toml");
@@ -61,7 +61,10 @@ outputs = ["total", "position", "self_contacts"]
   );
   await picture(page, "self_contacts.png");
   await page.click(".contact-side >> nth=1");
-  await page.waitForFunction(() => document.querySelector("#percept-title").textContent === "right");
+  const touch = closed.list[0].sides[1].touch;
+  await page.waitForSelector(".touch.chosen");
+  const row = await page.locator(".touch.chosen").innerText();
+  assert.ok(row.includes(`#${touch}`) && row.includes("right"), row);
 
   await seek(page, 1.62);
   assert.equal((await seen()).list.length, 0);

@@ -47,7 +47,7 @@ const chart = new ChartPanel(
   choices,
 );
 const touches = new TouchPanel(model, choices, (touch) => lookAtTaxels([...touch.taxels]));
-const selfContacts = new SelfContactsPanel(model);
+const selfContacts = new SelfContactsPanel(model, choices);
 new Boards(model);
 new Log(
   model,

@@ -1,4 +1,4 @@
-/** Where the robot touches itself: a list of the self-contacts. */
+/** Where the robot touches itself: a list of the self-contacts. A click on a side chooses its touch. */
 
 import { byId, make, setText } from "./dom.js";
 import { withUnit } from "./format.js";
@@ -8,9 +8,11 @@ import { withUnit } from "./format.js";
 export class SelfContactsPanel {
   /**
    * @param {import("./model.js").Model} model
+   * @param {import("./choices.js").Choices} choices
    */
-  constructor(model) {
+  constructor(model, choices) {
     this.model = model;
+    this.choices = choices;
     this.panel = byId("self-contacts-panel", HTMLElement);
     this.list = byId("self-contacts", HTMLElement);
     this.count = byId("self-contact-count", HTMLElement);
@@ -34,11 +36,13 @@ export class SelfContactsPanel {
 
   /** @param {SelfContact} contact */
   row(contact) {
-    const { model } = this;
+    const { model, choices } = this;
     const row = make("div", "contact");
     row.append(make("i"));
-    for (const { link, total } of contact.sides) {
-      const name = make("span", "contact-side", model.welcome?.links[link]?.name ?? "");
+    for (const { link, touch, total } of contact.sides) {
+      const isListed = model.welcome?.touches;
+      const name = make(isListed ? "button" : "span", "contact-side", model.welcome?.links[link]?.name ?? "");
+      if (isListed) name.addEventListener("click", () => choices.chooseTouch(touch));
       row.append(name, make("span", "contact-total", withUnit(total, "P", model.quantity)));
     }
     const angle = Math.round((contact.angle * 180) / Math.PI);
