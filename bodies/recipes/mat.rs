@@ -30,9 +30,9 @@ const TAXELS_A_SQUARE: u32 = 4;
 /// Squares of a face's grid, along x and z.
 const SQUARES: [u32; 2] = [COLUMNS / TAXELS_A_SQUARE, ROWS / TAXELS_A_SQUARE];
 
-/// A point of a slab's outline.
+/// A point of the outline.
 #[derive(Clone, Copy)]
-struct Corner {
+struct OutlinePoint {
     /// The middle of its arc; beside a side, the point `CORNER` further in. x and z, m.
     centre: [f64; 2],
     outward: [f64; 2],
@@ -54,7 +54,7 @@ fn quarter(steps: u32) -> impl DoubleEndedIterator<Item = (f64, f64)> {
 }
 
 /// The outline, once around from +x over +z: rounded corners, and points beside the grid's lines along the sides.
-fn outline() -> Vec<Corner> {
+fn outline() -> Vec<OutlinePoint> {
     let half = [PITCH * f64::from(COLUMNS) / 2.0 + BORDER, PITCH * f64::from(ROWS) / 2.0 + BORDER];
     let mut outline = Vec::new();
     for (corner, [x, z]) in [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].into_iter().enumerate() {
@@ -65,7 +65,7 @@ fn outline() -> Vec<Corner> {
         if corner % 2 == 1 {
             arc.reverse();
         }
-        outline.extend(arc.into_iter().map(|outward| Corner { centre, outward, inner }));
+        outline.extend(arc.into_iter().map(|outward| OutlinePoint { centre, outward, inner }));
         // The side that follows, to the next corner: across the mat after the first and third corner, along it after the others.
         let axis = corner % 2;
         let mut lines: Vec<u32> = (1..SQUARES[axis]).collect();
@@ -77,7 +77,7 @@ fn outline() -> Vec<Corner> {
         outline.extend(lines.into_iter().map(|line| {
             let (mut centre, mut inner) = (centre, inner);
             (centre[axis], inner[axis]) = (along(axis, line), line);
-            Corner { centre, outward, inner }
+            OutlinePoint { centre, outward, inner }
         }));
     }
     outline
@@ -97,7 +97,7 @@ fn slab() -> MeshData {
         mesh.normals.push(normal.as_vec3().to_array());
         mesh.positions.len() as u32 - 1
     };
-    let [underside, upside] = [(0.0, DVec3::NEG_Y), (THICKNESS, DVec3::Y)].map(|(height, normal)| {
+    let [underside, topside] = [(0.0, DVec3::NEG_Y), (THICKNESS, DVec3::Y)].map(|(height, normal)| {
         let first = vertex(DVec3::new(along(0, 0), height, along(1, 0)), normal);
         for place in 1..(SQUARES[0] + 1) * (SQUARES[1] + 1) {
             let [column, row] = [place % (SQUARES[0] + 1), place / (SQUARES[0] + 1)];
@@ -108,7 +108,7 @@ fn slab() -> MeshData {
     let mut loops: Vec<Vec<u32>> = Vec::new();
     for (inset, height, out, up) in rings {
         let radius = CORNER - inset;
-        let corners = outline.iter().map(|Corner { centre, outward, .. }| {
+        let corners = outline.iter().map(|OutlinePoint { centre, outward, .. }| {
             let place = DVec3::new(centre[0] + outward[0] * radius, height, centre[1] + outward[1] * radius);
             vertex(place, DVec3::new(outward[0] * out, up, outward[1] * out))
         });
@@ -121,9 +121,9 @@ fn slab() -> MeshData {
             mesh.triangles.extend([[a, c, b], [b, c, d]]);
         }
     }
-    for (first, ring, is_upside) in [(underside, &loops[0], false), (upside, &loops[loops.len() - 1], true)] {
+    for (first, ring, is_top) in [(underside, &loops[0], false), (topside, &loops[loops.len() - 1], true)] {
         let at = |[column, row]: [u32; 2]| first + row * (SQUARES[0] + 1) + column;
-        let mut add = |[a, b, c]: [u32; 3]| mesh.triangles.push(if is_upside { [a, c, b] } else { [a, b, c] });
+        let mut add = |[a, b, c]: [u32; 3]| mesh.triangles.push(if is_top { [a, c, b] } else { [a, b, c] });
         for k in 0..outline.len() {
             let [inner, next] = [outline[k].inner, outline[after(k)].inner].map(at);
             add([inner, ring[k], ring[after(k)]]);

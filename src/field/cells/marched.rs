@@ -9,6 +9,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use super::super::geodesic::Start;
 use super::polygon::Candidate;
 use crate::body::Topology;
 
@@ -96,14 +97,16 @@ impl<'a> Marched<'a> {
         Self { topology, coming: near.clone(), near, first, leaving, longest_m, queue: BinaryHeap::new(), reach_m }
     }
 
-    /// Adds the point `site` in a triangle, with its distances to the corners.
-    pub(super) fn add(&mut self, triangle: u32, site: u32, distances_m: [f64; 3]) {
-        let corners = self.topology.triangles[triangle as usize];
-        self.queue.extend(corners.into_iter().zip(distances_m).map(|(vertex, distance_m)| Coming {
-            distance_m,
-            vertex,
-            site,
-        }));
+    /// Adds the point `site`, from which distances start at `start`.
+    pub(super) fn add(&mut self, start: &Start, site: u32) {
+        for wedge in &start.wedges {
+            let corners = self.topology.triangles[wedge.triangle as usize];
+            self.queue.extend(corners.into_iter().zip(wedge.corners).map(|(vertex, corner)| Coming {
+                distance_m: corner.length(),
+                vertex,
+                site,
+            }));
+        }
     }
 
     /// Finds all distances.

@@ -115,23 +115,22 @@ impl Cells {
         let first = first_of_place(topology, places, &positions);
         let is_first = |&point: &usize| first[point] as usize == point;
         let starts: Vec<usize> = (0..places.len()).filter(is_first).collect();
-        let mut cells = Self {
-            areas: vec![0.0; places.len()],
-            first,
-            borders: BTreeMap::new(),
-            pieces: Vec::new(),
-            surface: Vec::new(),
-        };
+        let mut cells = Self::empty(first);
         let is_fine = fine_parts(topology, starts.iter().map(|&start| places[start].triangle), marched_per_point);
         let is_fine = |triangle: u32| is_fine[topology.part[triangle as usize] as usize];
         let spacing = Spacing::of(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
         let reach_m = if parts_of_cells.is_some() { REACH * spacing.largest_m() } else { f64::INFINITY };
         let most = CUTS_PER_TRIANGLE * topology.triangles.len() + CUTS_PER_POINT * starts.len();
+        let [per_triangle, per_point] =
+            if parts_of_cells.is_some() { AT_START } else { [WINDOWS_PER_TRIANGLE, WINDOWS_PER_POINT] };
+        let most_windows = |surface: &Topology| {
+            (per_triangle * surface.triangles.len() + per_point * starts.len()).clamp(MIN_WINDOWS, MAX_WINDOWS)
+        };
         let refined = refine(topology, spacing.shortest_edge(), |p| spacing.edge_at(p), most);
         match refined {
             None => {
                 let starts = starts.iter().map(|&start| (start, places[start])).collect();
-                cells.divide(topology, (starts, reach_m), is_fine, parts_of_cells.as_mut());
+                cells.divide(topology, (starts, reach_m), is_fine, most_windows(topology), parts_of_cells.as_mut());
                 cells.surface =
                     parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(topology, |triangle| triangle, topology));
             }
@@ -150,7 +149,8 @@ impl Cells {
                 };
                 let parent = |part: u32| refined.parent[cut.given[part as usize] as usize];
                 let starts = starts.iter().filter_map(|&start| within(start)).collect();
-                cells.divide(&cut, (starts, reach_m), |part| is_fine(parent(part)), parts_of_cells.as_mut());
+                let is_fine = |part| is_fine(parent(part));
+                cells.divide(&cut, (starts, reach_m), is_fine, most_windows(&cut), parts_of_cells.as_mut());
                 cells.surface = parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(&cut, parent, topology));
             }
         }
@@ -160,20 +160,23 @@ impl Cells {
         cells
     }
 
+    /// Cells that have nothing yet, of points of which each has its cell in common with `first` of it.
+    fn empty(first: Vec<u32>) -> Self {
+        let areas = vec![0.0; first.len()];
+        Self { areas, first, borders: BTreeMap::new(), pieces: Vec::new(), surface: Vec::new() }
+    }
+
     /// Divides what of `topology` is within `reach_m` of `starts`: points, each with its place. Parts whose triangles are fine are marched
-    /// over, and so is all where windows are too many.
+    /// over, and so is all where windows are more than `most_windows`.
     fn divide(
         &mut self,
         topology: &Topology,
         (starts, reach_m): (Vec<(usize, SurfacePlace)>, f64),
         is_fine: impl Fn(u32) -> bool,
+        most_windows: usize,
         mut parts: Option<&mut Parts>,
     ) {
-        let [per_triangle, per_point] =
-            if parts.is_some() { AT_START } else { [WINDOWS_PER_TRIANGLE, WINDOWS_PER_POINT] };
-        let most = per_triangle * topology.triangles.len() + per_point * starts.len();
-        let most = most.clamp(MIN_WINDOWS, MAX_WINDOWS);
-        let mut waves = Waves::extending(topology, reach_m, most);
+        let mut waves = Waves::extending(topology, reach_m, most_windows);
         let mut is_reached = vec![false; topology.parts()];
         let mut marched = Marched::new(topology, &is_fine, reach_m);
         let mut is_marched = vec![false; topology.parts()];
@@ -191,9 +194,7 @@ impl Cells {
             let part = topology.part[place.triangle as usize] as usize;
             is_reached[part] = true;
             if is_marched[part] {
-                for wedge in &start.wedges {
-                    marched.add(wedge.triangle, point as u32, wedge.corners.map(DVec2::length));
-                }
+                marched.add(&start, point as u32);
             } else {
                 waves.add(&start, point as u32);
             }
@@ -204,9 +205,7 @@ impl Cells {
             is_marched.fill(true);
             marched = Marched::new(topology, |_| true, reach_m);
             for (point, place) in starts {
-                for wedge in Start::new(topology, place.inward(), DVec3::X).wedges {
-                    marched.add(wedge.triangle, point as u32, wedge.corners.map(DVec2::length));
-                }
+                marched.add(&Start::new(topology, place.inward(), DVec3::X), point as u32);
             }
             marched.run();
         }

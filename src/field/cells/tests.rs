@@ -305,3 +305,20 @@ fn bare_surface_around_a_skin_is_in_no_cell() {
         assert!((Cells::new(&topology, &places(&topology, &points)).areas.iter().sum::<f64>() - 1.0).abs() < 1e-6);
     }
 }
+
+#[test]
+fn all_is_marched_over_where_windows_are_too_many() {
+    let topology = sheet(40, 40, |p| p.extend(0.0));
+    let at = |i: u32| DVec3::new(0.1 + 0.2 * f64::from(i % 5), 0.1 + 0.2 * f64::from(i / 5), 0.0);
+    let points: Vec<DVec3> = (0..25).map(at).collect();
+    for most_windows in [0, 100, usize::MAX] {
+        let mut cells = Cells::empty((0..25).collect());
+        let starts = places(&topology, &points).into_iter().enumerate().collect();
+        cells.divide(&topology, (starts, f64::INFINITY), |_| false, most_windows, None);
+        assert!((cells.areas.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{most_windows}");
+        assert_near(&cells.areas, &[0.04; 25], 0.02);
+        // Across corners single ones may be of no length to speak of.
+        let long = cells.borders.values().filter(|border| border.length_m > 0.1).count();
+        assert_eq!(long, 40, "{most_windows}");
+    }
+}
