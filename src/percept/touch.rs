@@ -69,7 +69,7 @@ impl TouchFlags {
 pub struct Touch {
     /// Lasts from onset to release, and is never used again.
     pub id: u64,
-    /// Time since its onset, s.
+    /// Time since its onset to the nanosecond, s.
     pub age_s: f64,
     /// Index of the link with most of its total.
     pub link: u32,

@@ -21,6 +21,13 @@ pub(super) struct Kept {
     pub(super) trail: Trail,
 }
 
+impl Kept {
+    /// Its age at `t_s`, s. Clocks tell nanoseconds; what is finer comes from the difference of two numbers.
+    pub(super) fn age_s(&self, t_s: f64) -> f64 {
+        ((t_s - self.began_s).max(0.0) * 1e9).round() / 1e9
+    }
+}
+
 /// A pressed taxel of a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct KeptTaxel {

@@ -293,7 +293,7 @@ impl Touches {
             let velocity = kept.trail.follow(t_s, place.position, self.options.velocity_over_s);
             let link_from_body = self.skin.link_from_body(touch.link);
             touch.velocity = velocity.map(|velocity| link_from_body.transform_vector3(velocity));
-            (touch.id, touch.age_s) = (named.id, (t_s - kept.began_s).max(0.0));
+            (touch.id, touch.age_s) = (named.id, kept.age_s(t_s));
             if velocity.is_none() {
                 touch.flags |= TouchFlags::YOUNG;
             }

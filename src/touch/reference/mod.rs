@@ -120,7 +120,7 @@ impl Reference {
                     past.positions = then.positions.clone();
                 }
             }
-            touch.age_s = (frame.t_s - past.began_s).max(0.0);
+            touch.age_s = ((frame.t_s - past.began_s).max(0.0) * 1e9).round() / 1e9;
             touch.velocity = velocity(&mut past.positions, frame.t_s, touch.position, options.velocity_over_s);
             if touch.velocity.is_none() {
                 touch.flags |= TouchFlags::YOUNG;
