@@ -30,8 +30,8 @@ const CUTS_PER_POINT: usize = 60;
 
 /// Number of windows at which a surface counts as too rough, and is marched over: in all, per triangle, and where there are few of these.
 const MAX_WINDOWS: usize = 40_000_000;
-const WINDOWS_PER_TRIANGLE: usize = 40;
-const WINDOWS_PER_POINT: usize = 10_000;
+const WINDOWS_PER_TRIANGLE: usize = 10;
+const WINDOWS_PER_POINT: usize = 1_000;
 const MIN_WINDOWS: usize = 500_000;
 
 /// The same per triangle and point where the surface of cells is asked for, which is so at each start: a second for thousands of points.
