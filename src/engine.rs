@@ -18,6 +18,7 @@ mod skin_fits;
 mod skin_sigmas;
 mod spread;
 mod state;
+mod touch_check;
 
 use self::cadence::OnChange;
 use self::check::Check;
@@ -392,7 +393,10 @@ impl Engine {
         };
         self.advance(Input::of(frames), Some(&mut check), None)?;
         let names: Vec<String> = (0..self.plan.fields.len()).map(|field| self.plan.label(field)).collect();
-        let agreement = compare(&check.right, &check.bounds, &self.percepts, &names);
+        let mut agreement = compare(&check.right, &check.bounds, &self.percepts, &names);
+        if let Some(touches) = &mut check.touches {
+            agreement.merge(touches.found());
+        }
         self.check = Some(check);
         Ok((&self.percepts, agreement))
     }

@@ -48,6 +48,7 @@ class _Comparison(TypedDict):
 class _Verified(TypedDict):
     agrees: bool
     percepts: int
+    touches: int
     failed: int
     failures: list[str]
     quantities: dict[str, _Comparison]

@@ -19,6 +19,7 @@ pub(crate) fn told<'py>(py: Python<'py>, sum: &Agreement) -> PyResult<Bound<'py,
     let found = PyDict::new(py);
     found.set_item("agrees", sum.holds())?;
     found.set_item("percepts", sum.percepts)?;
+    found.set_item("touches", sum.touches)?;
     found.set_item("failed", sum.failed)?;
     found.set_item("failures", &sum.failures)?;
     found.set_item("quantities", quantities)?;

@@ -16,9 +16,12 @@ use crate::stage::limit::Limit;
 pub struct Agreement {
     /// Percepts (a field in a frame) looked at.
     pub percepts: u64,
-    /// Per quantity, what came of comparing it: every output under its name, `flags` and `contact`.
+    /// Touches of the whole body (a touch in a frame) looked at.
+    pub touches: u64,
+    /// Per quantity, what came of comparing it: every output under its name, `flags` and `contact`; of touches with `touches.` before
+    /// the name, and `touches` itself, which is the choice of their taxels and ids.
     pub quantities: BTreeMap<String, Comparison>,
-    /// Percepts in which a value differs.
+    /// Percepts and touches in which a value differs.
     pub failed: u64,
     /// The first of those, in words.
     pub failures: Vec<String>,
@@ -79,6 +82,7 @@ impl Agreement {
     /// Adds what another batch gave.
     pub fn merge(&mut self, other: Self) {
         self.percepts += other.percepts;
+        self.touches += other.touches;
         self.failed += other.failed;
         self.failures.extend(other.failures);
         self.failures.truncate(MOST_WORDS);
@@ -100,14 +104,19 @@ impl fmt::Display for Agreement {
         let (values, percepts) = (whole.values(), self.percepts);
         let different = whole.compared - whole.agreeing;
         write!(f, "{verdict} with the reference: of {values} value{}", plural(values))?;
-        write!(f, " in {percepts} percept{}, {} agreeing, {different} different", plural(percepts), whole.agreeing)?;
+        write!(f, " in {percepts} percept{}", plural(percepts))?;
+        if self.touches > 0 {
+            let among = if self.touches == 1 { "touch" } else { "touches" };
+            write!(f, " and {} {among}", self.touches)?;
+        }
+        write!(f, ", {} agreeing, {different} different", whole.agreeing)?;
         write!(f, ", {} too close to call, {} not compared", whole.too_close, whole.not_compared)?;
         if whole.not_compared > 0 {
             write!(f, ", as motion hangs on a centroid before that was too close to call")?;
         }
         for (name, c) in &self.quantities {
             let different = c.compared - c.agreeing;
-            write!(f, "\n  {name:<21} {} agreeing, {different} different", c.agreeing)?;
+            write!(f, "\n  {name:<22} {} agreeing, {different} different", c.agreeing)?;
             write!(f, ", {} too close, {} not compared", c.too_close, c.not_compared)?;
             if c.worst_error > 0.0 {
                 write!(f, "; worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;

@@ -109,11 +109,17 @@ pub(crate) struct BoundedReference {
     reference: Reference,
     /// Per field, how far what the frame before left may be off in single precision.
     doubts: Vec<Doubt>,
+    /// Those of the last frame, slot by slot.
+    pressures: Vec<Pressure>,
 }
 
 impl BoundedReference {
     pub(crate) fn new(plan: &Plan) -> Self {
-        Self { reference: Reference::new(plan), doubts: vec![Doubt::default(); plan.fields.len()] }
+        Self {
+            reference: Reference::new(plan),
+            doubts: vec![Doubt::default(); plan.fields.len()],
+            pressures: Vec::new(),
+        }
     }
 
     pub(crate) fn recalibrate(&mut self, plan: &Plan) {
@@ -133,12 +139,19 @@ impl BoundedReference {
         let (pressures, present) = self.reference.frame(raw, frame, percepts);
         let raw = (raw, frame);
         let cells = before.into_iter().zip(present).enumerate();
-        cells
+        let bounds = cells
             .map(|(index, (before, present))| {
                 let advances = advances(index);
                 self.bound(&Cell { index, pressures: &pressures, step, present, before, advances, raw })
             })
-            .collect()
+            .collect();
+        self.pressures = pressures;
+        bounds
+    }
+
+    /// The pressures of the frame that was run last, slot by slot.
+    pub(crate) fn pressures(&self) -> &[Pressure] {
+        &self.pressures
     }
 
     pub(crate) fn restore(&mut self, state: &BackendState) -> Result<()> {

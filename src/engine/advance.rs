@@ -9,6 +9,7 @@ use super::check::Check;
 use super::dominated::orient_again;
 use super::input::{GoOn, Input};
 use super::post::{Post, flag_stale, flag_stale_poses};
+use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
 use crate::signal::RawValue;
@@ -190,9 +191,12 @@ impl Engine {
         }
         post.finish(&raw, &mut self.percepts, &mut self.post, Some(&mut *self.backend))?;
         if let Some(on_skin) = &mut self.on_skin {
-            on_skin.find((&self.plan, &self.links), frames, &raw, self.intake.stale(), &mut self.percepts);
+            let of_touches = check.as_deref_mut().and_then(|check| check.touches.as_mut());
+            let about = (&self.plan, &self.links);
+            on_skin.find(about, frames, &raw, self.intake.stale(), &mut self.percepts, of_touches);
             if let Some(check) = &mut check {
                 check.take_several(&raw, &self.percepts);
+                check.touches.iter_mut().for_each(TouchCheck::end_of_stretch);
             }
         }
         if let Some(check) = &mut check {

@@ -5,6 +5,7 @@
 //! follows is comparable. The percepts compared are those that the backend gives without a comparison, to the bit.
 
 use super::post::{Post, PostFieldState, PostState};
+use super::touch_check::TouchCheck;
 use crate::backend::bounds::{BoundedReference, CellBound};
 use crate::backend::{BackendState, FieldState, RawBatch};
 use crate::error::Result;
@@ -24,6 +25,8 @@ pub(super) struct Check {
     last_bounds: Vec<CellBound>,
     /// By field, how far its position in the last frame may be off, m, where motion in the world is asked for.
     position_off: Vec<f64>,
+    /// Where touches of the whole body are asked for.
+    pub(super) touches: Option<TouchCheck>,
 }
 
 impl Check {
@@ -44,6 +47,7 @@ impl Check {
             bounds: Vec::new(),
             last_bounds: vec![CellBound::default(); plan.fields.len()],
             position_off: vec![0.0; plan.fields.len()],
+            touches: plan.touched_from.map(|_| TouchCheck::default()),
         };
         check.reference.restore(backend)?;
         for (field, state) in post.fields.iter().enumerate() {
@@ -71,6 +75,9 @@ impl Check {
     ) -> Result<()> {
         let advances = |field| post.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
         let mut bounds = self.reference.run(raw, offset, &mut self.right, advances);
+        if let (Some(touches), Some(first)) = (&mut self.touches, post.plan.touched_from) {
+            touches.take(&self.reference.pressures()[first..][..post.plan.channels()]);
+        }
         post.flag_restart(raw, offset, &mut self.right);
         let before: Vec<world_motion::Memory> = self.post.fields.iter().map(|field| field.world_motion).collect();
         post.place(std::slice::from_ref(frame), raw, offset, &mut self.right, &self.post);

@@ -9,6 +9,7 @@ use super::links::Links;
 use super::self_contacts::SelfContacts;
 use super::skin_fits::{FitTrails, Moment, SkinFits};
 use super::skin_sigmas::SkinSigmas;
+use super::touch_check::TouchCheck;
 use crate::backend::RawBatch;
 use crate::body::Body;
 use crate::field::TaxelGraph;
@@ -131,7 +132,7 @@ impl OnSkin {
     }
 
     /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `stale` has the taxels of the
-    /// body that are stale, by frame of the call.
+    /// body that are stale, by frame of the call. With `check`, touches are held to their definition.
     pub(super) fn find(
         &mut self,
         (plan, links): (&Plan, &Links),
@@ -139,6 +140,7 @@ impl OnSkin {
         raw: &RawBatch<'_>,
         stale: &[Vec<usize>],
         percepts: &mut Percepts,
+        mut check: Option<&mut TouchCheck>,
     ) {
         for (offset, frame) in frames.iter().enumerate() {
             let index = raw.first + offset;
@@ -154,7 +156,12 @@ impl OnSkin {
                 without_value: &self.without_value,
                 notes: &self.notes,
             };
+            let before = check.is_some().then(|| self.touches.state());
             self.touches.step(input, &mut found);
+            if let Some((check, before)) = check.as_deref_mut().zip(before) {
+                let number = percepts.frame_number(index);
+                check.compare((offset, number), &input, (&before, &self.touches), &found);
+            }
             flag_several(&found, &mut percepts.flags[index * plan.fields.len()..][..plan.fields.len()]);
             if let Some(sigmas) = &mut self.sigmas {
                 sigmas.add((plan, self.touches.skin()), raw, offset, pressures, &mut found);

@@ -24,24 +24,24 @@ pub(super) const ROUNDING: f64 = 1e-10;
 
 /// How far a touch's quantities may be off; `None` where that is not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bound {
+pub(crate) struct Bound {
     /// Of total, force, and by taxel the force of a wrench, as a share.
-    pub(super) share: f64,
+    pub(crate) share: f64,
     /// Of the weighted mean in space, m.
-    pub(super) mean_m: f64,
+    pub(crate) mean_m: f64,
     /// Of the position, m.
-    pub(super) position_m: f64,
+    pub(crate) position_m: f64,
     /// Along and across, m.
-    pub(super) spread_m: [f64; 2],
-    pub(super) anisotropy: f64,
+    pub(crate) spread_m: [f64; 2],
+    pub(crate) anisotropy: f64,
     /// Of the principal axis, rad.
-    pub(super) axis_rad: Option<f64>,
+    pub(crate) axis_rad: Option<f64>,
     /// Of the line through the two farthest points, rad.
-    pub(super) orientation_rad: Option<f64>,
+    pub(crate) orientation_rad: Option<f64>,
     /// Whether the anisotropy may be on the other side of the limit.
-    pub(super) isotropic_in_doubt: bool,
+    pub(crate) isotropic_in_doubt: bool,
     /// Whether the second and third farthest points may be a tie or not.
-    pub(super) tie_in_doubt: bool,
+    pub(crate) tie_in_doubt: bool,
 }
 
 /// ρ = r/(1 − r) for the share r.

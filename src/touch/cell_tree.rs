@@ -160,7 +160,6 @@ impl CellTree {
     }
 
     /// The triangles in the cell of `node`, about its taxel.
-    #[cfg(test)]
     pub(super) fn triangles_about(&self, node: u32) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         let cell = &self.cells[node as usize];
         let chunks = &self.chunks[cell.chunks[0] as usize..cell.chunks[1] as usize];

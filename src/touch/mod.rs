@@ -12,11 +12,10 @@
 //!    link. Fits and standard deviations are made by the engine, which has the raw values.
 //!
 //! All is in double precision, on the body at rest; quantities come out in the frame of the touch's link. `reference.rs` is the
-//! same as a definition, written plainly and slowly, with the margins of its choices.
+//! same as a definition, written plainly and slowly, with the margins of its choices: what a comparison holds touches to.
 //!
 //! **Cost.** A frame costs a look at every pressure, and the rest by pressed taxel. After the first frames nothing is allocated.
 
-#[cfg(test)]
 mod bound;
 mod bridges;
 mod cell_tree;
@@ -29,8 +28,7 @@ mod measure;
 mod moments;
 mod options;
 mod profile;
-#[cfg(test)]
-mod reference;
+pub(crate) mod reference;
 mod regions;
 mod skin;
 #[cfg(test)]

@@ -180,6 +180,11 @@ impl Skin {
         &self.surface
     }
 
+    /// Whether the cell of `node` has a surface.
+    pub(crate) fn has_surface(&self, node: u32) -> bool {
+        self.surface.has_surface(self.cell_of(node))
+    }
+
     /// The node whose cell of the surface `node` has.
     pub(super) fn cell_of(&self, node: u32) -> u32 {
         self.cell_of[node as usize]

@@ -46,7 +46,7 @@ impl<'a, P> Input<'a, P> {
 
 /// What the next touches depend on beside the next frames.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct TouchState(Memory);
+pub struct TouchState(pub(super) Memory);
 
 /// Finds the touches of a skin, frame after frame.
 ///
@@ -121,10 +121,20 @@ impl Touches {
         &self.skin
     }
 
+    /// What is asked of touches.
+    pub(crate) fn options(&self) -> &Options {
+        &self.options
+    }
+
     /// The state after the frames so far.
     #[must_use]
     pub fn state(&self) -> TouchState {
         TouchState(self.memory.clone())
+    }
+
+    /// The taxels of each touch of the last frame, as nodes in no order, the oldest touch first.
+    pub(crate) fn taxels(&self) -> impl Iterator<Item = &[u32]> + '_ {
+        self.identities.named().iter().map(|named| self.regions.members(named.region as usize))
     }
 
     /// Goes on from `state`, of the same skin and options: the touches are the same bits as without an interruption.

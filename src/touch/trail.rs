@@ -38,6 +38,11 @@ impl Trail {
         last.is_some_and(|last| t_s - last.t_s > over_s * (1.0 + ROUNDING))
     }
 
+    /// When and where it was, the oldest first, s and m.
+    pub(super) fn positions(&self) -> impl Iterator<Item = (f64, DVec3)> + '_ {
+        self.past[..self.count as usize].iter().map(|past| (past.t_s, past.position))
+    }
+
     /// Takes the `position` at `t_s`, m; the velocity over `over_s`, m/s, if the trail goes back so far.
     pub(crate) fn follow(&mut self, t_s: f64, position: DVec3, over_s: f64) -> Option<DVec3> {
         let past = &self.past[..self.count as usize];

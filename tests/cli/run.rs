@@ -143,7 +143,7 @@ fn verify_reports_how_the_backend_compares() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let report = stderr(&output);
     let verdict = report.lines().find(|line| line.contains("backend cpu agrees with the reference: of ")).unwrap();
-    assert!(verdict.contains(" in 3640 percepts, ") && verdict.ends_with(" not compared"), "{report}");
+    assert!(verdict.contains(" in 3640 percepts and 202 touches, ") && verdict.ends_with(" not compared"), "{report}");
     assert!(report.contains("orientation"), "{report}");
     assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 280);
 }

@@ -1,7 +1,9 @@
 //! The comparison with the reference: what it counts, and that it goes on after what is too close to call.
 
 use somatic::source::{CsvSource, Source};
-use somatic::{Agreement, BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Percepts, Scene};
+use somatic::{
+    Agreement, BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Percepts, Scene, TouchOutputs,
+};
 
 use crate::common::{Flat, backends, data, frame};
 
@@ -157,5 +159,48 @@ fn on_the_mat_a_tenth_as_gain_disagrees_nowhere() {
         let (whole, total) = (sum.whole(), sum.quantities["total"]);
         assert!(whole.too_close > 0 && whole.not_compared == 0, "{sum}");
         assert!(total.compared > total.values() / 2 && total.too_close > 0, "{sum}");
+    }
+}
+
+#[test]
+fn touches_are_held_to_their_definition_and_a_comparison_changes_none() {
+    let body = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
+    let wanted = TouchOutputs::USUAL | TouchOutputs::ORIENTATION | TouchOutputs::WRENCH;
+    let options = || somatic::touch::Options { outputs: wanted, ..Default::default() };
+    let scene = || Scene::default().touches(options()).outputs(Outputs::TOTAL);
+    for backend in others() {
+        let make = || {
+            let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+            let calibration =
+                Some(Calibration::parse("[all]\ngain = 0.37\ndead_band = 3\nunit = \"kPa\"\n", &ids).unwrap());
+            let options = Options::default().backend(backend).scene(scene()).calibration(calibration).batch(64);
+            Engine::new(&body, options).unwrap()
+        };
+        let (mut engine, mut plain) = (make(), make());
+        // Blobs that move over the skin, merge and part, and noise that makes single taxels come and go.
+        let frame = |index: usize| {
+            let mut frame = engine.frame(0.02 * index as f64);
+            for (place, value) in frame.values.iter_mut().enumerate() {
+                let wave = (place as f64 * 0.03 + index as f64 * 0.11).sin().max(0.0).powi(4);
+                let noise = f64::from((place * 7919 + index * 104_729) as u32 % 100) * 0.01;
+                *value = somatic::RawValue::new(400.0 * wave + 10.5 * noise);
+            }
+            frame
+        };
+        let frames: Vec<Frame> = (0..24).map(frame).collect();
+        let mut sum = Agreement::default();
+        for part in frames.chunks(5) {
+            let (percepts, agreement) = engine.process_and_compare(part).unwrap();
+            assert_eq!(percepts, plain.process(part).unwrap(), "{backend:?}");
+            sum.merge(agreement);
+        }
+        println!("{backend:?} {sum}");
+        assert!(sum.holds(), "{backend:?}: {sum}");
+        let of = |name: &str| sum.quantities[name];
+        assert_eq!(of("touches").values(), sum.touches, "every touch is counted once: {sum}");
+        assert!(of("touches").compared > 500 && of("touches.position").compared > 500, "{sum}");
+        assert!(of("touches.velocity").compared > 20 && of("touches.principal_axis").compared > 100, "{sum}");
+        assert!(of("touches.orientation").compared > 100 && of("touches.wrench").compared > 500, "{sum}");
+        assert!(of("touches.position").worst_error > 0.0, "single precision is seen: {sum}");
     }
 }

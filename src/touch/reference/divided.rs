@@ -27,24 +27,24 @@ impl Reference {
                 regions.push(Region { peak: node, nodes: BTreeSet::from([node]), in_doubt: false });
                 continue;
             };
-            let joined = home(&regions, highest).unwrap();
+            // All that were swept are in a region.
+            let Some(joined) = home(&regions, highest) else { continue };
             // One of another region that is as good as equally high.
             for &other in &higher {
-                let beyond = home(&regions, other).unwrap();
+                let Some(beyond) = home(&regions, other) else { continue };
                 if beyond != joined && scene.are_near(pressure(other), pressure(highest)) {
                     regions[beyond].in_doubt = true;
                     regions[joined].in_doubt = true;
                 }
             }
             regions[joined].nodes.insert(node);
-            let mut peaks: Vec<u32> =
-                higher.iter().map(|&other| regions[home(&regions, other).unwrap()].peak).collect();
+            let peak_of = |&other: &u32| home(&regions, other).map(|home| regions[home].peak);
+            let mut peaks: Vec<u32> = higher.iter().filter_map(peak_of).collect();
             peaks
                 .sort_by(|&a, &b| if is_higher(a, b) { std::cmp::Ordering::Less } else { std::cmp::Ordering::Greater });
             peaks.dedup();
             for peak in peaks {
-                let own = home(&regions, node).unwrap();
-                let other = home(&regions, peak).unwrap();
+                let (Some(own), Some(other)) = (home(&regions, node), home(&regions, peak)) else { continue };
                 if own == other {
                     continue;
                 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec3};
 
-use super::{Past, Region, RightTouch, Scene};
+use super::{Past, Region, RightTouch, RightWrench, Scene};
 use crate::body::nearest_on_triangle;
 use crate::percept::TouchFlags;
 use crate::touch::bound;
@@ -27,19 +27,23 @@ impl Scene<'_> {
         let link = by_link.iter().find(|(_, share)| **share == most).map_or(0, |(&link, _)| link);
         let link_in_doubt = by_link.iter().any(|(&other, &share)| other != link && self.are_near(share, most));
         let distance = |node: u32| taxel(node).position.distance(mean);
-        let base = nodes().min_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b))).unwrap();
+        let base = nodes().min_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+        let base = base.unwrap_or(region.peak);
         let places: Vec<(DVec3, f64)> = nodes().map(|node| (taxel(node).position, pull(node))).collect();
         let mean_m = bound::of_mean(&places, mean, self.within);
         let base_in_doubt = nodes().any(|node| node != base && distance(node) - distance(base) <= 2.0 * mean_m);
         let (position, position_m) = self.position(region, mean, base, mean_m);
-        let mut wrenches: BTreeMap<u32, [DVec3; 2]> = BTreeMap::new();
+        let mut wrenches: BTreeMap<u32, RightWrench> = BTreeMap::new();
         for node in nodes() {
             let taxel = taxel(node);
             let way = self.skin.link_from_body(taxel.link);
             let force = -way.transform_vector3(taxel.normal) * taxel.reading.newton_at_one * self.pressure(node);
             let wrench = wrenches.entry(taxel.link).or_default();
-            wrench[0] += force;
-            wrench[1] += way.transform_point3(taxel.position).cross(force);
+            let place = way.transform_point3(taxel.position);
+            wrench.force_newton += force;
+            wrench.torque_newton_m += place.cross(force);
+            wrench.forces_newton += force.length();
+            wrench.torques_newton_m += (place.length() + taxel.position.length()) * force.length();
         }
         let newtons: Vec<f64> = nodes().map(|node| taxel(node).reading.newton_at_one * self.pressure(node)).collect();
         let mut touch = RightTouch {
@@ -78,7 +82,10 @@ impl Scene<'_> {
             let origin = self.skin.taxels()[cell as usize].position;
             for corners in surface.triangles_about(cell) {
                 let point = nearest_on_triangle(corners.map(|corner| corner + origin), mean);
-                nearest.push((point, point.distance(mean)));
+                // A triangle that is a line in single precision has no nearest point; its neighbours have it.
+                if point.is_finite() {
+                    nearest.push((point, point.distance(mean)));
+                }
             }
         }
         let Some(&(point, least_m)) = nearest.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else {

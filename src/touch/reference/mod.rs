@@ -1,7 +1,8 @@
 //! The definition of touches, written plainly and slowly: other code for the same equations, with the margins of its choices.
 //!
 //! A choice whose margin is less than `within` of what it compares is in doubt, and with it all touches that it may change. These
-//! are left out of comparisons, and counted. Where P may be off by more than rounding, `within` is that share.
+//! are left out of comparisons, and counted. Where P may be off by more than rounding, `within` is that share. A taxel of which it is
+//! not certain whether it is pressed puts all in doubt that it is part of or lies beside.
 
 mod divided;
 mod measure;
@@ -14,34 +15,47 @@ use glam::DVec3;
 use super::bound::Bound;
 use super::options::Options;
 use super::skin::Skin;
+use super::touches::TouchState;
 use crate::percept::TouchFlags;
 
 /// A touch as it is right.
 #[derive(Clone, Debug)]
-pub(super) struct RightTouch {
-    pub(super) id: u64,
-    pub(super) age_s: f64,
-    pub(super) link: u32,
-    pub(super) nodes: BTreeSet<u32>,
-    pub(super) total: f64,
-    pub(super) force_newton: Option<f64>,
-    pub(super) position: DVec3,
-    pub(super) centre: DVec3,
-    pub(super) axis: Option<DVec3>,
-    pub(super) anisotropy: Option<f64>,
-    pub(super) spread_m: Option<[f64; 2]>,
-    pub(super) orientation: Option<DVec3>,
-    pub(super) velocity: Option<DVec3>,
-    pub(super) wrenches: BTreeMap<u32, [DVec3; 2]>,
+pub(crate) struct RightTouch {
+    pub(crate) id: u64,
+    pub(crate) age_s: f64,
+    pub(crate) link: u32,
+    pub(crate) nodes: BTreeSet<u32>,
+    pub(crate) total: f64,
+    pub(crate) force_newton: Option<f64>,
+    pub(crate) position: DVec3,
+    pub(crate) centre: DVec3,
+    pub(crate) axis: Option<DVec3>,
+    pub(crate) anisotropy: Option<f64>,
+    pub(crate) spread_m: Option<[f64; 2]>,
+    pub(crate) orientation: Option<DVec3>,
+    pub(crate) velocity: Option<DVec3>,
+    /// By link.
+    pub(crate) wrenches: BTreeMap<u32, RightWrench>,
     /// Of the flags about form and identity.
-    pub(super) flags: TouchFlags,
+    pub(crate) flags: TouchFlags,
     /// Which taxels it has, or its identity, may be chosen otherwise.
-    pub(super) in_doubt: bool,
+    pub(crate) in_doubt: bool,
     /// Its chart may have another base, which may change axis, anisotropy and spread.
-    pub(super) base_in_doubt: bool,
-    pub(super) link_in_doubt: bool,
+    pub(crate) base_in_doubt: bool,
+    pub(crate) link_in_doubt: bool,
     /// How far it may be off.
-    pub(super) bound: Bound,
+    pub(crate) bound: Bound,
+}
+
+/// What presses on a link about its origin, in its frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct RightWrench {
+    pub(crate) force_newton: DVec3,
+    pub(crate) torque_newton_m: DVec3,
+    /// Σ‖F‖ of its taxels, what a share of the force is a share of.
+    pub(crate) forces_newton: f64,
+    /// Σ‖x‖‖F‖, with the distances from the origins of both the link and the body, in which x is rounded.
+    pub(crate) torques_newton_m: f64,
 }
 
 /// What is kept of a touch.
@@ -55,7 +69,7 @@ pub(super) struct Past {
 
 /// The definition, frame after frame.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Reference {
+pub(crate) struct Reference {
     ids_given: u64,
     touches: BTreeMap<u64, Past>,
     two: BTreeSet<(u64, u64)>,
@@ -71,11 +85,13 @@ pub(super) struct Region {
 
 /// A frame for the reference.
 #[derive(Clone, Debug)]
-pub(super) struct Frame {
-    pub(super) t_s: f64,
-    pub(super) restarts: bool,
-    pub(super) pressures: Vec<f64>,
-    pub(super) without_value: BTreeSet<u32>,
+pub(crate) struct Frame {
+    pub(crate) t_s: f64,
+    pub(crate) restarts: bool,
+    pub(crate) pressures: Vec<f64>,
+    pub(crate) without_value: BTreeSet<u32>,
+    /// Nodes that may be pressed or not.
+    pub(crate) unsure: BTreeSet<u32>,
 }
 
 /// What regions are found with.
@@ -88,8 +104,26 @@ pub(super) struct Scene<'a> {
 }
 
 impl Reference {
+    /// One that goes on from `state`.
+    pub(crate) fn after(state: &TouchState) -> Self {
+        let memory = &state.0;
+        let mut touches: BTreeMap<u64, Past> = BTreeMap::new();
+        for kept in &memory.touches {
+            let positions = kept.trail.positions().collect();
+            let past = Past { began_s: kept.began_s, link: kept.link, positions, pressures: BTreeMap::new() };
+            touches.insert(kept.id, past);
+        }
+        for taxel in &memory.taxels {
+            let of = memory.touches.get(taxel.touch as usize).and_then(|kept| touches.get_mut(&kept.id));
+            if let Some(past) = of {
+                past.pressures.insert(taxel.node, taxel.pressure);
+            }
+        }
+        Self { ids_given: memory.ids_given, touches, two: memory.two.iter().map(|[a, b]| (*a, *b)).collect() }
+    }
+
     /// The touches of the next frame, the oldest first, and the identities that end.
-    pub(super) fn step(
+    pub(crate) fn step(
         &mut self,
         skin: &Skin,
         options: &Options,
@@ -102,7 +136,12 @@ impl Reference {
             self.two.clear();
         }
         let scene = Scene { skin, options, frame, beside: neighbours(skin, &frame.without_value), within };
-        let (regions, pairs) = self.regions(&scene);
+        let (mut regions, pairs) = self.regions(&scene);
+        for region in &mut regions {
+            let is_unsure = |node: &u32| frame.unsure.contains(node);
+            region.in_doubt |=
+                region.nodes.iter().any(|node| is_unsure(node) || scene.beside[*node as usize].iter().any(is_unsure));
+        }
         let named = self.name(&scene, &regions);
         let mut right = Vec::new();
         let mut kept = BTreeMap::new();

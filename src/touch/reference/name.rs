@@ -54,7 +54,7 @@ impl Reference {
             }
             if let Some(&(_, _, region)) = claims.iter().find(|claim| claim.1 == id) {
                 went.insert(id, region);
-                let into = became.get_mut(&region).unwrap();
+                let Some(into) = became.get_mut(&region) else { continue };
                 into.merged = true;
                 if id < id_of[&region] {
                     into.continues = Some(id);

@@ -14,7 +14,7 @@ use crate::touch::{Input, Options, Skin, SkinParts, Splits, Touches};
 
 /// A frame that says nothing of nodes but their pressures, with gaps.
 fn frame(t_s: f64, pressures: Vec<f64>, without_value: BTreeSet<u32>) -> reference::Frame {
-    reference::Frame { t_s, restarts: false, pressures, without_value }
+    reference::Frame { t_s, restarts: false, pressures, without_value, unsure: BTreeSet::new() }
 }
 
 fn agrees(skin: &Skin, frame: &TouchFrame, found: &Touch, right: &RightTouch) -> Result<(), String> {
@@ -42,10 +42,10 @@ fn agrees(skin: &Skin, frame: &TouchFrame, found: &Touch, right: &RightTouch) ->
     same("force", a, b, bound.share * b)?;
     near("centre", found.centre, way.transform_point3(right.centre), 1e-12)?;
     for share in frame.links(found) {
-        let [force, torque] = right.wrenches[&share.link];
+        let right = right.wrenches[&share.link];
         let wrench = share.wrench.ok_or("no wrench")?;
-        near("force", wrench.force_newton, force, bound.share * b)?;
-        near("torque", wrench.torque_newton_m, torque, bound.share * b * 10.0)?;
+        near("force", wrench.force_newton, right.force_newton, bound.share * right.forces_newton)?;
+        near("torque", wrench.torque_newton_m, right.torque_newton_m, bound.share * right.torques_newton_m)?;
     }
     // Without a surface it hangs on the base.
     let has_surface = skin.surface().has_surface(skin.cell_of(found.base));
