@@ -1,9 +1,9 @@
-//! How long it takes to fit what presses, a touch: `cargo bench --bench fit`.
+//! How long it takes to fit what presses, a touch of the whole body: `cargo bench --bench fit`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use somatic::source::{SimulatedSource, Source as _};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Scene};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Scene, TouchOutputs, touch};
 
 fn main() {
     divan::main();
@@ -28,10 +28,10 @@ enum Asked {
 impl Asked {
     const ALL: [Self; 2] = [Self::Axis, Self::Fit];
 
-    fn outputs(self) -> Outputs {
+    fn outputs(self) -> TouchOutputs {
         match self {
-            Self::Axis => Outputs::CENTROID | Outputs::PRINCIPAL_AXIS,
-            Self::Fit => Outputs::FIT,
+            Self::Axis => TouchOutputs::USUAL,
+            Self::Fit => TouchOutputs::USUAL | TouchOutputs::FIT,
         }
     }
 }
@@ -42,7 +42,8 @@ fn touched(text: &str, field: &str, asked: Asked, backend: BackendKind) -> (Engi
     let mut source = SimulatedSource::on_body("simulation", text, body.clone()).unwrap();
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(&source.calibration(), &ids).unwrap();
-    let scene = Scene::default().outputs(asked.outputs()).fields([field]);
+    let touches = touch::Options { outputs: asked.outputs(), ..touch::Options::default() };
+    let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).fields([field]);
     let options = Options::default().scene(scene).calibration(calibration).backend(backend).batch(256);
     let mut engine = Engine::new(&body, options).unwrap();
     engine.set_channels(source.taxels()).unwrap();
@@ -51,7 +52,8 @@ fn touched(text: &str, field: &str, asked: Asked, backend: BackendKind) -> (Engi
         frames.push(frame.clone());
     }
     let fitted = engine.process(&frames).unwrap();
-    let count = (0..frames.len()).filter(|&at| fitted.get(at, 0).fit_place.is_some()).count();
+    let touches = |at: usize| fitted.touches(at).map_or(&[][..], |found| &found.touches);
+    let count = (0..frames.len()).filter(|&at| touches(at).iter().any(|touch| touch.fit.is_some())).count();
     assert!(matches!(asked, Asked::Axis) || count > frames.len() / 2, "{count} of {} are fitted", frames.len());
     (engine, frames)
 }

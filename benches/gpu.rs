@@ -5,8 +5,7 @@
 //! First the percepts of every shape are held to the f64 reference. Then, as JSON: what the machine copies (on the device,
 //! up, down), and for each shape and number of frames a call the programs by themselves, by the device's clock where it
 //! may be read, with the share of the copy bandwidth that their least bytes make; and whole calls, frames in memory to
-//! percepts in memory, in turns with empty ones: the same bytes up and down, as many groups, and nothing computed. Last, contacts
-//! fitted to touches, whose descents are the device's, in turns with the backend `cpu`.
+//! percepts in memory, in turns with empty ones: the same bytes up and down, as many groups, and nothing computed.
 
 // The skins of `somatic bench`.
 #[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
@@ -18,8 +17,7 @@ use std::time::{Duration, Instant};
 use crate::shape::Shape;
 use serde_json::{Value, json};
 use somatic::backend::gpu::{Bandwidth, EmptyCall, adapters, bandwidth, device_time};
-use somatic::source::{SimulatedSource, Source as _};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Result, Scene};
+use somatic::{BackendKind, Body, Outputs, Result};
 
 /// Sensors, fields, members, and of one field more.
 const SKINS: [(usize, usize, usize, usize); 5] = [
@@ -36,12 +34,6 @@ const MOST: u128 = 40_000_000;
 const MOST_VALUES: usize = 20_000_000;
 /// Memberships of a comparison with the reference at most.
 const MOST_COMPARED: u128 = 4_000_000;
-/// Touches of a call, a frame each.
-const TOUCHES: [usize; 3] = [1, 256, 9984];
-/// A rod that turns over the nine sensors of the hand's back.
-const ROD: &str = "rate_hz = 100\nduration_s = 2.56\n[layer]\nthickness_m = 0.007\n[sensor]\nkind = \"fsr\"\nnoise_sigma = 1\n\
-                   [[touch]]\non = \"hand/back\"\nindenter = \"rod\"\nradius_m = 0.0127\nlength_m = 0.05\n\
-                   angle_deg = [[0, 0], [2.56, 180]]\npath = [[0, 0.002]]\nhold = { newton = 30 }\n";
 const OUTPUTS: Outputs = Outputs::CENTROID.union(Outputs::ORIENTATION);
 
 fn main() -> Result<()> {
@@ -69,7 +61,6 @@ fn main() -> Result<()> {
         "adapter": { "name": adapter.name, "api": adapter.api, "kind": adapter.kind, "driver": adapter.driver },
         "copy_bytes_per_s": { "on_device": bandwidth.on_device, "up": bandwidth.up, "down": bandwidth.down },
         "cases": cases,
-        "fits": TOUCHES.into_iter().map(fits).collect::<Result<Vec<Value>>>()?,
     });
     println!("{report:#}");
     Ok(())
@@ -131,39 +122,4 @@ fn case(shape: &Shape, body: &Body, bandwidth: &Bandwidth) -> Result<Value> {
             "empty_dispatch_us": empty_s * 1e6,
         },
     }))
-}
-
-/// Whole calls with a touch to be fitted in each of `count` frames.
-fn fits(count: usize) -> Result<Value> {
-    let body = Body::from_bytes("hand", somatic::bundled::HAND)?;
-    let mut source = SimulatedSource::on_body("rod", ROD, body.clone())?;
-    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let calibration = Calibration::parse(&source.calibration(), &ids)?;
-    let (mut turn, mut frame) = (Vec::new(), Frame::missing(0.0, source.taxels().len()));
-    while source.next_frame(&mut frame)? {
-        turn.push(frame.clone());
-    }
-    let frames: Vec<Frame> = turn.iter().cycle().take(count).cloned().collect();
-    let engine = |backend: BackendKind| {
-        let scene = Scene::default().outputs(Outputs::FIT).fields(["hand/back"]);
-        let options = Options::default().scene(scene).calibration(calibration.clone()).backend(backend);
-        let mut engine = Engine::new(&body, options.batch(count.min(256)))?;
-        engine.set_channels(source.taxels())?;
-        Ok::<Engine, somatic::Error>(engine)
-    };
-    let mut engines = [engine(BackendKind::Gpu)?, engine(BackendKind::Cpu)?];
-    let mut seconds = [Vec::new(), Vec::new()];
-    let start = Instant::now();
-    while seconds[0].len() < 3 || (seconds[0].len() < 2000 && start.elapsed() < Duration::from_secs(2)) {
-        for (engine, seconds) in engines.iter_mut().zip(&mut seconds) {
-            let call = Instant::now();
-            engine.process(&frames)?;
-            seconds.push(call.elapsed().as_secs_f64());
-        }
-    }
-    let [gpu_us, cpu_us] = seconds.map(|mut seconds| {
-        seconds.sort_by(f64::total_cmp);
-        seconds[seconds.len() / 2] * 1e6 / count as f64
-    });
-    Ok(json!({ "touches": count, "gpu_us_a_touch": gpu_us, "cpu_us_a_touch": cpu_us }))
 }

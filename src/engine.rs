@@ -6,7 +6,6 @@ mod cadence;
 mod check;
 mod dominated;
 mod drift_state;
-mod fit;
 mod ids;
 mod input;
 mod links;

@@ -1,31 +1,30 @@
 //! What ordinary touches tell of a skin: every taxel's gain, and how wide the layer makes a contact.
 //!
-//! A touch that moves over the skin is felt by other taxels in each frame. Where a fit of the contact explains them all but one,
-//! that one's gain is off. Contacts are fitted under the gains found so far (`docs/fit.md`), each taxel's gain is
-//! moved to what makes it agree with the contacts that pressed it, and both are repeated:
+//! A touch of the whole body that moves over the skin is felt by other taxels in each frame. Where a fit of the contact explains them
+//! all but one, that one's gain is off. Contacts are fitted under the gains found so far (`docs/fit.md`), each taxel's gain is moved to
+//! what makes it agree with the contacts that pressed it, and both are repeated:
 //!
 //! ln γᵢ ← ln γᵢ + Σ w ln(Pᵢ/mᵢ) / (Σ w + 1/s²), w = 1/((σᵢ/mᵢ)² + e²), of the touches that press taxel i
 //!
 //! with m what the contact makes it feel, σ its noise, e = 0.1 what the model is off by and s = 0.2 how far gains are
 //! taken to be apart. Residuals over 2e count less (Huber).
 //!
-//! **Not to be known** from touches alone: the gain of the whole, as any is explained by harder touches; a slope of gains over a field, as
-//! it is explained by touches a little beside; one that grows with the square of the distance, as it makes a Gaussian another Gaussian,
-//! wider or narrower. These are taken off what is found. Nor are the gain of a taxel that nothing touched, and
-//! the layer's σ apart from the contacts' own size: the width that is found explains both together, and is what fits need.
+//! **Not to be known** from touches alone: the gain of the whole, as any is explained by harder touches; a slope of gains over the
+//! skin, as it is explained by touches a little beside; one that grows with the square of the distance, as it makes a Gaussian another
+//! Gaussian, wider or narrower. These are taken off what is found, of each part of the skin that touches connect. Nor are the gain of
+//! a taxel that nothing touched, and the layer's σ apart from the contacts' own size: the width that is found explains both
+//! together, and is what fits need.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use glam::DVec2;
+use glam::DVec3;
 
 use crate::backend::BackendKind;
 use crate::backend::cpu::fit::fit_each;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result, failed};
-use crate::percept::{self, Outputs, Percepts};
-use crate::scene::{Knobs, Scene};
-use crate::signal::{Calibration, Frame, Letter};
+use crate::percept::{self, Outputs, TouchFlags, TouchFrame, TouchOutputs};
+use crate::scene::{Around, Knobs, Scene};
+use crate::signal::{Calibration, Frame, Letter, RawValue};
 use crate::stage::fit::{Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
 use crate::touch;
 
@@ -43,11 +42,30 @@ const MOST: usize = 6000;
 const LEAST_SHARE: f64 = 0.1;
 /// Touches that a taxel needs for its gain to be told.
 const LEAST_TOUCHES: u32 = 5;
-/// Shapes of (the logarithm of) gains over a field that other contacts explain as well.
-const UNKNOWABLE: [fn(DVec2) -> f64; 6] =
+/// A point has four parameters; with one taxel more than that some agree by chance.
+const LEAST_PRESSED: usize = 6;
+/// Shapes of (the logarithm of) gains over taxels that face one way, across their normal, that other contacts explain as well.
+const UNKNOWABLE_ON_A_SIDE: [fn(DVec3) -> f64; 6] =
     [|_| 1.0, |at| at.x, |at| at.y, |at| at.x * at.x, |at| at.y * at.y, |at| at.x * at.y];
+/// The same over taxels around a limb.
+const UNKNOWABLE_AROUND: [fn(DVec3) -> f64; 10] = [
+    |_| 1.0,
+    |at| at.x,
+    |at| at.y,
+    |at| at.z,
+    |at| at.x * at.x,
+    |at| at.y * at.y,
+    |at| at.z * at.z,
+    |at| at.x * at.y,
+    |at| at.y * at.z,
+    |at| at.z * at.x,
+];
+/// Taxels face one way where the mean of their normals is at least this long: a cap that reaches 53° to every side.
+const ONE_WAY: f64 = 0.8;
 /// Of σ, in distances between taxels, where fits start without knowing it.
 const START: f64 = 0.5;
+/// A place is beyond the sensors where it is farther from all, in distances between taxels.
+const REACH: f64 = 2.0;
 
 /// What touches told.
 #[derive(Clone, Debug, Default)]
@@ -68,37 +86,44 @@ pub struct GainsEstimate {
     pub touches: usize,
 }
 
-/// A touch in a frame: its field, its taxels with their indices in the body, and how far places may lie from them.
+/// A touch in a frame.
 #[derive(Clone, Debug)]
 struct Observed {
-    field: usize,
+    /// Its taxels and those beside them, as nodes of the skin.
     taxels: Vec<(usize, Taxel)>,
-    reach_m: f64,
+    /// The longest way between two of them that are neighbours, m.
+    spacing_m: f64,
+}
+
+/// Where a taxel of the skin is on the body at rest.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    position: DVec3,
+    normal: DVec3,
 }
 
 /// Gathers touches frame by frame.
 pub struct GainsSurvey {
     engine: Engine,
     taxels: usize,
-    /// Index in a frame by taxel of the body.
+    /// Index in a frame by node of the skin, where the frame has the taxel.
     value_of: Vec<Option<usize>>,
     touches: Vec<Observed>,
     /// Every so many touches one is kept.
     stride: usize,
     seen: usize,
-    spacing_m: f64,
 }
 
 impl GainsSurvey {
     /// Begins with a calibration that knows baselines and dead bands, for frames of the taxels `ids`.
     ///
     /// # Errors
-    /// No field has a chart; the calibration or the ids are for another body; no taxel has an area.
-    pub fn new(body: &Body, calibration: Calibration, fields: &[String], ids: &[u32]) -> Result<Self> {
+    /// No taxel has an area; the calibration or the ids are for another body.
+    pub fn new(body: &Body, calibration: Calibration, ids: &[u32]) -> Result<Self> {
+        let asked = touch::Options { outputs: TouchOutputs::TAXELS, ..touch::Options::default() };
         let scene = Scene {
-            outputs: Outputs::CENTROID,
-            touches: Some(touch::Options::default()),
-            fields: fields.to_vec(),
+            outputs: Outputs::TOTAL,
+            touches: Some(asked),
             letters: vec![Letter::default()],
             knobs: Knobs::default(),
             ..Scene::default()
@@ -107,38 +132,39 @@ impl GainsSurvey {
         let mut engine = Engine::new(body, Options { backend: BackendKind::Cpu, ..options })?;
         engine.set_channels(ids)?;
         let plan = engine.plan();
-        let usable = || plan.fields.iter().filter(|field| field.chart.is_some() && field.area_known);
-        let spacing_m = usable().map(|field| field.spacing * f64::from(field.unit_m)).fold(0.0, f64::max);
-        if spacing_m == 0.0 {
-            return Err(Error::failed("no field has a chart and taxels with areas, which contacts are fitted in")
-                .at(&body.name));
+        if !plan.areas.iter().any(|area| *area > 0.0) {
+            return Err(Error::failed("no taxel has an area, without which contacts cannot be fitted").at(&body.name));
         }
-        let mut value_of = vec![None; body.taxels.len()];
+        let mut value_of_taxel = vec![None; body.taxels.len()];
         for (value, id) in ids.iter().enumerate() {
             if let Some(taxel) = engine.index_of_taxel(*id) {
-                value_of[taxel] = Some(value);
+                value_of_taxel[taxel] = Some(value);
             }
         }
-        let (taxels, touches) = (body.taxels.len(), Vec::new());
-        Ok(Self { engine, taxels, value_of, touches, stride: 1, seen: 0, spacing_m })
+        // The skin's nodes are the plan's channels.
+        let value_of = plan.body_taxels.iter().map(|&taxel| value_of_taxel[taxel]).collect();
+        Ok(Self { taxels: body.taxels.len(), value_of, touches: Vec::new(), stride: 1, seen: 0, engine })
     }
 
-    /// Takes the touches of `frames`: those that are alone on a field.
+    /// Takes the touches of `frames`: those that nothing else presses beside.
     ///
     /// # Errors
     /// As [`Engine::process`].
     pub fn add(&mut self, frames: &[Frame]) -> Result<()> {
         let percepts = self.engine.process(frames)?.clone();
         for (index, frame) in frames.iter().enumerate() {
-            for field in 0..percepts.fields() {
-                if touches_on(&percepts, index, field) != 1 || self.engine.plan().fields[field].divided {
+            let Some(found) = percepts.touches(index) else { continue };
+            for touch in &found.touches {
+                if touch.flags.contains(TouchFlags::WRAPPED) {
                     continue;
                 }
                 self.seen += 1;
                 if !self.seen.is_multiple_of(self.stride) {
                     continue;
                 }
-                let observed = observed(&self.engine, field, frame, &self.value_of);
+                let observed = observed(&self.engine, (found, touch), |node| {
+                    self.value_of[node as usize].map_or(RawValue::MISSING, |value| frame.values[value])
+                });
                 self.touches.extend(observed);
                 if self.touches.len() > MOST {
                     let mut index = 0;
@@ -158,71 +184,80 @@ impl GainsSurvey {
     /// # Errors
     /// Too few touches press enough taxels at once; it was stopped.
     pub fn finish(self, progress: &mut dyn FnMut(f64) -> bool) -> Result<GainsEstimate> {
-        estimate(&self.touches, self.taxels, START * self.spacing_m, progress)
+        let skin = self.engine.skin().map_or(&[][..], |skin| skin.taxels());
+        let spots: Vec<Spot> =
+            skin.iter().map(|taxel| Spot { position: taxel.position, normal: taxel.mean_normal }).collect();
+        let of_skin = estimate(&self.touches, &spots, progress)?;
+        let mut estimate = GainsEstimate { gains: vec![None; self.taxels], pressed: vec![0; self.taxels], ..of_skin };
+        for (node, &taxel) in self.engine.plan().body_taxels.iter().enumerate() {
+            (estimate.gains[taxel], estimate.pressed[taxel]) = (of_skin.gains[node], of_skin.pressed[node]);
+        }
+        Ok(estimate)
     }
 }
 
-/// How many touches lie on `field` in frame `frame`.
-fn touches_on(percepts: &Percepts, frame: usize, field: usize) -> usize {
-    let Some(found) = percepts.touches(frame) else { return 0 };
-    let is_on = |touch: &&percept::Touch| found.fields(touch).iter().any(|share| share.field as usize == field);
-    found.touches.iter().filter(is_on).count()
+/// The `touch` of those found in a frame that reads `value`, as fits take it; `None` where it cannot be used.
+fn observed(
+    engine: &Engine,
+    (found, touch): (&TouchFrame, &percept::Touch),
+    value: impl Fn(u32) -> RawValue,
+) -> Option<Observed> {
+    let skin = engine.skin()?;
+    let own = found.taxels(touch);
+    if own.len() < LEAST_PRESSED {
+        return None;
+    }
+    let mut near: Vec<u32> = own.iter().flat_map(|&node| skin.beside(node)).chain(own).copied().collect();
+    near.sort_unstable();
+    near.dedup();
+    let unrolled = skin.unrolled(touch.base, touch.link, near);
+    let Around { felt, longest_way_m } = engine.plan().felt_around(skin, &unrolled, value);
+    let is_alone = felt.iter().all(|(node, taxel)| taxel.pressure <= 0.0 || own.contains(node));
+    let is_known = felt.iter().all(|(_, taxel)| taxel.area_m2 > 0.0);
+    let pressed = felt.iter().filter(|(_, taxel)| taxel.pressure > 0.0).count();
+    let taxels = || felt.iter().map(|&(node, taxel)| (node as usize, taxel)).collect();
+    (is_alone && is_known && pressed >= LEAST_PRESSED).then(|| Observed { taxels: taxels(), spacing_m: longest_way_m })
 }
 
-/// The touch on `field`, as fits take it; `None` where it cannot be used.
-fn observed(engine: &Engine, field: usize, frame: &Frame, value_of: &[Option<usize>]) -> Option<Observed> {
-    let (plan, skin) = (engine.plan(), engine.skin()?);
-    // The skin's nodes are the plan's channels.
-    let beside = |taxel: usize| {
-        let node = plan.body_taxels.binary_search(&taxel).ok();
-        let beside = node.map_or(&[][..], |node| skin.beside(node as u32));
-        beside.iter().map(|&other| plan.body_taxels[other as usize])
+/// The taxels of the skin that touches connect, in the order of their first ones.
+fn connected(touches: &[Observed], taxels: usize) -> Vec<Vec<usize>> {
+    // By taxel another one of its part, in the end the first.
+    let mut part: Vec<usize> = (0..taxels).collect();
+    let first = |part: &[usize], mut taxel: usize| {
+        while part[taxel] != taxel {
+            taxel = part[taxel];
+        }
+        taxel
     };
-    let of = &plan.fields[field];
-    of.chart.as_ref()?;
-    if !of.area_known {
-        return None;
+    for touch in touches {
+        let pressed = || touch.taxels.iter().filter(|(_, taxel)| taxel.pressure > 0.0).map(|(node, _)| *node);
+        for (a, b) in pressed().zip(pressed().skip(1)) {
+            let (a, b) = (first(&part, a), first(&part, b));
+            part[a.max(b)] = a.min(b);
+        }
     }
-    let taxels: Vec<usize> = plan.taxels_of(field).collect();
-    let taxel = |member: usize| plan.pressed_taxel(of, member, frame.values[value_of[taxels[member]]?]);
-    let all: Vec<Option<Taxel>> = (0..of.count).map(taxel).collect();
-    let is_pressed = |member: &usize| all[*member].is_some_and(|taxel| taxel.pressure > 0.0);
-    let pressed: Vec<usize> = (0..of.count).filter(is_pressed).collect();
-    // A point has four parameters; with one taxel more than that some agree by chance.
-    if pressed.len() < 6 {
-        return None;
-    }
-    let around = pressed.iter().flat_map(|&member| beside(taxels[member]));
-    let around = around.filter_map(|taxel| taxels.iter().position(|&other| other == taxel));
-    let members: BTreeSet<usize> = pressed.iter().copied().chain(around).collect();
-    let reach_m = 2.0 * of.spacing * f64::from(of.unit_m);
-    let taxels = members.into_iter().filter_map(|member| Some((taxels[member], all[member]?))).collect();
-    Some(Observed { field, taxels, reach_m })
+    let mut parts: Vec<Vec<usize>> = vec![Vec::new(); taxels];
+    (0..taxels).for_each(|taxel| parts[first(&part, taxel)].push(taxel));
+    parts.retain(|part| part.len() > 1);
+    parts
 }
 
-fn estimate(
-    touches: &[Observed],
-    taxels: usize,
-    start_m: f64,
-    progress: &mut dyn FnMut(f64) -> bool,
-) -> Result<GainsEstimate> {
+fn estimate(touches: &[Observed], spots: &[Spot], progress: &mut dyn FnMut(f64) -> bool) -> Result<GainsEstimate> {
     const LEAST: usize = 50;
     if touches.len() < LEAST {
         return Err(failed!(
-            "{} frames have a touch alone on a field that presses six taxels or more, of {LEAST} that are needed; let a finger wander over \
-             all of the skin for two minutes",
+            "{} touches press six taxels or more with nothing beside them, of {LEAST} that are needed; let a finger wander over all of \
+             the skin for two minutes",
             touches.len()
         ));
     }
-    let (mut gains, mut sigma_m) = (vec![0.0_f64; taxels], start_m);
+    let taxels = spots.len();
+    let mut spacings: Vec<f64> = touches.iter().map(|touch| touch.spacing_m).collect();
+    spacings.sort_by(f64::total_cmp);
+    let (mut gains, mut sigma_m) = (vec![0.0_f64; taxels], START * spacings[spacings.len() / 2]);
     let (mut width_m, mut left, mut used) = (0.0, 0.0, 0);
     let mut pressed = vec![0; taxels];
-    // By field and taxel.
-    let mut places: BTreeMap<usize, BTreeMap<usize, DVec2>> = BTreeMap::new();
-    for touch in touches {
-        let of_field = places.entry(touch.field).or_default();
-        of_field.extend(touch.taxels.iter().map(|(index, taxel)| (*index, taxel.place_m)));
-    }
+    let parts = connected(touches, taxels);
     for round in 0..ROUNDS {
         let fitted: Vec<Touch> = touches.iter().map(|touch| touch.under(&gains, sigma_m)).collect();
         let explained = fit_each(&fitted.iter().collect::<Vec<_>>(), |touch, fits| touch.explained(fits?));
@@ -255,13 +290,9 @@ fn estimate(
         for ((gain, weight), sum) in gains.iter_mut().zip(&weights).zip(&sums) {
             *gain += sum / (weight + 1.0 / (SPREAD * SPREAD));
         }
-        for field in places.values() {
-            let known: Vec<(usize, DVec2)> = field
-                .iter()
-                .map(|(&index, &at)| (index, at))
-                .filter(|(index, _)| pressed[*index] >= LEAST_TOUCHES)
-                .collect();
-            take_off(&mut gains, &known);
+        for part in &parts {
+            let known: Vec<usize> = part.iter().copied().filter(|&taxel| pressed[taxel] >= LEAST_TOUCHES).collect();
+            take_off(&mut gains, spots, &known);
         }
         widths.sort_by(f64::total_cmp);
         width_m = widths[widths.len() / 2];
@@ -277,19 +308,26 @@ fn estimate(
     Ok(GainsEstimate { gains, pressed, width_m, sigma_m, left, touches: used })
 }
 
-/// Takes off the logarithms of `gains` of the taxels that are `known`, with their places, what touches cannot tell.
-fn take_off(gains: &mut [f64], known: &[(usize, DVec2)]) {
+/// Takes off the logarithms of `gains` of the taxels `known`, which are at `spots`, what touches cannot tell.
+fn take_off(gains: &mut [f64], spots: &[Spot], known: &[usize]) {
     let count = known.len();
-    let middle = known.iter().map(|(_, at)| *at).sum::<DVec2>() / count.max(1) as f64;
-    let size = known.iter().map(|(_, at)| at.distance(middle)).fold(f64::MIN_POSITIVE, f64::max);
-    let of =
-        |shape: fn(DVec2) -> f64| -> Vec<f64> { known.iter().map(|(_, at)| shape((*at - middle) / size)).collect() };
+    let mean =
+        |of: fn(&Spot) -> DVec3| known.iter().map(|&taxel| of(&spots[taxel])).sum::<DVec3>() / count.max(1) as f64;
+    let (middle, facing) = (mean(|spot| spot.position), mean(|spot| spot.normal));
+    let side = (facing.length() >= ONE_WAY).then(|| facing.normalize().any_orthonormal_pair());
+    let placed = |&taxel: &usize| {
+        let from_middle = spots[taxel].position - middle;
+        side.map_or(from_middle, |(u, v)| DVec3::new(from_middle.dot(u), from_middle.dot(v), 0.0))
+    };
+    let places: Vec<DVec3> = known.iter().map(placed).collect();
+    let size = places.iter().map(|at| at.length()).fold(f64::MIN_POSITIVE, f64::max);
+    let all = if side.is_some() { &UNKNOWABLE_ON_A_SIDE[..] } else { &UNKNOWABLE_AROUND[..] };
     // The constant alone where taxels are too few to see more in.
-    let shapes = if count > 2 * UNKNOWABLE.len() { &UNKNOWABLE[..] } else { &UNKNOWABLE[..1] };
+    let shapes = if count > 2 * all.len() { all } else { &all[..1] };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for shape in shapes {
-        let mut vector = of(*shape);
+        let mut vector: Vec<f64> = places.iter().map(|at| shape(*at / size)).collect();
         for other in &basis {
             let along = dot(&vector, other);
             vector.iter_mut().zip(other).for_each(|(x, y)| *x -= along * y);
@@ -302,15 +340,15 @@ fn take_off(gains: &mut [f64], known: &[(usize, DVec2)]) {
         }
     }
     for vector in &basis {
-        let along: f64 = known.iter().zip(vector).map(|((index, _), x)| gains[*index] * x).sum();
-        known.iter().zip(vector).for_each(|((index, _), x)| gains[*index] -= along * x);
+        let along: f64 = known.iter().zip(vector).map(|(&taxel, x)| gains[taxel] * x).sum();
+        known.iter().zip(vector).for_each(|(&taxel, x)| gains[taxel] -= along * x);
     }
 }
 
 impl Observed {
     /// It with `gains` taken off, as fits take it.
     fn under(&self, gains: &[f64], sigma_m: f64) -> Touch {
-        let layer = Layer { sigma_m, gain_spread: MODEL, reach_m: self.reach_m, steps: STEPS };
+        let layer = Layer { sigma_m, gain_spread: MODEL, reach_m: REACH * self.spacing_m, steps: STEPS };
         let taxel = |&(index, taxel): &(usize, Taxel)| {
             let by = (-gains[index]).exp();
             let sigma = taxel.sigma.map(|sigma| by * sigma);

@@ -113,8 +113,8 @@ pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{
-    COLUMNS, Column, ContactKind, Fit, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact,
-    SelfContactSide, TOUCH_COLUMNS, Touch, TouchColumn, TouchFlags, TouchFrame, TouchOutputs,
+    COLUMNS, Column, ContactKind, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact, SelfContactSide,
+    TOUCH_COLUMNS, Touch, TouchColumn, TouchFit, TouchFlags, TouchFrame, TouchOutputs,
 };
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, FrameTime, Letter, Pose, RawValue, Receptor};

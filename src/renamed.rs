@@ -2,7 +2,7 @@
 
 /// Old names and what they are now, flags without their `--`; `*` is the rest of a name. What one name stood for may be called by
 /// several now: which of them is meant follows from what is known where it is given.
-const RENAMED: [(&str, &str); 16] = [
+const RENAMED: [(&str, &str); 25] = [
     // Outputs, ways to an orientation, tables.
     ("axis", "principal_axis"),
     ("axis_sigma", "principal_axis_sigma"),
@@ -10,6 +10,16 @@ const RENAMED: [(&str, &str); 16] = [
     ("footprint", "fit"),
     ("footprint-*", "fit-*"),
     ("footprint_*", "fit_*"),
+    // What presses, of touches in place of fields.
+    ("fit_*", "touches.fit_*"),
+    ("fit_angle", "touches.fit_direction"),
+    ("fit_displacement", "touches.fit_velocity"),
+    ("fit_speed", "touches.fit_velocity"),
+    ("fit_place_sigma", "touches.fit_sigmas"),
+    ("fit_force_sigma", "touches.fit_sigmas"),
+    ("fit_angle_sigma", "touches.fit_sigmas"),
+    ("fit_width_sigma", "touches.fit_sigmas"),
+    ("fit_length_sigma", "touches.fit_sigmas"),
     // Keys of scenes.
     ("force", "overwrite"),
     ("in", "relative_to"),
@@ -23,10 +33,10 @@ const RENAMED: [(&str, &str); 16] = [
     ("in", "relative-to"),
     ("skin", "gains-from"),
     // A whole group of outputs.
-    ("footprint", "fit_*"),
+    ("footprint", "touches.fit_*"),
 ];
 
-/// What `old` is called now, if it was renamed and its new name is one of `known`, or stands for several of them.
+/// What `old` is called now, if it was renamed, once or twice, and its new name is one of `known`, or stands for several of them.
 #[must_use]
 pub fn new_name<'k>(old: &str, known: impl IntoIterator<Item = &'k str>) -> Option<String> {
     let known: Vec<&str> = known.into_iter().collect();
@@ -34,13 +44,20 @@ pub fn new_name<'k>(old: &str, known: impl IntoIterator<Item = &'k str>) -> Opti
         Some(group) => known.iter().any(|name| name.starts_with(group)),
         None => known.contains(&new.as_str()),
     };
-    RENAMED.iter().filter_map(|(was, now)| put(old, was, now)).find(is_known)
+    let once: Vec<String> = names_after(old).collect();
+    let twice = once.iter().flat_map(|name| names_after(name));
+    once.iter().cloned().chain(twice).find(is_known)
 }
 
 /// What `new` was called before, if that was otherwise: to read what was written then.
 #[must_use]
 pub fn old_name(new: &str) -> Option<String> {
     RENAMED.iter().find_map(|(was, now)| put(new, now, was))
+}
+
+/// What `old` may have been called next.
+fn names_after(old: &str) -> impl Iterator<Item = String> {
+    RENAMED.iter().filter_map(move |(was, now)| put(old, was, now))
 }
 
 /// `name` with `to` in the place of `from`, if it is called so.
@@ -65,10 +82,20 @@ mod tests {
         // Not all that was called so is called otherwise.
         is("skin", &["body", "taxels"], None);
         is("footprint", &["fit-1", "fit"], Some("fit"));
-        is("footprint", &["total", "fit_angle"], Some("fit_*"));
+        is("footprint", &["total", "touches.fit_place"], Some("touches.fit_*"));
         is("footprint_angle", &["total", "fit_angle"], Some("fit_angle"));
         is("footprint_*", &["total", "fit_angle"], Some("fit_*"));
         is("footprint_age", &["total", "fit_angle"], None);
+        // What was renamed twice.
+        let of_touches = ["total", "touches.fit_place", "touches.fit_direction", "touches.fit_sigmas"];
+        is("fit_place", &of_touches, Some("touches.fit_place"));
+        is("fit_angle", &of_touches, Some("touches.fit_direction"));
+        is("fit_angle_sigma", &of_touches, Some("touches.fit_sigmas"));
+        is("fit_*", &of_touches, Some("touches.fit_*"));
+        is("footprint_place", &of_touches, Some("touches.fit_place"));
+        is("footprint_angle", &of_touches, Some("touches.fit_direction"));
+        is("footprint_*", &of_touches, Some("touches.fit_*"));
+        is("fit_age", &of_touches, None);
         is("total", &["total"], None);
         assert_eq!((old_name("fit_angle").as_deref(), old_name("total")), (Some("footprint_angle"), None));
         assert_eq!(old_name("principal_axis").as_deref(), Some("axis"));

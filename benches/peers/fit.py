@@ -3,8 +3,8 @@
 
     benches/peers/fit.py SOMATIC     after benches/peers/run has made the Python environment; SOMATIC is the program
 
-Simulates examples/simulations/turn.toml, fits every frame four times over, checks the angles against somatic's own, and takes turns with
-`somatic tradeoff` on the same frames.
+Simulates examples/simulations/turn.toml on the nine sensors of the hand's back, fits every frame four times over, checks the angles
+against those of somatic's touches, and takes turns with `somatic tradeoff` on the same frames.
 """
 import json
 import math
@@ -274,12 +274,20 @@ def main(somatic):
         subprocess.run([somatic, "simulate", simulation, "-o", rod], check=True, capture_output=True)
         header = rod.read_text().splitlines()[0].split(",")
         table = np.genfromtxt(rod, delimiter=",", skip_header=1)
-        outputs = "fit_kind,fit_angle,fit_place"
-        run = [somatic, "run", "--source", f"sim:{simulation}", "--fields", "hand/back", "--outputs", outputs, "--sink", "-"]
+        ids = [16, 17, 18, 19, 20, 21, 22, 23, 24]
+        # The other sensors of the hand have no value, so that both have the same nine.
+        kept = [0, *(header.index(str(i)) for i in ids)]
+        rows = (",".join(line.split(",")[column] for column in kept) for line in rod.read_text().splitlines())
+        nine = Path("target/peers/nine.csv")
+        nine.write_text("\n".join(rows) + "\n")
+        calibration = Path("target/peers/nine.calibration.toml")
+        calibration.write_text(rod.with_suffix(".calibration.toml").read_text())
+        source = ["--body", "hand", "--source", nine, "--calibration", calibration]
+        outputs = "touches.fit_kind,touches.fit_direction,touches.fit_place"
+        run = [somatic, "run", *source, "--outputs", outputs, "--sink", "-"]
         lines = subprocess.run(run, check=True, capture_output=True, text=True).stdout.splitlines()
-    fields = [json.loads(line)["fields"] for line in lines]
-    theirs = [(of[0] if of else {}) for of in fields]
-    ids = [16, 17, 18, 19, 20, 21, 22, 23, 24]
+    touches = [json.loads(line).get("touches", []) for line in lines]
+    theirs = [max(of, key=lambda touch: touch["total"], default={}) for of in touches]
     uv = np.array([[u, v] for v in (0.011, 0.0, -0.011) for u in (-0.012, 0.0, 0.012)])
     counts = table[:, [header.index(str(i)) for i in ids]]
     pressures, threshold = newton(counts)
@@ -292,8 +300,8 @@ def main(somatic):
     print(f"{len(pairs)} of {len(found)} are fitted by both; angles differ by up to {math.degrees(max(apart)):.1e} degrees")
     many, results = np.tile(counts, (4, 1)), np.zeros((4 * len(counts), 4))
     # All frames in one call, as Numba has them.
-    tradeoff = [somatic, "tradeoff", "--source", f"sim:{simulation}", "--fields", "hand/back", "--backend", "cpu", "--seconds", "2",
-                "--frames", "2880", "--batch", "2880", "--json"]
+    tradeoff = [somatic, "tradeoff", *source, "--fields", "hand/back", "--backend", "cpu", "--seconds", "2", "--frames", "2880",
+                "--batch", "2880", "--json"]
     times, own, ratios = [], [], []
     for _ in range(5):
         rounds = []
@@ -306,7 +314,7 @@ def main(somatic):
         rows = json.loads(subprocess.run(tradeoff, check=True, capture_output=True, text=True).stdout)["rows"]
         of = lambda by: min(row["p50_us"] for row in rows if row["way"] == "batch" and row["orientation_by"] == by)
         times.append(sorted(rounds)[2])
-        # What fits take beside the moments of the same frames.
+        # What touches and their fits take beside the moments of the same frames.
         own.append(of("fit") - of("second-moments"))
         ratios.append(times[-1] / own[-1])
     middle = lambda numbers: sorted(numbers)[2]

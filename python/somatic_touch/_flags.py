@@ -40,11 +40,6 @@ class Flags(_Flags):
     JUMPED = 1 << 17
     DRIFT_UNKNOWN = 1 << 18
     NO_UNIT = 1 << 19
-    FEW_TAXELS = 1 << 20
-    OFF_FIELD = 1 << 21
-    POOR_FIT = 1 << 22
-    CURVED = 1 << 23
-    NO_LAYER = 1 << 24
     NOISE_UNKNOWN = 1 << 25
     UNSURE = 1 << 26
     STALE_POSE = 1 << 27

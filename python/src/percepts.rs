@@ -9,6 +9,7 @@ use pyo3::types::PyCapsule;
 use somatic::error::{suggestion, unknown};
 use somatic::percept::ColumnValues;
 use somatic::renamed::new_name;
+use somatic::scene::AskedOutputs;
 use somatic::sink::TableKind;
 use somatic::{COLUMNS, Column, Flags, Outputs, Percepts};
 
@@ -59,7 +60,13 @@ impl PyPercepts {
                 _ if COLUMNS.iter().any(|column| column.name == name) => {
                     format!("`{name}` was not asked for; add it to the scene's outputs")
                 }
-                _ => unknown("output", name, outputs.columns().map(|column| column.name)),
+                _ => {
+                    let names: Vec<String> = AskedOutputs::names().filter(|name| name.starts_with("touches.")).collect();
+                    match new_name(name, names.iter().map(String::as_str)) {
+                        Some(new) => format!("`{name}` is `{new}` now; see `.touches`"),
+                        None => unknown("output", name, outputs.columns().map(|column| column.name)),
+                    }
+                }
             },
         ))
     }
@@ -134,8 +141,7 @@ impl PyPercepts {
         let column = self.column(py, name)?;
         let p = self.run.unit();
         Ok(match column.unit {
-            Unit::Force if p == "Pa" => "N".to_owned(),
-            Unit::P | Unit::Force if !p.is_empty() => p.to_owned(),
+            Unit::P if !p.is_empty() => p.to_owned(),
             unit => unit.symbol().to_owned(),
         })
     }

@@ -11,7 +11,7 @@ use crate::stage::calibrate::Pressure;
 use crate::stage::limit::Limit;
 use crate::stage::{
     Given, GivenLimit, Pressed, U, centroid, contact, difference, filter, force, hysteresis, motion, orientation,
-    principal_axis, touches,
+    principal_axis,
 };
 
 /// How far a single-precision percept may be off in one cell.
@@ -31,8 +31,6 @@ pub(crate) struct CellBound {
 pub(crate) struct MayRemember {
     /// Whether there was contact, and where: the rest hangs on that too.
     pub(crate) contact: bool,
-    /// Which touches there were.
-    pub(crate) touches: bool,
     /// The last centroid that counted.
     pub(crate) filter: bool,
 }
@@ -55,7 +53,7 @@ impl CellBound {
             in_doubt: (Flags::all() - INPUT) | flags,
             limits: [Limit::TooClose; _],
             centroid: Limit::TooClose,
-            may_remember: MayRemember { contact: true, touches: true, filter: true },
+            may_remember: MayRemember { contact: true, filter: true },
         }
     }
 
@@ -84,7 +82,6 @@ struct Doubt {
     place: f64,
     /// That centroid is not known, as it was too close to call and is not in the percepts.
     unread: bool,
-    touches: touches::Doubt,
     filter: filter::Doubt,
     difference: difference::Doubt,
 }
@@ -168,11 +165,6 @@ impl BoundedReference {
         (self.doubts[index].place, self.doubts[index].unread) = (0.0, moves && state.centroid.is_none());
     }
 
-    /// The same for what the host remembers of the touches.
-    pub(crate) fn restore_touches(&mut self, index: usize, memory: &touches::Memory) {
-        self.doubts[index].touches = touches::Doubt::after(memory);
-    }
-
     /// The same for what the host's filter remembers.
     pub(crate) fn restore_filter(&mut self, index: usize, memory: &filter::Memory, trail: &difference::Memory) {
         self.doubts[index].filter = filter::Doubt::after(memory);
@@ -216,7 +208,6 @@ impl BoundedReference {
         let unread = std::mem::take(&mut doubt.unread);
         if !hysteresis::reference(total, field.thresholds, cell.before.contact) {
             if cell.advances {
-                doubt.touches.release();
                 doubt.filter.release();
                 doubt.difference.release();
             }
@@ -248,9 +239,6 @@ impl BoundedReference {
             } else {
                 moved(&mut bound, field, cell, (touched, doubt.place), before);
             }
-        }
-        if plan.stages().fit {
-            self.touches(&mut bound, cell, &mut doubt.touches);
         }
         if field.charted && plan.stages().filter && cell.advances {
             let clock = filter::Clock::new(cell.step.dt_s, cell.step.flags);
@@ -286,24 +274,6 @@ impl BoundedReference {
             bound.set(axis.limits(cell.present));
             bound.in_doubt |= axis.line.in_doubt;
         }
-    }
-
-    fn touches(&self, bound: &mut CellBound, cell: &Cell<'_>, doubt: &mut touches::Doubt) {
-        let field = &self.reference.plan.fields[cell.index];
-        let pulls = |member: usize, slot: u32, weight: f32| {
-            let pressure = cell.pressures[slot as usize];
-            let right = self.reference.plan.weight(field, member);
-            let rounding = (f64::from(weight) - right).abs() * (pressure.value + pressure.bound);
-            let pressed = pressure.value > 0.0;
-            (right * pressure.value, if pressed { right * pressure.bound + rounding } else { 0.0 })
-        };
-        let members = self.reference.plan.members_of(field).iter().enumerate();
-        let (pulls, off): (Vec<f64>, Vec<f64>) =
-            members.map(|(index, member)| pulls(index, member.slot, member.weight)).unzip();
-        if cell.step.restarts() {
-            doubt.release();
-        }
-        bound.may_remember.touches = cell.advances && doubt.follow(&field.skin(), &pulls, off);
     }
 }
 

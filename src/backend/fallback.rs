@@ -4,7 +4,6 @@ use super::{Backend, BackendState, FieldState, RawBatch, cpu};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
-use crate::stage::fit::{Ends, Touch};
 
 /// The backend that runs, and what the other one needs to go on.
 pub(super) struct Fallback {
@@ -79,10 +78,6 @@ impl Backend for Fallback {
         self.or_on_cpu(|backend| backend.run(raw, percepts))?;
         self.keep(raw, percepts);
         Ok(())
-    }
-
-    fn descend(&mut self, touches: &[&Touch]) -> Result<Option<Vec<Option<Ends<f64>>>>> {
-        self.or_on_cpu(|backend| backend.descend(touches))
     }
 }
 

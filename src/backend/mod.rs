@@ -19,7 +19,6 @@ pub(crate) use self::state::{BackendState, FieldState};
 use crate::error::{Error, Result};
 use crate::percept::{Percepts, Precision};
 use crate::scene::{Arithmetic, Plan};
-use crate::stage::fit::{Ends, Touch};
 
 words! {"backend",
     /// Which backend is asked for.
@@ -83,10 +82,4 @@ pub(crate) trait Backend: Send {
 
     /// Turns `raw` into those frames of `percepts` that stand for it; `percepts` hold this backend's precision.
     fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()>;
-
-    /// Where the descents of contacts to `touches` end; none of a touch with too few taxels. Without a device of its own a backend
-    /// leaves them to the CPU.
-    fn descend(&mut self, _touches: &[&Touch]) -> Result<Option<Vec<Option<Ends<f64>>>>> {
-        Ok(None)
-    }
 }

@@ -69,7 +69,7 @@ pub(super) struct RunOptions {
     #[schemars(with = "OneOrMany")]
     pub(super) fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches, self_contacts, speed_in_world, filtered_*, fit_* and *_sigma;
+    /// Compute only these quantities [default: all but touches, self_contacts, speed_in_world, filtered_* and *_sigma;
     /// force only where P has a unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', help = outputs_help())]
     #[serde(deserialize_with = "outputs")]
@@ -168,7 +168,7 @@ pub(super) struct RunOptions {
     #[serde(rename = "filter_time_s")]
     pub(super) filter_time: Option<f64>,
 
-    /// Measure fit_speed (0.2 s without this) and the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
+    /// Measure the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
     /// --filter-window, of which the high end still counts. 0.2 is steady where few sensors feel a touch.
     #[arg(long, help_heading = COMPUTED, value_name = "S", allow_hyphen_values = true)]
     #[serde(rename = "filter_over_s")]

@@ -184,12 +184,11 @@ impl Engine {
             // As the backend left them: post-processing may put the last frame's percepts in their place.
             let left = check.is_some().then(|| FieldState::after(&self.plan, &self.percepts, raw.first + offset));
             post.frame(offset, frame, &raw, &mut self.percepts, &mut self.post);
-            post.fit_now(&raw, &mut self.percepts, &mut self.post, Some(&mut *self.backend))?;
             if let (Some(check), Some(left)) = (&mut check, left) {
-                check.frame(&post, (offset, frame), &raw, &left, &self.post)?;
+                check.frame(&post, (offset, frame), &raw, &left, &self.post);
             }
         }
-        post.finish(&raw, &mut self.percepts, &mut self.post, Some(&mut *self.backend))?;
+        post.finish(&raw, &mut self.percepts, &mut self.post);
         if let Some(on_skin) = &mut self.on_skin {
             let of_touches = check.as_deref_mut().and_then(|check| check.touches.as_mut());
             let about = (&self.plan, &self.links);
@@ -200,7 +199,7 @@ impl Engine {
             }
         }
         if let Some(check) = &mut check {
-            check.finish(&post, &raw, first_bound)?;
+            check.finish(&post, &raw, first_bound);
         }
         if let Some(drift) = &mut self.drift {
             let cells = range.start * self.plan.fields.len()..range.end * self.plan.fields.len();

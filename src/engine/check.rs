@@ -1,7 +1,7 @@
 //! The comparison of a backend's percepts with the reference's.
 //!
 //! Where the reference cannot tell by its own margin, a backend may choose otherwise and keep another state: of a contact, a
-//! centroid, touches, a filter. From there on the reference goes on from the backend's state, field by field, so that what
+//! centroid, a filter. From there on the reference goes on from the backend's state, field by field, so that what
 //! follows is comparable. The percepts compared are those that the backend gives without a comparison, to the bit.
 
 use super::post::{Post, PostFieldState, PostState};
@@ -51,7 +51,6 @@ impl Check {
         };
         check.reference.restore(backend)?;
         for (field, state) in post.fields.iter().enumerate() {
-            check.reference.restore_touches(field, &state.touches);
             check.reference.restore_filter(field, &state.filter, &state.difference);
         }
         Ok(check)
@@ -72,7 +71,7 @@ impl Check {
         raw: &RawBatch<'_>,
         left: &[FieldState],
         after: &PostState,
-    ) -> Result<()> {
+    ) {
         let advances = |field| post.cadence.is_none_or(|cadence| cadence.since(offset, field).is_some());
         let mut bounds = self.reference.run(raw, offset, &mut self.right, advances);
         if let (Some(touches), Some(first)) = (&mut self.touches, post.plan.touched_from) {
@@ -91,7 +90,6 @@ impl Check {
             }
         }
         post.frame(offset, frame, raw, &mut self.right, &mut self.post);
-        post.fit_now(raw, &mut self.right, &mut self.post, None)?;
         if post.plan.stages().world_motion {
             self.bound_world_motion(raw.steps[offset].dt_s, &before, &mut bounds);
         }
@@ -99,16 +97,14 @@ impl Check {
             self.restore_doubtful(field, bound, left[field], &after.fields[field]);
         }
         self.bounds.extend(bounds);
-        Ok(())
     }
 
     /// Ends a call, whose bounds begin at `first`.
-    pub(super) fn finish(&mut self, post: &Post<'_>, raw: &RawBatch<'_>, first: usize) -> Result<()> {
-        post.finish(raw, &mut self.right, &mut self.post, None)?;
+    pub(super) fn finish(&mut self, post: &Post<'_>, raw: &RawBatch<'_>, first: usize) {
+        post.finish(raw, &mut self.right, &mut self.post);
         if let Some(cadence) = post.cadence {
             cadence.bounds(&mut self.bounds[first..], raw.steps, &mut self.last_bounds);
         }
-        Ok(())
     }
 
     /// Takes from `percepts` which fields several touches are on: touches are made once, of the backend's own pressures.
@@ -142,10 +138,6 @@ impl Check {
             self.reference.restore_field(field, left);
             own.contact = after.contact;
             own.world_motion = after.world_motion;
-        }
-        if may_remember.touches {
-            own.touches = after.touches.clone();
-            self.reference.restore_touches(field, &after.touches);
         }
         if may_remember.filter {
             own.filter = after.filter;
@@ -282,8 +274,7 @@ mod tests {
                 let of = agreement.quantities[name];
                 assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
             };
-            // A fit has no bound: tests/it/fit.rs holds it to its bits.
-            let has_bound = |column: &&Column| column.store != Store::Active && column.stage != "fit";
+            let has_bound = |column: &&Column| column.store != Store::Active;
             for column in COLUMNS.iter().filter(has_bound) {
                 for component in 0..column.components {
                     let limit = |bound: &CellBound| match (column.measure, bound.centroid) {

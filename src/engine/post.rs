@@ -1,19 +1,17 @@
-//! Post-processing, the same for every backend: places on the surface and in the world, separate touches, filtered motion.
+//! Post-processing, the same for every backend: places on the surface and in the world, forces, filtered motion.
 
 use glam::DVec3;
 
 use super::cadence::{self, OnChange};
-use super::fit::{self, On};
 use super::links::Links;
 use super::place;
 use super::spread::{Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
-use crate::error::Result;
-use crate::percept::{Flags, Host, Outputs, Percepts, Precision, Values};
+use crate::percept::{Flags, Host, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::{difference, filter, force, motion, touches, world_motion};
+use crate::stage::{difference, filter, force, motion, world_motion};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -21,7 +19,6 @@ pub(super) struct PostState {
     pub(super) fields: Vec<PostFieldState>,
     /// The percepts of the last frame, where cadence `on-change` may keep some.
     pub(super) last: Option<Percepts>,
-    pub(super) fits: fit::FitState,
     /// The raw values of the last frame by channel, where changes say where fields on several links are touched.
     pub(super) raw_before: Vec<RawValue>,
 }
@@ -29,8 +26,6 @@ pub(super) struct PostState {
 /// The same of one field.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PostFieldState {
-    /// The separate touches of the last frame.
-    pub(super) touches: touches::Memory,
     pub(super) filter: filter::Memory,
     /// Where the centroid was, where motion is measured over a time.
     pub(super) difference: difference::Memory,
@@ -43,13 +38,7 @@ pub(super) struct PostFieldState {
 impl PostState {
     /// The state before the first frame.
     pub(super) fn initial(plan: &Plan) -> Self {
-        let fields = plan.fields.len();
-        Self {
-            fields: vec![PostFieldState::default(); fields],
-            last: None,
-            fits: fit::FitState::initial(fields),
-            raw_before: Vec::new(),
-        }
+        Self { fields: vec![PostFieldState::default(); plan.fields.len()], last: None, raw_before: Vec::new() }
     }
 }
 
@@ -142,7 +131,7 @@ impl Post<'_> {
     ) {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         percepts.t_s[index] = frame.t_s;
-        if !(stages.pressures || stages.filter || stages.world_motion || stages.sigma || self.cadence.is_some()) {
+        if !(stages.force || stages.filter || stages.world_motion || stages.sigma || self.cadence.is_some()) {
             return;
         }
         let (alone, mut now) = (std::slice::from_ref(frame), Now::default());
@@ -167,17 +156,6 @@ impl Post<'_> {
                 continue;
             }
             before.contact = contact;
-            if step.restarts() {
-                before.touches.release();
-            }
-            if stages.fit {
-                let found = self.touches(field, index, cell, percepts, &mut before.touches);
-                match &field.layer {
-                    _ if found.is_empty() => {}
-                    Ok(_) => state.fits.waiting.push(fit::Waiting::new((number, cell, offset), found)),
-                    Err(reason) => percepts.flags[cell] |= *reason,
-                }
-            }
             if stages.filter && field.charted {
                 self.filter(field, step, cell, percepts, before);
             }
@@ -191,26 +169,8 @@ impl Post<'_> {
         }
     }
 
-    /// Fits the touches of the frames completed so far, where frames may keep percepts of the one before.
-    pub(super) fn fit_now(
-        &self,
-        raw: &RawBatch<'_>,
-        percepts: &mut Percepts,
-        state: &mut PostState,
-        on: On<'_>,
-    ) -> Result<()> {
-        if self.cadence.is_some() { fit::all(self.plan, raw, &mut state.fits, percepts, on) } else { Ok(()) }
-    }
-
-    /// Completes the frames of `raw`, and keeps the last percepts of a call, where the next call may need them.
-    pub(super) fn finish(
-        &self,
-        raw: &RawBatch<'_>,
-        percepts: &mut Percepts,
-        state: &mut PostState,
-        on: On<'_>,
-    ) -> Result<()> {
-        fit::all(self.plan, raw, &mut state.fits, percepts, on)?;
+    /// Keeps what the next call may need of `raw` and of its percepts.
+    pub(super) fn finish(&self, raw: &RawBatch<'_>, percepts: &mut Percepts, state: &mut PostState) {
         if let Some(last) = raw.frames.checked_sub(1).filter(|_| self.plan.has_spread_changes()) {
             state.raw_before.clear();
             state.raw_before.extend(raw.rows.row(last));
@@ -219,7 +179,6 @@ impl Post<'_> {
             let last = state.last.get_or_insert_with(|| percepts.clone());
             last.take_frame(percepts, raw.first + raw.frames - 1);
         }
-        Ok(())
     }
 
     /// Keeps the percept of a field in frame `index` as it was in the frame before, which is in `last` where it was of
@@ -316,34 +275,6 @@ impl Post<'_> {
             percepts.add_present(cell, output & self.plan.outputs);
             percepts.set_host(host, cell, &components[..host.column().components]);
         }
-    }
-
-    /// Finds a cell's separate touches.
-    fn touches<'m>(
-        &self,
-        field: &PlanField,
-        frame: usize,
-        cell: usize,
-        percepts: &mut Percepts,
-        memory: &'m mut touches::Memory,
-    ) -> &'m [touches::Found] {
-        if percepts.flags[cell].contains(Flags::NO_CONTACT) {
-            memory.release();
-            return &[];
-        }
-        let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
-        let members = self.plan.members_of(field);
-        let right = percepts.precision() == Precision::F64;
-        let weight = |index: usize, member: &Member| {
-            if right { self.plan.weight(field, index) } else { f64::from(member.weight) }
-        };
-        let pull = |(index, member): (usize, &Member)| weight(index, member) * pressures[member.slot as usize];
-        let pulls: Vec<f64> = members.iter().enumerate().map(pull).collect();
-        let found = memory.follow(&field.skin(), &pulls);
-        if found.len() > 1 {
-            percepts.flags[cell] |= Flags::SEVERAL;
-        }
-        found
     }
 }
 

@@ -9,10 +9,10 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use crate::backend::RawBatch;
 use crate::backend::cpu::fit::fit_each;
-use crate::percept::{ContactKind, Fit, Flags, Percepts, TouchFit, TouchFlags, TouchFrame};
-use crate::scene::{Plan, REACH};
+use crate::percept::{ContactKind, Percepts, TouchFit, TouchFlags, TouchFrame};
+use crate::scene::{Around, Plan, REACH};
 use crate::signal::{LayerResponse, RawValue};
-use crate::stage::fit::{self, Layer};
+use crate::stage::fit::{self, Fit, Layer, Taxel};
 use crate::touch::{Skin, Trail, Unrolled};
 
 /// Where the fits of touches were on the body at rest, by the touches' identities: what the velocities of the next fits depend on.
@@ -151,24 +151,15 @@ impl SkinFits {
         value: impl Fn(u32) -> RawValue,
     ) -> Result<fit::Touch, TouchFlags> {
         let LayerResponse { sigma_m, gain_spread } = self.layer.ok_or(TouchFlags::NO_LAYER)?;
-        let first_slot = plan.touched_from.unwrap_or(0);
-        let mut taxels = Vec::with_capacity(near.nodes.len());
-        for (&node, &place_m) in near.nodes.iter().zip(&near.places_m) {
-            let quantity = plan.calibrations[node as usize].quantity;
-            let Some(taxel) = plan.felt(first_slot + node as usize, quantity, place_m, value(node)) else { continue };
-            if taxel.area_m2 <= 0.0 {
-                return Err(TouchFlags::NO_LAYER);
-            }
-            taxels.push(taxel);
+        let Around { felt, longest_way_m } = plan.felt_around(skin, near, value);
+        let taxels: Vec<Taxel> = felt.into_iter().map(|(_, taxel)| taxel).collect();
+        if taxels.iter().any(|taxel| taxel.area_m2 <= 0.0) {
+            return Err(TouchFlags::NO_LAYER);
         }
         if !taxels.iter().any(|taxel| taxel.pressure > 0.0) {
             return Err(TouchFlags::FEW_TAXELS);
         }
-        let place_of = |node: u32| near.nodes.binary_search(&node).ok().map(|at| near.places_m[at]);
-        let ways = near.nodes.iter().zip(&near.places_m).flat_map(|(&node, from)| {
-            skin.beside(node).iter().filter_map(move |&other| place_of(other)).map(|to| from.distance(to))
-        });
-        let reach_m = REACH * ways.fold(0.0, f64::max);
+        let reach_m = REACH * longest_way_m;
         Ok(fit::Touch::new(&taxels, &Layer { sigma_m, gain_spread, reach_m, steps: self.steps }))
     }
 
@@ -181,7 +172,7 @@ impl SkinFits {
             let on_skin = fit.map(|fit| waiting.on_skin(skin, &fit));
             spots.push(on_skin.map(|(_, spot)| spot));
             let Some(touch) = percepts.touch_mut(waiting.at) else { continue };
-            touch.flags |= said(flags);
+            touch.flags |= flags;
             touch.fit = on_skin.map(|(fit, _)| fit);
         }
         if let Some(over_s) = self.velocity_over_s {
@@ -253,15 +244,4 @@ impl Waiting {
         };
         (given, Spot { place, line: direction.filter(|_| fit.kind == ContactKind::Line) })
     }
-}
-
-/// What a fit says, of a touch.
-fn said(flags: Flags) -> TouchFlags {
-    let pairs = [
-        (Flags::FEW_TAXELS, TouchFlags::FEW_TAXELS),
-        (Flags::OFF_FIELD, TouchFlags::OFF_SKIN),
-        (Flags::POOR_FIT, TouchFlags::POOR_FIT),
-        (Flags::NO_LAYER, TouchFlags::NO_LAYER),
-    ];
-    pairs.into_iter().filter(|(of_field, _)| flags.contains(*of_field)).map(|(_, of_touch)| of_touch).collect()
 }

@@ -154,8 +154,8 @@ mod tests {
         // And their frames have no poses.
         percept.speed_in_world = percept.speed;
         assert_eq!(outputs.columns().count(), outputs.iter().count());
-        // Nor are they self-contacts, or have a unit.
-        for column in (outputs - Outputs::FIT - Outputs::FORCE).columns() {
+        // Nor do they have a unit.
+        for column in (outputs - Outputs::FORCE).columns() {
             let numbers = percept.value(column).unwrap_or_else(|| panic!("{}", column.name));
             assert_eq!(numbers[column.components..].iter().sum::<f64>(), 0.0, "{} has more", column.name);
         }

@@ -1,6 +1,7 @@
 //! Experiments: the paper's figures from simulation, with a table of errors (`docs/paper.md`), and speed on synthetic bodies
 //! (`docs/performance.md`).
 
+mod chart_fit;
 pub mod dump;
 mod figures;
 mod kalman;

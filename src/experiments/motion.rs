@@ -8,10 +8,13 @@ use somatic::percept::{Outputs, Percept};
 use somatic::scene::{MotionFilter, Scene};
 use somatic::signal::{Calibration, Frame};
 use somatic::source::{SimulatedSource, Source as _};
-use somatic::{BackendKind, Engine, Options};
+use somatic::{BackendKind, Engine, Options, touch};
 
+use super::chart_fit::{self, ChartFit, PlaneChart};
 use super::kalman::{self, Kalman};
 
+/// The field that is touched.
+const FIELD: &str = "hand/back";
 const RATE_HZ: f64 = 50.0;
 /// Runs of each case, each with noise of its own.
 const SEEDS: u64 = 30;
@@ -138,8 +141,8 @@ const FIT: usize = 5;
 /// What the sensors' noise and the layer are, for fits.
 const LAYER: &str = "noise = 1.04\n[layer]\nsigma_m = 0.004\n";
 
-/// One run's frames: percepts, and the truth's velocity.
-type Run = Vec<(f64, Percept, [f64; 2])>;
+/// One run's frames: percepts, what is fitted to touches, and the truth's velocity.
+type Run = Vec<(f64, Percept, Option<ChartFit>, [f64; 2])>;
 
 /// All seeds and angles of a case under a hard or a soft onset.
 fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec<(Option<[f64; 2]>, Run)>> {
@@ -163,7 +166,7 @@ fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec
         let angle = if is_rod { format!("angle_deg = {angle_deg}\n") } else { String::new() };
         let text = format!(
             "rate_hz = {RATE_HZ}\nduration_s = {:.6}\n[layer]\nthickness_m = 0.007\n[sensor]\nkind = \"fsr\"\nwiper = 38\n\
-             noise_sigma = 1\n[[touch]]\non = \"hand/back\"\n{keys}\n{angle}path = [{}]\ntimes_s = [{}]\n",
+             noise_sigma = 1\n[[touch]]\non = \"{FIELD}\"\n{keys}\n{angle}path = [{}]\ntimes_s = [{}]\n",
             points[points.len() - 1][0],
             path.join(", "),
             times.join(", ")
@@ -184,9 +187,11 @@ fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec
     let dead_band = if onset == "soft" { THRESHOLD } else { 0.5 * THRESHOLD };
     let keys = format!("[all]\nsensor = \"fsr\"\nwiper = 38\ndead_band = {dead_band}\nonset = \"{onset}\"\n{LAYER}");
     let scene = Scene::default()
-        .outputs(Outputs::CENTROID | Outputs::MOTION | Outputs::FILTERED | Outputs::FIT_MOTION)
+        .outputs(Outputs::CENTROID | Outputs::MOTION | Outputs::FILTERED)
         .filter(MotionFilter::default().over_s(OVER_S))
-        .fields(vec!["hand/back".to_owned()]);
+        .touches(touch::Options { velocity_over_s: OVER_S, ..chart_fit::asked() })
+        .fields(vec![FIELD.to_owned()]);
+    let chart = PlaneChart::new(body, FIELD)?;
     let calibration = Calibration::parse(&keys, &ids)?;
     let options = Options::default()
         .scene(scene)
@@ -199,7 +204,8 @@ fn runs(body: &Body, indenter: usize, motion: Motion, onset: &str) -> Result<Vec
     let mut runs: Vec<(Option<[f64; 2]>, Run)> = directions.into_iter().map(|along| (along, Vec::new())).collect();
     for (index, (run, velocity)) in truths.into_iter().enumerate() {
         let t_s = frames[index].t_s - run as f64 * BETWEEN_RUNS_S;
-        runs[run].1.push((t_s, percepts.get(index, 0), velocity.unwrap_or_default()));
+        let fit = chart.fit(percepts.touches(index));
+        runs[run].1.push((t_s, percepts.get(index, 0), fit, velocity.unwrap_or_default()));
     }
     Ok(runs)
 }
@@ -214,16 +220,16 @@ fn velocity(displacement: Option<[f64; 2]>, speed: Option<f64>) -> Option<[f64; 
 /// Adds what every way makes of a run.
 fn judge(run: &Run, across: Option<[f64; 2]>, is_soft: bool, errors: &mut [Errors; 6], speeds: &mut Vec<f64>) {
     let mut filter = Kalman::with_lag(OVER_S / 2.0, 1.0 / RATE_HZ);
-    for (index, (t_s, percept, right)) in run.iter().enumerate() {
+    for (index, (t_s, percept, fit, right)) in run.iter().enumerate() {
         let tracked = filter.follow(percept.centroid);
         let Some(now) = percept.centroid.filter(|_| *t_s >= WARM_UP_S) else { continue };
         let over = |frames: usize| {
-            let (before_s, then, _) = &run[index.checked_sub(frames)?];
+            let (before_s, then, ..) = &run[index.checked_sub(frames)?];
             let then = then.centroid?;
             Some([0, 1].map(|axis| (now[axis] - then[axis]) / (t_s - before_s)))
         };
         let steady = velocity(percept.filtered_displacement, percept.filtered_speed);
-        let fitted = velocity(percept.fit_displacement, percept.fit_speed);
+        let fitted = fit.and_then(|fit| fit.velocity);
         let ways: Vec<(usize, Option<[f64; 2]>)> = if is_soft {
             vec![(4, steady)]
         } else {

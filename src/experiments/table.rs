@@ -133,7 +133,7 @@ struct Scores {
     /// Degrees.
     two_points: Errors,
     principal_axis: Errors,
-    /// The place of the fitted contact, as `centroid`, and its angle.
+    /// The place of the contact fitted to the touch, as `centroid`, and its angle.
     fit_place: Errors,
     fit: Errors,
     fitted: u64,
@@ -159,24 +159,24 @@ impl Scores {
 
     fn add(&mut self, moment: &Moment, earlier: Option<&Moment>, signal: usize) {
         let Some(truth) = &moment.truth else { return };
-        let percept = &moment.percepts[signal];
+        let (percept, fit) = (&moment.percepts[signal], &moment.fits[signal]);
         self.frames += 1;
         self.felt += u64::from(percept.contact);
-        self.fitted += u64::from(percept.fit_place.is_some());
+        self.fitted += u64::from(fit.is_some());
         let place = |errors: &mut Errors, seen: Option<[f64; 2]>| {
             let Some((seen, right)) = seen.zip(truth.uv) else { return };
             let error = [(seen[0] - right[0]) * 1e3, (seen[1] - right[1]) * 1e3];
             errors.add(truth.angle.map_or_else(|| libm::hypot(error[0], error[1]), |angle| across(error, angle)));
         };
         place(&mut self.centroid, percept.centroid);
-        place(&mut self.fit_place, percept.fit_place);
+        place(&mut self.fit_place, fit.map(|fit| fit.place));
         if let Some(right) = truth.angle {
             let compare = |errors: &mut Errors, seen: Option<f64>| {
                 seen.into_iter().for_each(|seen| errors.add(between_lines(seen, right).to_degrees()));
             };
             compare(&mut self.two_points, percept.orientation);
             compare(&mut self.principal_axis, percept.principal_axis);
-            compare(&mut self.fit, percept.fit_angle);
+            compare(&mut self.fit, fit.and_then(|fit| fit.angle));
             let tied = percept.flags.contains(Flags::TIE);
             let is_across = |seen: f64| between_lines(seen, right).to_degrees() > ACROSS_DEG;
             let across = percept.orientation.is_some_and(is_across);

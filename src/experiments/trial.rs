@@ -2,6 +2,7 @@
 
 use std::array;
 
+use super::chart_fit::{self, ChartFit, PlaneChart};
 use somatic::backend::BackendKind;
 use somatic::body::Body;
 use somatic::error::Result;
@@ -66,7 +67,7 @@ fn filter() -> MotionFilter {
     MotionFilter::default().low_m(0.5e-3).high_m(6e-3).by(FilterBy::Distance).time_constant_s(0.15)
 }
 
-/// One frame: readings, forces, truth, and the field's percept from each of [`Signal::ALL`].
+/// One frame: readings, forces, truth, and from each of [`Signal::ALL`] the field's percept and what is fitted to its touch.
 #[derive(Clone, Debug)]
 pub(super) struct Moment {
     pub(super) t_s: f64,
@@ -76,6 +77,7 @@ pub(super) struct Moment {
     /// The truth of the touch, if one presses.
     pub(super) truth: Option<Truth>,
     pub(super) percepts: [Percept; 2],
+    pub(super) fits: [Option<ChartFit>; 2],
 }
 
 /// The ids of the taxels that a simulation delivers, and its frames.
@@ -148,13 +150,15 @@ impl Series {
     }
 
     fn with_percepts(self, source: &SimulatedSource, field: &str) -> Result<Vec<Moment>> {
+        let chart = PlaneChart::new(source.body(), field)?;
         let mut percepts = Vec::with_capacity(2);
         for (signal, frames) in Signal::ALL.into_iter().zip(&self.signals) {
             let calibration = calibration(signal, source.body().taxels.len());
-            let fitted = if calibration.is_some() { Outputs::FIT } else { Outputs::empty() };
+            let touches = calibration.is_some().then(chart_fit::asked);
             let moments = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
             let scene = Scene::default()
-                .outputs(moments | fitted | Outputs::MOTION | Outputs::FILTERED)
+                .outputs(moments | Outputs::MOTION | Outputs::FILTERED)
+                .touches(touches)
                 .filter(filter())
                 .fields(vec![field.to_owned()]);
             let options = Options::default()
@@ -165,14 +169,16 @@ impl Series {
             let mut engine = Engine::new(source.body(), options)?;
             engine.set_channels(source.taxels())?;
             let batch = engine.process(frames)?;
-            percepts.push((0..batch.frames()).map(|frame| batch.get(frame, 0)).collect::<Vec<_>>());
+            let seen = |frame: usize| (batch.get(frame, 0), chart.fit(batch.touches(frame)));
+            percepts.push((0..batch.frames()).map(seen).collect::<Vec<_>>());
         }
         let moments = self.read.into_iter().enumerate().map(|(index, read)| Moment {
             t_s: read.t_s,
             counts: read.counts,
             forces_newton: read.forces_newton,
             truth: read.truth,
-            percepts: array::from_fn(|signal| percepts[signal][index]),
+            percepts: array::from_fn(|signal| percepts[signal][index].0),
+            fits: array::from_fn(|signal| percepts[signal][index].1),
         });
         Ok(moments.collect())
     }

@@ -153,7 +153,6 @@ fn channels(body: &Body, wiring: &Wiring) -> Vec<Option<[usize; 2]>> {
 fn column_json(column: &Column, plan: &Plan) -> Value {
     let unit = match (column.unit, plan.common_quantity()) {
         (Unit::P, Some(quantity)) => quantity.symbol(),
-        (Unit::Force, Some(quantity)) => quantity.of_force().symbol(),
         (unit, _) => unit.symbol(),
     };
     json!({"name": column.name, "unit": unit, "components": column.components, "help": column.help})

@@ -7,8 +7,8 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 use serde::Serialize;
 
+use super::Flags;
 use super::typed::Typed;
-use super::{ContactKind, Flags};
 
 /// An output as data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,7 +55,7 @@ pub enum Unit {
     Newton,
     /// Pa.
     Pascal,
-    /// None: a [`ContactKind`], which data files name.
+    /// None: a [`super::ContactKind`], which data files name.
     Kind,
 }
 
@@ -283,32 +283,6 @@ columns! {
     FILTERED_SPEED 19 filtered_speed: f64, MetrePerSecond, Number, filter, parts [] host [FilteredSpeed];
     #[doc = "Force in newtons, unweighted: Σ PᵢAᵢ where P is in Pa, Σ Pᵢ where it is in N; given by default where the calibration has a unit."]
     FORCE 20 force: f64, Newton, Number, force, parts [] host [Force];
-    #[doc = "What kind of contact presses: point, line, segment or blob; only on request, as is all of the fit."]
-    FIT_KIND 21 fit_kind: ContactKind, Kind, Number, fit, parts [] host [FitKind];
-    #[doc = "Where it presses, (u, v) in the field's chart, m; of a line its point nearest to the touch's mean."]
-    FIT_PLACE 22 fit_place: [f64; 2], Metre, Vector, fit, parts [] host [FitPlace];
-    #[doc = "The standard deviation of that, m; of a line only what it is off across."]
-    FIT_PLACE_SIGMA 23 fit_place_sigma: [f64; 2], Metre, Vector, fit, parts [] host [FitPlaceSigma];
-    #[doc = "How hard it presses in all, taxels or not, in N where P is in Pa, else in the unit of P; absent where it goes on beyond the sensors."]
-    FIT_FORCE 24 fit_force: f64, Force, Number, fit, parts [] host [FitForce];
-    #[doc = "The standard deviation of that, in the same unit."]
-    FIT_FORCE_SIGMA 25 fit_force_sigma: f64, Force, Number, fit, parts [] host [FitForceSigma];
-    #[doc = "Its direction along, rad in [0, π); absent for a point."]
-    FIT_ANGLE 26 fit_angle: f64, Radian, Line, fit, parts [] host [FitAngle];
-    #[doc = "The standard deviation of that, rad."]
-    FIT_ANGLE_SIGMA 27 fit_angle_sigma: f64, Radian, Number, fit, parts [] host [FitAngleSigma];
-    #[doc = "The standard deviation of its pressure across, at the sensors, m."]
-    FIT_WIDTH 28 fit_width: f64, Metre, Number, fit, parts [] host [FitWidth];
-    #[doc = "The standard deviation of the width, m."]
-    FIT_WIDTH_SIGMA 33 fit_width_sigma: f64, Metre, Number, fit, parts [] host [FitWidthSigma];
-    #[doc = "How long a segment is, m; of a blob the standard deviation of its pressure along."]
-    FIT_LENGTH 29 fit_length: f64, Metre, Number, fit, parts [] host [FitLength];
-    #[doc = "The standard deviation of the length, m."]
-    FIT_LENGTH_SIGMA 34 fit_length_sigma: f64, Metre, Number, fit, parts [] host [FitLengthSigma];
-    #[doc = "How far its place has moved in --filter-over (0.2 s), (Δu, Δv), m; of a line across it."]
-    FIT_DISPLACEMENT 35 fit_displacement: [f64; 2], Metre, Vector, fit, parts [] host [FitDisplacement];
-    #[doc = "The length of that over its time, m/s."]
-    FIT_SPEED 36 fit_speed: f64, MetrePerSecond, Number, fit, parts [] host [FitSpeed];
     #[doc = "The standard deviation of the total by the sensors' noise, in the unit of P; only on request, as are all sigmas."]
     TOTAL_SIGMA 30 total_sigma: f64, P, Number, sigma, parts [] host [TotalSigma];
     #[doc = "The standard deviations of the centroid by the sensors' noise, along u and v, m."]
@@ -319,13 +293,11 @@ columns! {
 
 impl Outputs {
     /// What is given unless something else is asked for: all but [`Outputs::SELF_CONTACTS`], [`Outputs::FILTERED`],
-    /// [`Outputs::SIGMAS`], [`Outputs::FIT`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the
-    /// calibration.
+    /// [`Outputs::SIGMAS`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the calibration.
     pub const USUAL: Self = Self::all()
         .difference(Self::SELF_CONTACTS)
         .difference(Self::FILTERED)
         .difference(Self::SIGMAS)
-        .difference(Self::FIT)
         .difference(Self::SPEED_IN_WORLD)
         .difference(Self::FORCE);
 
@@ -334,12 +306,6 @@ impl Outputs {
 
     /// Motion that counts, of [`crate::scene::MotionFilter`].
     pub const FILTERED: Self = Self::of_stage("filter");
-
-    /// What presses, fitted under the skin's own response.
-    pub const FIT: Self = Self::of_stage("fit");
-
-    /// Motion of fitted contacts, which has a memory: of a field, not of each of its touches.
-    pub const FIT_MOTION: Self = Self::FIT_DISPLACEMENT.union(Self::FIT_SPEED);
 
     /// What the stage *motion* gives.
     pub const MOTION: Self = Self::of_stage("motion");

@@ -52,17 +52,6 @@ bitflags! {
         const DRIFT_UNKNOWN = 1 << 18;
         /// P has no unit, or a taxel no area: the force is absent.
         const NO_UNIT = 1 << 19;
-        /// Too few taxels are pressed to tell what presses: no more than a contact has parameters.
-        const FEW_TAXELS = 1 << 20;
-        /// What presses goes on beyond the sensors: its force and length are not known, or even its place.
-        const OFF_FIELD = 1 << 21;
-        /// No kind of contact explains what the taxels feel.
-        const POOR_FIT = 1 << 22;
-        /// The field's chart is too far from flat to fit a contact in it.
-        const CURVED = 1 << 23;
-        /// What the layer makes of a contact is not known: the calibration has no `[layer]`, a taxel has no area, or the letter
-        /// is no pressure.
-        const NO_LAYER = 1 << 24;
         /// The calibration does not say how noisy a pressed taxel is: there are no sigmas.
         const NOISE_UNKNOWN = 1 << 25;
         /// Noise alone may switch a taxel on or off, or turn the axis anyhow: what depends on it has no sigma.

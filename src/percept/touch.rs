@@ -3,7 +3,7 @@
 use bitflags::bitflags;
 use glam::DVec3;
 
-use super::{ContactKind, FitSigma};
+use super::ContactKind;
 
 bitflags! {
     /// Why a quantity of a touch is absent or in doubt, and what was wrong with the input. Names are those of
@@ -146,8 +146,24 @@ pub struct TouchFit {
     pub length_m: Option<f64>,
     /// Change of its middle on the skin over 0.2 s, m/s; of a line only across it.
     pub velocity: Option<DVec3>,
-    /// Standard deviations, where the noise of the sensors is known; that of the place is along u and v of the chart.
+    /// Standard deviations, where the noise of the sensors is known.
     pub sigma: Option<FitSigma>,
+}
+
+/// Standard deviations of a [`TouchFit`], each in the unit of what it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct FitSigma {
+    /// Along u and v of the touch's chart; of a line only what it is off across.
+    pub place: [f64; 2],
+    /// Of the force.
+    pub force: f64,
+    /// Of the angle.
+    pub angle: f64,
+    /// Of the width.
+    pub width: f64,
+    /// Of the length.
+    pub length: f64,
 }
 
 /// The part of a touch on one of its links.

@@ -1,7 +1,5 @@
 //! Quantities as their components and back.
 
-use super::ContactKind;
-
 /// The type of a percept's quantity, made of its components.
 pub(super) trait Typed {
     fn of(components: [f64; 3]) -> Self;
@@ -25,16 +23,6 @@ impl Typed for u32 {
 
     fn components(self) -> [f64; 3] {
         [self.into(), 0.0, 0.0]
-    }
-}
-
-impl Typed for ContactKind {
-    fn of([value, ..]: [f64; 3]) -> Self {
-        Self::ALL[(value as usize).min(Self::ALL.len() - 1)]
-    }
-
-    fn components(self) -> [f64; 3] {
-        [f64::from(self as u8), 0.0, 0.0]
     }
 }
 

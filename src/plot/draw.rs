@@ -81,7 +81,6 @@ struct Plot<'a> {
 fn for_people<'a>(column: &Column, p_unit: &'a str) -> (f64, &'a str) {
     match column.unit {
         Unit::P => p_for_people(p_unit),
-        Unit::Force => (1.0, if p_unit == "Pa" { "N" } else { p_unit }),
         Unit::Metre => (1e3, "mm"),
         Unit::SquareMetre => (1e4, "cm²"),
         Unit::Radian => (180.0 / std::f64::consts::PI, "°"),

@@ -87,11 +87,14 @@ mod tests {
         let more = asked(&["touches.wrench", "total"]);
         assert_eq!(more.of_touches, Some(TouchOutputs::USUAL | TouchOutputs::WRENCH));
         assert_eq!(more.of_fields, Outputs::TOTAL);
-        assert_eq!(asked(&["touches", "fit_place"]).of_touches, usual);
+        assert_eq!(asked(&["touches", "peak"]).of_touches, usual);
         for name in AskedOutputs::names() {
             assert!(name.parse::<AskedOutputs>().is_ok(), "{name}");
         }
         let error = "touches.wrenches".parse::<AskedOutputs>().unwrap_err().to_string();
         assert!(error.contains("touches.wrench"), "{error}");
+        // What fields had, touches have now.
+        let error = "fit_angle".parse::<AskedOutputs>().unwrap_err().to_string();
+        assert_eq!(error, "`fit_angle` is `touches.fit_direction` now");
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use super::{Knobs, Plan, PlanField};
-use crate::percept::{Component, Outputs};
+use crate::percept::{Component, Outputs, TouchOutputs};
 use crate::signal::Letter;
 
 /// A stage of a plan.
@@ -118,14 +118,18 @@ impl Plan {
             ("force", stages.force, of(&all), ""),
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
-            ("fit", stages.fit, found_charted, ""),
+            ("fit", self.fits(), (self.channels(), 0), ""),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = match name {
                 "self_contacts" => Outputs::SELF_CONTACTS,
                 _ => Outputs::of_stage(name),
             };
-            let asked: Vec<String> = (self.outputs() & gives).names().collect();
+            let mut asked: Vec<String> = (self.outputs() & gives).names().collect();
+            if name == "fit" {
+                let outputs = self.touch_outputs().unwrap_or(TouchOutputs::empty()) & TouchOutputs::FIT;
+                asked.extend(outputs.names().map(|name| format!("touches.{name}")));
+            }
             let why = match (runs, asked.is_empty(), idle.is_empty()) {
                 (true, false, _) => format!("asked for: {}", asked.join(", ")),
                 (true, true, _) => self.needed_by(name).to_owned(),

@@ -73,8 +73,8 @@ words! {"way to orientation",
         TwoPoints = "two-points",
         /// The principal axis of the second moments: output `principal_axis`.
         SecondMoments = "second-moments",
-        /// The contact fitted to the touch in one step: outputs `fit_place` and `fit_angle`, beside the axis for touches
-        /// without a fit. It is not tested whether it explains the taxels.
+        /// The contact fitted to each touch of the whole body in one step: outputs `touches.fit_place` and
+        /// `touches.fit_direction`, beside the axis for touches without a fit. It is not tested whether it explains the taxels.
         FitInOne = "fit-1",
         /// The same in two steps.
         FitInTwo = "fit-2",
@@ -123,8 +123,8 @@ words! {"frame of coordinates",
 }
 
 impl Knobs {
-    /// Refuses what does not go together with `outputs` and with letters that are changes.
-    pub(super) fn check(self, outputs: Outputs, has_changes: bool) -> Result<()> {
+    /// Refuses what does not go together with `outputs` of fields, with letters that are changes and with no touches.
+    pub(super) fn check(self, outputs: Outputs, has_changes: bool, has_touches: bool) -> Result<()> {
         let refuse = |what: &str| Err(Error::usage(format!("{what}; leave one of them out")));
         let on_change = self.cadence == Cadence::OnChange;
         if on_change && has_changes {
@@ -139,7 +139,8 @@ impl Knobs {
             );
         }
         let either = Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
-        if self.orientation_by != OrientationBy::AsAsked && !outputs.intersects(either) {
+        let has_orientation = outputs.intersects(either) || (has_touches && self.orientation_by.steps().is_some());
+        if self.orientation_by != OrientationBy::AsAsked && !has_orientation {
             return Err(Error::usage(format!(
                 "{} is a way to an orientation, which is not asked for; add output `orientation`",
                 self.orientation_by
@@ -163,18 +164,14 @@ impl Charts {
 }
 
 impl OrientationBy {
-    /// `outputs`, with the one of `orientation` and `principal_axis` that this stands for in the place of either.
+    /// `outputs` of fields, with the one of `orientation` and `principal_axis` that this stands for in the place of either.
     #[must_use]
     pub fn applied(self, outputs: Outputs) -> Outputs {
         let either = Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
         match self {
             Self::TwoPoints if outputs.intersects(either) => (outputs - Outputs::PRINCIPAL_AXIS) | Outputs::ORIENTATION,
-            Self::SecondMoments if outputs.intersects(either) => {
+            Self::SecondMoments | Self::FitInOne | Self::FitInTwo | Self::Fit if outputs.intersects(either) => {
                 (outputs - Outputs::ORIENTATION) | Outputs::PRINCIPAL_AXIS
-            }
-            _ if self.steps().is_some() && outputs.intersects(either) => {
-                let fitted = Outputs::FIT_PLACE | Outputs::FIT_ANGLE;
-                (outputs - Outputs::ORIENTATION) | Outputs::PRINCIPAL_AXIS | fitted
             }
             _ => outputs,
         }
@@ -217,8 +214,8 @@ mod tests {
         assert_eq!(OrientationBy::TwoPoints.applied(both), Outputs::ORIENTATION | Outputs::TOTAL);
         assert_eq!(OrientationBy::SecondMoments.applied(Outputs::ORIENTATION), Outputs::PRINCIPAL_AXIS);
         assert_eq!(OrientationBy::SecondMoments.applied(Outputs::TOTAL), Outputs::TOTAL);
-        let fitted = Outputs::PRINCIPAL_AXIS | Outputs::FIT_PLACE | Outputs::FIT_ANGLE;
-        assert_eq!(OrientationBy::FitInTwo.applied(Outputs::ORIENTATION), fitted);
+        // The fit is that of touches.
+        assert_eq!(OrientationBy::FitInTwo.applied(Outputs::ORIENTATION), Outputs::PRINCIPAL_AXIS);
         assert_eq!(OrientationBy::Fit.applied(Outputs::TOTAL), Outputs::TOTAL);
     }
 }

@@ -1,55 +1,53 @@
-//! What fitting contacts needs to know of a plan: the layer over each field, and from when on a taxel feels anything.
+//! What fitting contacts needs to know of a plan: from when on a taxel feels anything, and what those around a touch feel.
 
 use glam::DVec2;
 
-use super::OrientationBy;
-use super::plan::{Plan, PlanField};
-use crate::percept::{Flags, TouchOutputs};
-use crate::signal::{LayerResponse, Quantity, RawValue, Receptor};
+use super::plan::Plan;
+use crate::percept::TouchOutputs;
+use crate::signal::{Quantity, RawValue};
 use crate::stage::calibrate::{self, Felt};
-use crate::stage::fit::{Layer, STEPS, Taxel};
+use crate::stage::fit::Taxel;
+use crate::touch::{Skin, Unrolled};
 
-/// A chart that is off by more than this share of a distance between neighbours is too far from flat to fit a contact in: it
-/// would be off by as much as the layer's σ where that is a tenth wrong.
-const CURVED: f64 = 0.1;
-/// A place is beyond the sensors where it is farther from every one than this share of the longest way between neighbours.
-pub(crate) const REACH: f64 = 0.6;
+/// A place is beyond the sensors where it is farther from every one than this share of the longest way between neighbours: over half
+/// of the diagonal of four that form a square.
+pub(crate) const REACH: f64 = 0.75;
+/// Cosine of the angle to the normal of a touch's base, 60°, over which a taxel that nothing presses says nothing of the contact: the
+/// skin turns away from what presses, which would not reach it however wide it is.
+const TURNED_AWAY_COSINE: f64 = 0.5;
 
-impl PlanField {
-    /// What contacts are fitted under, for a letter of `receptor` and orientations `by` something, or why none are.
-    pub(super) fn layer_under(
-        &self,
-        layer: Option<LayerResponse>,
-        receptor: Receptor,
-        by: OrientationBy,
-    ) -> Result<Layer, Flags> {
-        let Some(chart) = &self.chart else { return Err(Flags::NO_CHART) };
-        let Some(LayerResponse { sigma_m, gain_spread }) = layer else { return Err(Flags::NO_LAYER) };
-        if !self.area_known || receptor != Receptor::Sustained {
-            return Err(Flags::NO_LAYER);
-        }
-        if chart.distortion > CURVED {
-            return Err(Flags::CURVED);
-        }
-        let place = |member: usize| self.places[member].truncate();
-        let ways = self.beside.iter().enumerate().flat_map(|(member, beside)| {
-            beside.iter().map(move |&other| place(member).distance(place(other as usize)))
-        });
-        let reach_m = REACH * ways.fold(0.0, f64::max) * f64::from(self.unit_m);
-        Ok(Layer { sigma_m, gain_spread, reach_m, steps: by.steps().unwrap_or(STEPS) })
-    }
+/// What the taxels around a touch feel.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Around {
+    /// Nodes of the skin, ascending, and what they feel in the chart of the touch.
+    pub(crate) felt: Vec<(u32, Taxel)>,
+    /// The longest way between two of them that are neighbours, m.
+    pub(crate) longest_way_m: f64,
 }
 
 impl Plan {
-    /// What member `member` of `field` feels where it reads `value`, as fits of contacts take it, if that can be used.
-    pub(crate) fn pressed_taxel(&self, field: &PlanField, member: usize, value: RawValue) -> Option<Taxel> {
-        let slot = self.members_of(field)[member].slot as usize;
-        self.felt(slot, field.quantity, field.places[member].truncate() * f64::from(field.unit_m), value)
+    /// What the taxels `near` a touch of the whole body feel that reads `value`, of those that tell something of what presses.
+    pub(crate) fn felt_around(&self, skin: &Skin, near: &Unrolled, value: impl Fn(u32) -> RawValue) -> Around {
+        let first_slot = self.touched_from.unwrap_or(0);
+        let felt = near.nodes.iter().zip(&near.places_m).filter_map(|(&node, &place_m)| {
+            let quantity = self.calibrations[node as usize].quantity;
+            let taxel = self.felt(first_slot + node as usize, quantity, place_m, value(node))?;
+            let tells = taxel.pressure > 0.0 || near.cosine_to_base(skin, node) >= TURNED_AWAY_COSINE;
+            tells.then_some((node, taxel))
+        });
+        let felt: Vec<(u32, Taxel)> = felt.collect();
+        let place_of =
+            |node: u32| felt.binary_search_by_key(&node, |(node, _)| *node).ok().map(|at| felt[at].1.place_m);
+        let ways = felt.iter().flat_map(|&(node, Taxel { place_m: from, .. })| {
+            skin.beside(node).iter().filter_map(move |&other| place_of(other)).map(move |to| from.distance(to))
+        });
+        let longest_way_m = ways.fold(0.0, f64::max);
+        Around { longest_way_m, felt }
     }
 
     /// What the taxel of `slot`, whose P is `quantity`, feels at `place_m` in a chart where it reads `value`, as fits of contacts take
     /// it, if that can be used.
-    pub(crate) fn felt(&self, slot: usize, quantity: Quantity, place_m: DVec2, value: RawValue) -> Option<Taxel> {
+    fn felt(&self, slot: usize, quantity: Quantity, place_m: DVec2, value: RawValue) -> Option<Taxel> {
         let (channel, curve) = (self.channel_of(slot), self.curve_of(slot));
         let calibration = &self.calibrations[channel];
         let Felt { pressure, sigma } = calibrate::felt(value, calibration, curve)?;
@@ -68,9 +66,14 @@ impl Plan {
         })
     }
 
+    /// Whether contacts are fitted to touches.
+    pub(crate) fn fits(&self) -> bool {
+        self.touch_outputs().is_some_and(|outputs| outputs.intersects(TouchOutputs::FIT))
+    }
+
     /// Notes from when on each slot's taxel feels anything, where contacts are fitted.
     pub(super) fn note_what_is_felt(&mut self) {
-        if self.stages().fit || self.touch_outputs().is_some_and(|outputs| outputs.intersects(TouchOutputs::FIT)) {
+        if self.fits() {
             let of = |slot: usize| {
                 calibrate::threshold(&self.calibrations[slot % self.calibrations.len()], self.curve_of(slot))
             };

@@ -1,4 +1,4 @@
-//! What a plan makes of a field: its members' weights and neighbours, its thresholds, its unit.
+//! What a plan makes of a field: its members' weights, its thresholds, its unit.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,13 +19,6 @@ pub(crate) struct LinkPart {
     pub(crate) link: usize,
     /// Members, ascending, each with its position in that link, m.
     pub(crate) members: Vec<(u32, DVec3)>,
-}
-
-/// Per member of `field`, the members beside it; `around` has each taxel's neighbours.
-pub(super) fn beside(field: &Field, around: &[Vec<u32>]) -> Vec<Vec<u32>> {
-    let member_of = |taxel: u32| field.members.binary_search_by_key(&(taxel as usize), |member| member.taxel).ok();
-    let beside = |taxel: usize| around[taxel].iter().filter_map(|&n| member_of(n)).map(|m| m as u32).collect();
-    field.members.iter().map(|member| beside(member.taxel)).collect()
 }
 
 /// The members of `field` by their links; none where they all lie on one.

@@ -19,14 +19,14 @@ pub use choose_fields::choose_fields;
 pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
-pub(crate) use layer::REACH;
+pub(crate) use layer::{Around, REACH};
 pub use plan::Plan;
 pub(crate) use plan::PlanField;
 pub(crate) use stages::Stages;
 
 use crate::body::Body;
 use crate::error::{Error, Result, suggestion};
-use crate::percept::Outputs;
+use crate::percept::{Outputs, TouchOutputs};
 use crate::signal::Letter;
 pub use crate::stage::filter::FilterBy;
 use crate::touch;
@@ -92,10 +92,15 @@ setters!(Scene {
 });
 
 impl Scene {
-    /// What is asked of touches: self-contacts are made of them.
+    /// What is asked of touches: self-contacts are made of them, and they have the fits that may stand for an orientation.
     pub(crate) fn asked_touches(&self) -> Option<touch::Options> {
-        let needed = self.outputs.contains(Outputs::SELF_CONTACTS).then(touch::Options::default);
-        self.touches.or(needed)
+        let fits = self.knobs.orientation_by.steps().is_some();
+        let needed = fits || self.outputs.contains(Outputs::SELF_CONTACTS);
+        let mut asked = self.touches.or_else(|| needed.then(touch::Options::default))?;
+        if fits {
+            asked.outputs |= TouchOutputs::FIT_PLACE | TouchOutputs::FIT_DIRECTION;
+        }
+        Some(asked)
     }
 
     /// The link that stands for the world, which `body` must have.

@@ -9,19 +9,18 @@ use glam::DVec3;
 
 use super::curves::Curves;
 use super::left_out::{LeftOut, is_pressure, pressed_members};
-use super::members::{LinkPart, beside, parts, quantity_of, surface, thresholds, unit_of, weights};
+use super::members::{LinkPart, parts, quantity_of, surface, thresholds, unit_of, weights};
 use super::onset::{SoftOnset, softened};
 use super::stages::Stages;
 use super::{Coordinates, Knobs, Scene, choose_fields};
 use crate::body::{Body, Nearest};
 use crate::error::{Error, Result, nearest};
-use crate::field::{Chart, FieldSet, NoChart, WORLD, neighbours};
-use crate::percept::{Flags, Outputs, TouchOutputs};
+use crate::field::{Chart, FieldSet, NoChart, WORLD};
+use crate::percept::{Outputs, TouchOutputs};
 use crate::signal::{Calibration, Letter, Mark, Quantity, Receptor, Response, TaxelCalibration};
-use crate::stage::fit::Layer;
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
-use crate::stage::{filter, layout, touches};
+use crate::stage::{filter, layout};
 
 /// What a backend runs: only the taxels, fields and stages that the scene needs.
 #[derive(Clone, Debug)]
@@ -98,10 +97,6 @@ pub(crate) struct PlanField {
     /// The distance in the unit up to which its centroid counts as still.
     pub(crate) still: layout::Still,
     pub(crate) filter: filter::Settings,
-    /// Per member, the members beside it, where separate touches are wanted.
-    pub(crate) beside: Vec<Vec<u32>>,
-    /// What contacts are fitted under, or why none are.
-    pub(crate) layer: Result<Layer, Flags>,
     /// About how far members lie apart, in the unit.
     pub(crate) spacing: f64,
     /// Members' weights as the layout has them; empty where single precision holds each.
@@ -126,11 +121,6 @@ impl PlanField {
     pub(crate) fn is_wide(&self) -> bool {
         self.count >= layout::MANY
     }
-
-    /// As the stage that tells touches apart sees it.
-    pub(crate) fn skin(&self) -> touches::Skin<'_> {
-        touches::Skin { places: &self.places, beside: &self.beside, spacing: self.spacing }
-    }
 }
 
 impl Plan {
@@ -152,7 +142,7 @@ impl Plan {
         let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));
         Letter::check(&scene.letters)?;
         let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
-        scene.knobs.check(scene.outputs, has_changes)?;
+        scene.knobs.check(scene.outputs, has_changes, scene.touches.is_some())?;
         scene.check_world()?;
         let signal = scene.letters.iter().find_map(|letter| letter.signal);
         if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
@@ -214,7 +204,6 @@ impl Plan {
         }
         plan.note_what_is_felt();
         let nearest = Nearest::new(body);
-        let around = plan.stages().fit.then(|| neighbours(body));
         let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
         let (mut plan_fields, mut members) =
             (Vec::<PlanField>::with_capacity(chosen.len()), Vec::<layout::Member>::new());
@@ -251,8 +240,6 @@ impl Plan {
                 chart: field.chart.as_ref().ok().cloned(),
                 no_chart: field.chart.as_ref().err().cloned(),
                 surface: plan.stages().position.then(|| surface(&nearest, field)).flatten(),
-                layer: Err(Flags::NO_LAYER),
-                beside: around.as_ref().map_or(Vec::new(), |around| beside(field, around)),
                 spacing: field.spacing_m() / f64::from(unit_m),
                 places,
             });
@@ -264,8 +251,6 @@ impl Plan {
                 let in_letter = &mut plan_fields[first + letter];
                 in_letter.first = members.len();
                 in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
-                let receptor = plan.letters[letter].receptor;
-                in_letter.layer = in_letter.layer_under(calibration.layer, receptor, scene.knobs.orientation_by);
                 members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
                     slot: first_slot + channel_of(member.taxel),
                     weight: member.weight as f32,

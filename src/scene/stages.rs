@@ -18,20 +18,17 @@ pub(crate) struct Stages {
     pub(crate) pressures: bool,
     pub(crate) filter: bool,
     pub(crate) sigma: bool,
-    pub(crate) fit: bool,
 }
 
 impl Stages {
     /// The stages that `outputs` need. Whether there is hysteresis is the calibration's to say.
     pub(super) fn of(outputs: Outputs) -> Self {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
-        let fit = wants("fit");
         let world_motion = wants("world_motion");
         let position = wants("position") || world_motion;
         let [orientation, principal_axis, motion, filter, force, sigma] =
             ["orientation", "principal_axis", "motion", "filter", "force", "sigma"].map(wants);
-        let centroid = wants("centroid") || position || orientation || principal_axis || motion || filter || fit;
-        let pressures = fit || force;
+        let centroid = wants("centroid") || position || orientation || principal_axis || motion || filter;
         Self {
             centroid,
             orientation,
@@ -42,10 +39,10 @@ impl Stages {
             world_motion,
             self_contacts: outputs.contains(Outputs::SELF_CONTACTS),
             force,
-            pressures,
+            // Touches of the whole body keep them too.
+            pressures: force,
             filter,
             sigma,
-            fit,
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::FieldNames;
 use super::json::{key, print};
 use super::touch_line::{SkinNames, TouchWriter};
-use crate::percept::{COLUMNS, Flags, Percept, Percepts, Precision, SelfContact, Store, TouchFrame, Unit};
+use crate::percept::{COLUMNS, Flags, Percept, Percepts, Precision, SelfContact, Store, TouchFrame};
 
 /// Writes lines for fields with given names.
 pub(super) struct LineWriter {
@@ -158,7 +158,6 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
         key(line, column.name);
         match column.store {
             Store::Active => print(line, &(components[0] as u32)),
-            _ if column.unit == Unit::Kind => print(line, &percept.fit_kind),
             // In double precision whatever the backend.
             Store::Host(_) if column.components == 1 => print(line, &components[0]),
             Store::Host(_) => print(line, &&components[..column.components]),

@@ -27,7 +27,6 @@ pub(crate) mod position;
 pub(crate) mod principal_axis;
 pub(crate) mod self_contacts;
 pub(crate) mod sigma;
-pub(crate) mod touches;
 pub(crate) mod world_motion;
 
 use glam::DVec3;

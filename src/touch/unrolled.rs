@@ -37,6 +37,12 @@ impl Skin {
 }
 
 impl Unrolled {
+    /// Cosine of the angle between the mean normals of `node` and of the base.
+    #[must_use]
+    pub fn cosine_to_base(&self, skin: &Skin, node: u32) -> f64 {
+        skin.taxel(node).mean_normal.dot(skin.taxel(self.base).mean_normal)
+    }
+
     /// Where `place_m` of the chart is on the skin, within the cells of the taxels, and the direction at `angle_rad` there; both on
     /// the body at rest. It is laid down from the nearest of the taxels, so that little of the chart lies between.
     #[must_use]

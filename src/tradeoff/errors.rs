@@ -3,11 +3,12 @@
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::fits::{self, FitOnLink};
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::Result;
 use crate::field::Recharted;
-use crate::percept::{Flags, Outputs, Percept};
+use crate::percept::{Flags, Outputs, Percept, TouchFrame};
 use crate::scene::{Charts, Knobs, OrientationBy, Plan, PlanField, Scene};
 use crate::signal::{Calibration, Letter};
 use crate::source::Truth;
@@ -167,19 +168,12 @@ impl TrueErrors {
     }
 }
 
-/// The orientation of a percept `by` a method; where no contact could be fitted, by second moments.
+/// The orientation of a percept `by` a method of fields.
 fn orientation(percept: &Percept, by: OrientationBy) -> Option<f64> {
     match by {
         OrientationBy::AsAsked | OrientationBy::TwoPoints => percept.orientation,
-        OrientationBy::SecondMoments => percept.principal_axis,
-        _ => percept.fit_angle.or(percept.principal_axis),
+        _ => percept.principal_axis,
     }
-}
-
-/// Its place, likewise.
-fn place(percept: &Percept, by: OrientationBy) -> Option<DVec2> {
-    let fitted = percept.fit_place.filter(|_| by.steps().is_some());
-    fitted.or(percept.centroid).map(DVec2::from_array)
 }
 
 /// The angle between two lines, degrees.
@@ -198,7 +192,8 @@ impl ErrorSamples {
         by: OrientationBy,
     ) {
         let field = got.field;
-        let (Some(at), Some(right_at)) = (place(got, by), place(right, by)) else { return };
+        let places = got.centroid.zip(right.centroid);
+        let Some((at, right_at)) = places.map(|(a, b)| (DVec2::from_array(a), DVec2::from_array(b))) else { return };
         let same = geometry.has_same_chart(authored, field);
         let off = if same {
             Some(at.distance(right_at))
@@ -217,10 +212,18 @@ impl ErrorSamples {
         };
         self.orientation.extend(turned.filter(|_| !tied));
     }
+
+    /// Adds the errors of the fits of the touches in `got` against those in `right`.
+    pub(super) fn add_fits(&mut self, got: &TouchFrame, right: &TouchFrame) {
+        for (got, right) in fits::shared(got, right) {
+            self.centroid.push(1e3 * got.place.distance(right.place));
+            self.orientation.extend(got.direction.zip(right.direction).map(|(a, b)| between(a, b)));
+        }
+    }
 }
 
 impl TrueErrorSamples {
-    /// Adds the errors of `got` against the `truth` of the only touch on its field.
+    /// Adds the errors of `got`, `by` a method of fields, against the `truth` of the only touch on its field.
     pub(super) fn add(
         &mut self,
         geometry: &ChartGeometry,
@@ -229,22 +232,37 @@ impl TrueErrorSamples {
         truth: &Truth,
         by: OrientationBy,
     ) {
+        let (field, at) = (got.field, got.centroid.map(DVec2::from_array));
+        let place = at.and_then(|at| geometry.point(field, at));
+        let angle = orientation(got, by).zip(at);
+        let direction = angle.and_then(|(angle, at)| geometry.direction(field, at, angle));
+        self.add_one(authored, field, at.map(|_| (place, direction)), truth);
+    }
+
+    /// Adds the errors of `fit`, on the link of the `truth` of the only touch on `field`, if there is one.
+    pub(super) fn add_fit(&mut self, authored: &ChartGeometry, field: usize, fit: Option<FitOnLink>, truth: &Truth) {
+        self.add_one(authored, field, fit.map(|fit| (Some(fit.place), fit.direction)), truth);
+    }
+
+    /// Adds the errors of a place and a direction on a link, as far as these are known, if they are given.
+    fn add_one(
+        &mut self,
+        authored: &ChartGeometry,
+        field: usize,
+        given: Option<(Option<DVec3>, Option<DVec3>)>,
+        truth: &Truth,
+    ) {
         self.touches += 1;
-        let field = got.field;
-        let fits = by.steps().is_some();
-        let at = if fits { got.fit_place.map(DVec2::from_array) } else { place(got, by) };
-        let Some(at) = at else { return };
+        let Some((place, direction)) = given else { return };
         self.given += 1;
         let right = truth.angle.zip(truth.uv);
         let right = right.and_then(|(angle, uv)| authored.direction(field, DVec2::from_array(uv), angle));
-        let off = geometry.point(field, at).map(|point| point - truth.position_in_link);
+        let off = place.map(|place| place - truth.position_in_link);
         match right {
             Some(along) => self.across.extend(off.map(|off| 1e3 * off.reject_from_normalized(along).length())),
             None => self.round.extend(off.map(|off| 1e3 * off.length())),
         }
-        let angle = if fits { got.fit_angle } else { orientation(got, by) };
-        let got = angle.and_then(|angle| geometry.direction(field, at, angle));
-        self.orientation.extend(got.zip(right).map(|(a, b)| between(a, b)));
+        self.orientation.extend(direction.zip(right).map(|(a, b)| between(a, b)));
     }
 }
 

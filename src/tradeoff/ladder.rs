@@ -1,6 +1,6 @@
 //! The plans that a plan is made of, each with one stage more, so that a stage's time is what the next plan takes more.
 
-use crate::percept::Outputs;
+use crate::percept::{Outputs, TouchOutputs};
 use crate::scene::Plan;
 
 /// Stages that are timed together, and the outputs of a plan that ends with them.
@@ -8,8 +8,8 @@ use crate::scene::Plan;
 pub struct Rung {
     /// The outputs of all up to here.
     pub outputs: Outputs,
-    /// Whether touches are among them.
-    pub touches: bool,
+    /// What is given of touches, where these are among them.
+    pub touches: Option<TouchOutputs>,
     /// Which of [`Plan::explain`] they are; what is timed is shown at the last.
     pub stages: std::ops::Range<usize>,
 }
@@ -19,15 +19,20 @@ pub struct Rung {
 #[must_use]
 pub fn ladder(plan: &Plan) -> Vec<Rung> {
     let mut rungs: Vec<Rung> = Vec::new();
-    let (mut outputs, mut touches) = (Outputs::empty(), false);
+    let (mut outputs, mut touches) = (Outputs::empty(), None);
     let explained = plan.explain();
     for (index, stage) in explained.iter().enumerate() {
         let asked = plan.outputs() & stage.gives;
-        let (is_contact, is_touches) = (stage.name == "contact", stage.name == "touches");
-        if !(stage.runs && (is_contact || is_touches || !asked.is_empty())) {
+        let is_contact = stage.name == "contact";
+        let of_touches = match stage.name {
+            "touches" => plan.touch_outputs().map(|outputs| outputs - TouchOutputs::FIT),
+            "fit" => plan.touch_outputs(),
+            _ => None,
+        };
+        if !(stage.runs && (is_contact || of_touches.is_some() || !asked.is_empty())) {
             continue;
         }
-        touches |= is_touches;
+        touches = of_touches.or(touches);
         outputs |= if is_contact && asked.is_empty() { Outputs::TOTAL } else { asked };
         let first = rungs.last().map_or(0, |rung| rung.stages.end);
         rungs.push(Rung { outputs, touches, stages: first..index + 1 });
@@ -39,7 +44,10 @@ pub fn ladder(plan: &Plan) -> Vec<Rung> {
 mod tests {
     use super::*;
     use crate::backend::BackendKind;
+    use crate::engine::{Engine, Options};
+    use crate::scene::Scene;
     use crate::shape::Shape;
+    use crate::{bundled, touch};
 
     fn plan(outputs: Outputs) -> Plan {
         let shape = Shape { sensors: 64, fields: 8, members: 8, wide: 0, local: true, frames: 2, seed: 1 };
@@ -60,5 +68,19 @@ mod tests {
             let what = |rung: &Rung| (rung.outputs, rung.touches);
             assert!(rungs.windows(2).all(|pair| what(&pair[0]) != what(&pair[1])));
         }
+    }
+
+    #[test]
+    fn touches_are_a_rung_and_their_fits_another() {
+        let body = crate::Body::from_bytes("hand", bundled::HAND).unwrap();
+        let asked = TouchOutputs::USUAL | TouchOutputs::FIT_PLACE;
+        let touches = touch::Options { outputs: asked, ..touch::Options::default() };
+        let scene = Scene::default().outputs(Outputs::TOTAL | Outputs::FORCE).touches(touches);
+        let engine = Engine::new(&body, Options::default().scene(scene).backend(BackendKind::Reference)).unwrap();
+        let rungs = ladder(engine.plan());
+        let of_touches: Vec<Option<TouchOutputs>> = rungs.iter().map(|rung| rung.touches).collect();
+        assert_eq!(of_touches, [None, Some(TouchOutputs::USUAL), Some(TouchOutputs::USUAL), Some(asked)]);
+        let last = &engine.plan().explain()[rungs[3].stages.end - 1];
+        assert_eq!((last.name, last.why.as_str()), ("fit", "asked for: touches.fit_place"));
     }
 }

@@ -5,6 +5,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use super::errors::{ChartGeometry, ErrorSamples, Errors, rank};
+use super::fits;
 use super::truth::{OfTouches, Truths};
 use super::{CallMode, Combination, Measurement, Report, SimulatedTouches, TestFrames};
 use crate::backend::BackendKind;
@@ -14,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::field::{FieldSet, Recharted};
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Charts, Knobs, OrientationBy, Scene};
-use crate::signal::Frame;
+use crate::signal::{Frame, Receptor};
 
 /// Settings of a measurement.
 #[derive(Clone, Debug)]
@@ -108,7 +109,7 @@ pub fn measure(
     for charts in Charts::ALL.iter().filter(|charts| geometries.contains_key(charts.word()) && !another(**charts)) {
         report.left_out.push(format!("charts {charts}: they are the layout's own"));
     }
-    if options.scene.outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) && !has_layer(options) {
+    if options.scene.outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) && !can_fit(options) {
         report.left_out.push("fits: no calibration says what the layer is; add [layer] with sigma_m to it".to_owned());
     }
     const PROGRESS_BUILT: f64 = 0.1;
@@ -118,7 +119,7 @@ pub fn measure(
         .ways
         .iter()
         .flat_map(|&way| {
-            Combination::all(&options.scene, way, &measure_options.backends, has_layer(options))
+            Combination::all(&options.scene, way, &measure_options.backends, can_fit(options))
                 .into_iter()
                 .map(move |one| (way, one))
         })
@@ -188,9 +189,10 @@ pub fn measure(
     Ok(report)
 }
 
-/// Whether contacts can be fitted.
-fn has_layer(options: &Options) -> bool {
-    options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some())
+/// Whether contacts can be fitted to touches.
+fn can_fit(options: &Options) -> bool {
+    let has_touches = options.scene.letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
+    has_touches && options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some())
 }
 
 /// The method of orientation that `scene` requests.
@@ -229,9 +231,9 @@ struct ReferencePercepts {
 
 impl ReferencePercepts {
     fn new(body: &Body, options: &Options, played: &TestFrames) -> Result<Self> {
-        let fitted = if has_layer(options) { Outputs::FIT } else { Outputs::empty() };
-        let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS | fitted;
-        let scene = Scene { outputs, knobs: Knobs::default(), touches: None, ..options.scene.clone() };
+        let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
+        let touches = can_fit(options).then(fits::asked);
+        let scene = Scene { outputs, knobs: Knobs::default(), touches, ..options.scene.clone() };
         let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
         let mut engine = Engine::new(body, options)?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
@@ -264,7 +266,7 @@ impl Trial {
         }
         // Orientations are compared at their centroids.
         let outputs = options.scene.outputs | Outputs::CENTROID;
-        // Touches are the same whatever the knobs.
+        // Touches are the same whatever the knobs, and looked for where they are fitted.
         let scene = Scene { knobs, outputs, touches: None, ..options.scene.clone() };
         let mut engine = Engine::in_charts(body, recharted, Options { scene, backend, batch, ..options.clone() })?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
@@ -286,6 +288,12 @@ impl Trial {
         for call in 0..calls.calls.len() {
             let percepts = self.engine.process(calls.at(call, 0))?;
             for index in 0..percepts.frames() {
+                if by.steps().is_some() {
+                    let both = percepts.touches(index).zip(right.percepts.touches(frame));
+                    both.into_iter().for_each(|(got, right)| self.errors.add_fits(got, right));
+                    frame += 1;
+                    continue;
+                }
                 for field in (0..percepts.fields()).step_by(letters) {
                     let mut got = percepts.get(index, field);
                     got.field = field / letters;
@@ -367,7 +375,7 @@ mod tests {
         assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.last() == Some(&1.0));
         // The hand's own charts are planes.
         let of_way = |&way: &CallMode| {
-            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu], has_layer(&options));
+            let all = Combination::all(&options.scene, way, &[BackendKind::Cpu], can_fit(&options));
             all.iter().filter(|combination| combination.knobs.charts != Charts::Plane).count()
         };
         let expected: usize = CallMode::ALL.iter().map(of_way).sum();

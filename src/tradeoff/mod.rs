@@ -5,6 +5,7 @@
 //! the reference in the layout's own charts, and with the truth if the source has it.
 
 mod errors;
+mod fits;
 mod frames;
 mod ladder;
 mod measure;
@@ -93,10 +94,10 @@ impl Combination {
         }
     }
 
-    /// The combinations for `scene`, called `way`, on `backends`; knobs that `scene` sets stay fixed. Contacts are fitted where
-    /// the calibration `has_layer`, on the CPU, once: no other knob changes what they are.
+    /// The combinations for `scene`, called `way`, on `backends`; knobs that `scene` sets stay fixed. Contacts are fitted to
+    /// touches where that `can_fit`, on the CPU, once: no other knob changes what they are.
     #[must_use]
-    pub fn all(scene: &Scene, way: CallMode, backends: &[BackendKind], has_layer: bool) -> Vec<Self> {
+    pub fn all(scene: &Scene, way: CallMode, backends: &[BackendKind], can_fit: bool) -> Vec<Self> {
         let given = scene.knobs;
         let usual = Knobs::default();
         let live = way == CallMode::Live;
@@ -107,7 +108,7 @@ impl Combination {
         let orients = scene.outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS);
         // From moments up; without a scene that knows its layer there is nothing to fit under.
         let ways: Vec<OrientationBy> = match orients {
-            true => OrientationBy::ALL[1..].iter().copied().filter(|way| has_layer || way.steps().is_none()).collect(),
+            true => OrientationBy::ALL[1..].iter().copied().filter(|way| can_fit || way.steps().is_none()).collect(),
             false => vec![OrientationBy::AsAsked],
         };
         let ways = some(given.orientation_by, usual.orientation_by, &ways);

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::errors::{ChartGeometry, TrueErrorSamples, TrueErrors};
+use super::fits::{self, FitOnLink};
 use super::{Combination, SimulatedTouches, TestFrames};
 use crate::backend::BackendKind;
 use crate::body::Body;
@@ -10,7 +11,7 @@ use crate::engine::{Engine, Options};
 use crate::error::Result;
 use crate::field::Recharted;
 use crate::percept::{Outputs, Percept};
-use crate::scene::{Cadence, Charts, Coverage, Knobs, Scene};
+use crate::scene::{Cadence, Charts, Coordinates, Coverage, Knobs, Scene};
 use crate::signal::Letter;
 use crate::source::Truth;
 
@@ -19,6 +20,13 @@ const BATCH: usize = 256;
 
 /// Errors against the truth, of all touches, and of those that have a fit.
 pub(super) type OfTouches = (TrueErrors, Option<TrueErrors>);
+
+/// What is seen of a field that is touched.
+struct Seen {
+    percept: Percept,
+    /// What presses it, where that is fitted.
+    fit: Option<FitOnLink>,
+}
 
 /// Frames, and per frame the fields with a single touch, and its truth.
 pub(super) struct Truths<'a> {
@@ -72,10 +80,10 @@ impl<'a> Truths<'a> {
         let mut truths = Self { body, options, frames, truth, description, with_fit: None, known };
         if truths.options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some()) {
             let mut with_fit = BTreeSet::new();
-            let scene = Scene { outputs: Outputs::FIT, ..truths.scene(Knobs::default()) };
+            let scene = Scene { touches: Some(fits::asked()), ..truths.scene(Knobs::default()) };
             let recharted = &charted[Charts::AsAuthored.word()];
-            truths.each(BackendKind::Cpu, scene, recharted, &mut |frame, percept, _| {
-                if percept.fit_place.is_some() {
+            truths.each(BackendKind::Cpu, scene, recharted, &mut |frame, Seen { percept, fit }, _| {
+                if fit.is_some() {
                     with_fit.insert((frame, percept.field));
                 }
             })?;
@@ -101,10 +109,14 @@ impl<'a> Truths<'a> {
         }
         let knobs = Knobs { arithmetic: knobs.arithmetic.filter(|_| backend != BackendKind::Reference), ..knobs };
         let [mut all, mut fitted] = [(); 2].map(|()| TrueErrorSamples::default());
-        self.each(backend, self.scene(knobs), recharted, &mut |frame, percept, truth| {
-            all.add(geometry, authored, percept, truth, by);
+        self.each(backend, self.scene(knobs), recharted, &mut |frame, Seen { percept, fit }, truth| {
+            let add = |to: &mut TrueErrorSamples| match by.steps() {
+                Some(_) => to.add_fit(authored, percept.field, fit, truth),
+                None => to.add(geometry, authored, &percept, truth, by),
+            };
+            add(&mut all);
             if self.with_fit.as_ref().is_some_and(|with| with.contains(&(frame, percept.field))) {
-                fitted.add(geometry, authored, percept, truth, by);
+                add(&mut fitted);
             }
         })?;
         let fitted = self.with_fit.is_some().then(|| TrueErrors::of(&mut fitted));
@@ -116,28 +128,37 @@ impl<'a> Truths<'a> {
     /// The scene in which percepts are held against the truth.
     fn scene(&self, knobs: Knobs) -> Scene {
         let outputs = self.options.scene.outputs & (Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) | Outputs::CENTROID;
-        Scene { knobs, outputs, touches: None, letters: vec![Letter::default()], ..self.options.scene.clone() }
+        let letters = vec![Letter::default()];
+        // The truth is on links.
+        let (coordinates, relative_to) = (Coordinates::Anchor, None);
+        Scene { knobs, outputs, touches: None, letters, coordinates, relative_to, ..self.options.scene.clone() }
     }
 
-    /// Calls `on` with the number of each frame, what it reports of each field that is touched, and the truth.
+    /// Calls `on` with the number of each frame, what is seen of each field that is touched, and the truth.
     fn each(
         &self,
         backend: BackendKind,
         scene: Scene,
         recharted: &Recharted,
-        on: &mut dyn FnMut(usize, &Percept, &Truth),
+        on: &mut dyn FnMut(usize, Seen, &Truth),
     ) -> Result<()> {
         let options = Options { scene, backend, batch: BATCH, tare: false, ..self.options.clone() };
         let mut engine = Engine::in_charts(self.body, recharted.clone(), options)?;
         engine.set_channels(&self.frames.taxels).map_err(|e| e.at(&self.frames.source))?;
         for (call, frames) in self.frames.frames.chunks(BATCH).enumerate() {
-            let percepts = engine.process(frames)?;
+            engine.process(frames)?;
+            let percepts = engine.percepts();
             for frame in 0..frames.len() {
                 let number = call * BATCH + frame;
                 for (field, truth) in &self.truth[number] {
                     let percept = percepts.get(frame, *field);
                     if percept.contact {
-                        on(number, &percept, truth);
+                        let found = percepts.touches(frame);
+                        let fit = found.and_then(|found| {
+                            let link = self.body.links.iter().position(|link| link.name == truth.link)?;
+                            FitOnLink::new(&engine, fits::touch_on(found, *field)?, link as u32)
+                        });
+                        on(number, Seen { percept, fit }, truth);
                     }
                 }
             }

@@ -148,12 +148,14 @@ fn gains_from_a_wandering_finger_are_written_into_the_calibration() {
     let written = std::fs::read_to_string(&second).unwrap();
     assert!(written.contains("[taxel.162]\ngain = ") && written.contains("[layer]\nsigma_m = 0.0035"), "{written}");
     // It is what `run` takes, and fits come of it.
-    let run = ["run", "--body", &grid, "--source", &touches, "--calibration", &second, "--outputs", "fit_place"];
+    let run =
+        ["run", "--body", &grid, "--source", &touches, "--calibration", &second, "--outputs", "touches.fit_place"];
     let lines = done(&run);
-    assert!(lines.matches("fit_place").count() > 2000, "{}", lines.lines().next().unwrap());
+    // Once in the first line, which says what it is measured in.
+    assert!(lines.matches("\"fit_place\"").count() > 2000, "{}", lines.lines().next().unwrap());
     std::fs::write(at("one.csv"), "t,84\n0,5\n").unwrap();
     let (one, no) = (at("one.csv"), at("no"));
     let too_few = fails(1, &[&calibrate[..4], &[&one], &calibrate[5..], &["-o", &no]].concat());
-    assert!(too_few.contains("touch alone on a field") && too_few.contains("two minutes"), "{too_few}");
+    assert!(too_few.contains("0 touches press six taxels") && too_few.contains("two minutes"), "{too_few}");
     assert!(!folder.path().join("no").exists());
 }

@@ -178,8 +178,11 @@ fn whoever_gives_an_old_name_is_told_the_new_one_in_one_line() {
         (&["run", "--outputs", "total,axis"][..], "--outputs: `axis` is `principal_axis` now"),
         (&["run", "--outputs", "axis_sigma"], "--outputs: `axis_sigma` is `principal_axis_sigma` now"),
         (&["run", "--outputs", "contacts"], "--outputs: `contacts` is `self_contacts` now"),
-        (&["plan", "--outputs", "footprint_angle"], "--outputs: `footprint_angle` is `fit_angle` now"),
-        (&["run", "--outputs", "footprint"], "--outputs: `footprint` is `fit_*` now"),
+        (&["plan", "--outputs", "footprint_angle"], "--outputs: `footprint_angle` is `touches.fit_direction` now"),
+        (&["run", "--outputs", "footprint"], "--outputs: `footprint` is `touches.fit_*` now"),
+        (&["run", "--outputs", "total,fit_place"], "--outputs: `fit_place` is `touches.fit_place` now"),
+        (&["plan", "--outputs", "fit_angle_sigma"], "--outputs: `fit_angle_sigma` is `touches.fit_sigmas` now"),
+        (&["bench", "--outputs", "fit_speed"], "--outputs: `fit_speed` is `touches.fit_velocity` now"),
         (&["run", "--outputs", "total", "--table", "contacts"], "--table: `contacts` is `self_contacts` now"),
         (&["run", "--orientation-by", "footprint"], "--orientation-by: `footprint` is `fit` now"),
         (&["run", "--orientation-by", "footprint-2"], "--orientation-by: `footprint-2` is `fit-2` now"),
@@ -212,6 +215,7 @@ fn whoever_gives_an_old_name_is_told_the_new_one_in_one_line() {
         ("force = true", "line 1, column 1: `force` is `overwrite` now"),
         ("tare = true\nspeed = 2", "line 2, column 1: `speed` is `playback_speed` now"),
         ("outputs = [\"total\", \"axis\"]", "`axis` is `principal_axis` now"),
+        ("outputs = [\"fit_force\"]", "`fit_force` is `touches.fit_force` now"),
         ("[accuracy]\norientation_by = \"footprint-1\"", "`footprint-1` is `fit-1` now"),
     ] {
         told_of(2, key, &["run", "OLD"], new);

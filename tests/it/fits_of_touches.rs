@@ -1,10 +1,10 @@
-//! Every separate touch of a field has a fit of its own.
+//! Every touch of the whole body has a fit of its own.
 
 use glam::{DVec2, DVec3};
 use somatic::source::{SimulatedSource, Source};
 use somatic::touch;
 use somatic::{
-    BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percepts, Scene, TouchFlags, TouchOutputs,
+    BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Percepts, Scene, TouchFlags, TouchOutputs,
 };
 
 use crate::common::Flat;
@@ -25,10 +25,6 @@ fn grid() -> Body {
 }
 
 /// The percepts of the two balls, and where each was in each frame.
-fn pressed(outputs: Outputs, backend: BackendKind, layered: bool) -> (Percepts, Vec<[DVec2; 2]>) {
-    pressed_in(Scene::default().outputs(outputs).fields(["grid"]), backend, layered)
-}
-
 fn pressed_in(scene: Scene, backend: BackendKind, layered: bool) -> (Percepts, Vec<[DVec2; 2]>) {
     let body = grid();
     let mut source = SimulatedSource::on_body("two-balls", TWO_BALLS, body.clone()).unwrap();
@@ -95,24 +91,6 @@ fn touches_have_the_same_fits_on_every_backend() {
     crate::common::backends().into_iter().for_each(|backend| assert_eq!(of(backend), right, "{backend:?}"));
 }
 
-#[test]
-fn a_field_has_the_fit_of_its_strongest_touch() {
-    let (of_field, _) = pressed(Outputs::FIT, BackendKind::Cpu, true);
-    let (percepts, _) = pressed_in(fitted(), BackendKind::Cpu, true);
-    let mut compared = 0;
-    for frame in 0..percepts.frames() {
-        let (of_field, found) = (of_field.get(frame, 0), percepts.touches(frame).unwrap());
-        let strongest = found.touches.iter().max_by(|a, b| a.total.total_cmp(&b.total)).unwrap();
-        assert!(of_field.flags.contains(Flags::SEVERAL), "{of_field:?}");
-        let (Some(place), Some(fit)) = (of_field.fit_place, strongest.fit) else { continue };
-        // On a flat grid the chart of a touch is the field's, turned about its base.
-        if fit.place.y.abs() < 1e-9 && flat(fit.place).distance(DVec2::from_array(place)) < 1e-5 {
-            compared += 1;
-        }
-    }
-    assert!(compared > 80, "{compared} of 100");
-}
-
 /// The grid lies in its link's x and −z.
 fn flat(p: DVec3) -> DVec2 {
     DVec2::new(p.x, -p.z)
@@ -129,8 +107,9 @@ fn the_speed_of_a_rod_is_that_of_its_fits() {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(&source.calibration(), &ids).unwrap();
     let filter = somatic::scene::MotionFilter::default().over_s(0.2);
-    let outputs = Outputs::FIT_MOTION | Outputs::FILTERED_SPEED;
-    let scene = Scene::default().outputs(outputs).filter(filter).fields(["hand/back"]);
+    let asked =
+        touch::Options { outputs: TouchOutputs::USUAL | TouchOutputs::FIT_VELOCITY, ..touch::Options::default() };
+    let scene = Scene::default().outputs(Outputs::FILTERED_SPEED).filter(filter).touches(asked).fields(["hand/back"]);
     let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(16);
     let mut engine = Engine::new(&body, options).unwrap();
     engine.set_channels(source.taxels()).unwrap();
@@ -138,14 +117,18 @@ fn the_speed_of_a_rod_is_that_of_its_fits() {
     let mut frame = Frame::missing(0.0, source.taxels().len());
     let mut young = 0;
     while source.next_frame(&mut frame).unwrap() {
-        let percept = engine.process_one(&frame).unwrap().get(0, 0);
+        let percepts = engine.process_one(&frame).unwrap();
+        let touches = percepts.touches(0).unwrap().touches.iter();
+        let touch = touches.max_by(|a, b| a.total.total_cmp(&b.total)).unwrap();
+        let velocity = touch.fit.and_then(|fit| fit.velocity);
         let off = |speed: f64| (speed / 0.01008 - 1.0).powi(2);
-        fits.extend(percept.fit_speed.map(off));
-        centroids.extend(percept.filtered_speed.map(off));
+        fits.extend(velocity.map(|velocity| off(velocity.length())));
+        centroids.extend(percepts.get(0, 0).filtered_speed.map(off));
         // Motion is over 0.2 s: there is none yet in the first ten frames.
-        young += usize::from(percept.fit_speed.is_none() && percept.flags.intersects(Flags::HELD | Flags::NO_PREVIOUS));
-        let [u, v] = percept.fit_displacement.unwrap_or([-1.0, 1.0]);
-        assert!((u + v).abs() < 0.1 * (v - u), "it moves across itself: {percept:?}");
+        young += usize::from(velocity.is_none() && touch.flags.intersects(TouchFlags::YOUNG | TouchFlags::YOUNG_FIT));
+        if let (Some(velocity), Some(truth)) = (velocity, source.truth()[0].velocity_in_link) {
+            assert!(velocity.angle_between(truth) < 0.1, "it moves across itself: {velocity}, {truth}");
+        }
     }
     let rms = |squares: &[f64]| 100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
     println!(

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use somatic::gains::{GainsEstimate, GainsSurvey};
 use somatic::source::{SimulatedSource, Source};
-use somatic::{Body, Calibration, Engine, Frame, Options, Outputs, Scene};
+use somatic::{Body, Calibration, Engine, Frame, Options, Outputs, Scene, TouchOutputs, touch};
 
 use crate::common::Flat;
 
@@ -59,7 +59,7 @@ fn frames(source: &mut SimulatedSource) -> (Vec<Frame>, Vec<DVec2>) {
 fn estimated(body: &Body, source: &mut SimulatedSource, onset: &str) -> GainsEstimate {
     let text = source.calibration().replace("[all]\n", &format!("[all]\nonset = \"{onset}\"\n"));
     let calibration = Calibration::parse(&text, &ids(body)).unwrap();
-    let mut survey = GainsSurvey::new(body, calibration, &[], source.taxels()).unwrap();
+    let mut survey = GainsSurvey::new(body, calibration, source.taxels()).unwrap();
     survey.add(&frames(source).0).unwrap();
     survey.finish(&mut |_| true).unwrap()
 }
@@ -95,13 +95,19 @@ fn places(
         (layer.sigma_m, layer.gain_spread) = (sigma_m, spread);
         layer
     });
-    let scene = Scene::default().outputs(Outputs::CENTROID | Outputs::FIT);
+    let asked = touch::Options { outputs: TouchOutputs::FIT_PLACE, ..touch::Options::default() };
+    let scene = Scene::default().outputs(Outputs::TOTAL).touches(asked);
     let mut engine = Engine::new(body, Options::default().scene(scene).calibration(calibration).batch(256)).unwrap();
     engine.set_channels(source.taxels()).unwrap();
     let (frames, truth) = frames(source);
     let percepts = engine.process(&frames).unwrap();
     let errors: Vec<f64> = (0..frames.len())
-        .filter_map(|frame| Some(1e3 * DVec2::from_array(percepts.get(frame, 0).fit_place?).distance(truth[frame])))
+        .filter_map(|frame| {
+            let [touch] = &percepts.touches(frame)?.touches[..] else { return None };
+            // The grid lies in its link's x and −z.
+            let place = touch.fit?.place;
+            Some(1e3 * DVec2::new(place.x, -place.z).distance(truth[frame]))
+        })
         .collect();
     ((errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt(), errors.len())
 }

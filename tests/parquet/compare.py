@@ -39,12 +39,7 @@ def rows_of(lines):
     percepts, touches = [], []
     for line in lines:
         for field in line["fields"]:
-            head = {"t": line["t"], "frame": line["frame"]}
-            percepts.append(head | flat(field))
-            link = {key: field[key] for key in ("field", "link", "letter", "signal") if key in field}
-            # With a fit among the outputs, a field has touches of its own; else there are its shares of those of the body.
-            own = field.get("touches", [])
-            touches.extend(head | link | flat(touch) for touch in own if isinstance(own, list))
+            percepts.append({"t": line["t"], "frame": line["frame"]} | flat(field))
         for touch in line.get("touches", []):
             touches.append({"t": line["t"], "frame": line["frame"], "touch": touch.pop("id")} | flat(touch))
     return percepts, touches

@@ -73,7 +73,7 @@ def test_the_bundled_touch(somatic, touch: st.Recording, backend: str) -> None:
         compare(changed, text)
 
 
-def test_touches_have_fits_of_their_own(somatic) -> None:
+def test_touches_have_fits(somatic) -> None:
     rod = ROOT / "examples/simulations/turn.toml"
     outputs = ["touches.fit_kind", "touches.fit_place", "touches.fit_direction", "touches.fit_sigmas"]
     text = somatic("run", "--quiet", "--source", f"sim:{rod}", "--backend", "cpu", "--outputs", ",".join(outputs), "--sink", "-")
@@ -91,6 +91,9 @@ def test_touches_have_fits_of_their_own(somatic) -> None:
     assert told > 200
     with pytest.raises(st.UsageError, match="fit_width"):
         touches["fit_width"]
+    percepts = recording.engine({"outputs": outputs}, backend="cpu").process(recording.t, recording.values)
+    with pytest.raises(st.UsageError, match="`fit_place` is `touches.fit_place` now; see `.touches`"):
+        percepts["fit_place"]
 
 
 def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:
@@ -207,7 +210,8 @@ def test_units(hand: st.Body) -> None:
 def test_whoever_gives_an_old_name_is_told_the_new_one(touch: st.Recording) -> None:
     for scene, new in [
         ({"outputs": ["axis"]}, "`axis` is `principal_axis` now"),
-        ({"outputs": ["footprint_angle"]}, "`footprint_angle` is `fit_angle` now"),
+        ({"outputs": ["footprint_angle"]}, "`footprint_angle` is `touches.fit_direction` now"),
+        ({"outputs": ["fit_place"]}, "`fit_place` is `touches.fit_place` now"),
         ({"in": "hand"}, "`in` is `relative_to` now"),
         ({"force": True}, "`force` is `overwrite` now"),
         ("speed = 2", "`speed` is `playback_speed` now"),

@@ -5,7 +5,7 @@ use fearless_simd::{f64x8, mask64x8};
 
 use super::Level;
 use crate::parallel;
-use crate::stage::fit::{Ends, Fits, Real, Sensor, Start, Touch, fit, fit_alone};
+use crate::stage::fit::{Fits, Real, Sensor, Start, Touch, fit, fit_alone};
 
 /// Touches side by side.
 const ABREAST: usize = 8;
@@ -15,16 +15,7 @@ const FASTER_ABREAST: usize = 3;
 /// Fits all kinds to each of `touches`, on all cores, and gives what `of` makes of each touch and its fits: none where it has too few
 /// taxels for any.
 pub(crate) fn fit_each<T: Send>(touches: &[&Touch], of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync) -> Vec<T> {
-    each(Level::new(), touches, |index| touches[index].start(), of)
-}
-
-/// The same where descents were made elsewhere, and `ends` says of each touch where they ended.
-pub(crate) fn judge_each<T: Send>(
-    touches: &[&Touch],
-    ends: &[Option<Ends<f64>>],
-    of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync,
-) -> Vec<T> {
-    each(Level::new(), touches, |index| ends[index].as_ref().map(Ends::start), of)
+    each(Level::new(), touches, of)
 }
 
 /// A touch that can be fitted.
@@ -35,15 +26,10 @@ struct Startable<'a> {
     start: Start<f64>,
 }
 
-fn each<T: Send>(
-    level: Level,
-    touches: &[&Touch],
-    start: impl Fn(usize) -> Option<Start<f64>> + Sync,
-    of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync,
-) -> Vec<T> {
+fn each<T: Send>(level: Level, touches: &[&Touch], of: impl Fn(&Touch, Option<&Fits<f64>>) -> T + Sync) -> Vec<T> {
     if touches.len() < FASTER_ABREAST {
-        let fits = |index: usize| start(index).map(|start| fit_alone(touches[index].sensors(), &start));
-        return touches.iter().enumerate().map(|(index, touch)| of(touch, fits(index).as_ref())).collect();
+        let fits = |touch: &Touch| touch.start().map(|start| fit_alone(touch.sensors(), &start));
+        return touches.iter().map(|touch| of(touch, fits(touch).as_ref())).collect();
     }
     // Those with as many taxels side by side: the others wait for the one with most.
     let mut order: Vec<usize> = (0..touches.len()).collect();
@@ -51,8 +37,9 @@ fn each<T: Send>(
     let mut made: Vec<Option<T>> = order.iter().map(|_| None).collect();
     let groups = order.chunks(ABREAST).zip(made.chunks_mut(ABREAST));
     parallel::for_each(parallel::threads().min(groups.len()), groups, |(group, made)| {
-        let startable =
-            |(at, &index): (usize, &usize)| start(index).map(|start| Startable { at, touch: touches[index], start });
+        let startable = |(at, &index): (usize, &usize)| {
+            touches[index].start().map(|start| Startable { at, touch: touches[index], start })
+        };
         let group_startable: Vec<Startable<'_>> = group.iter().enumerate().filter_map(startable).collect();
         for (&Startable { at, touch, .. }, fits) in group_startable.iter().zip(fits_of(level, &group_startable)) {
             made[at] = Some(of(touch, Some(&fits)));
@@ -150,17 +137,11 @@ impl<S: Simd> Real for f64x8<S> {
 mod tests {
     use super::super::lanes::levels;
     use super::*;
-    use crate::percept::Fit;
-    use crate::stage::fit::Layer;
     use crate::stage::fit::made_up::{LAYER, touches};
+    use crate::stage::fit::{Fit, Layer};
 
     fn concluded(level: Level, touches: &[Touch]) -> Vec<Option<Fit>> {
-        each(
-            level,
-            &touches.iter().collect::<Vec<_>>(),
-            |index| touches[index].start(),
-            |touch, fits| touch.conclude(fits).0,
-        )
+        each(level, &touches.iter().collect::<Vec<_>>(), |touch, fits| touch.conclude(fits).0)
     }
 
     #[test]

@@ -124,7 +124,7 @@ mod tests {
         let body = Body::from_bytes("hand.glb", bundled::HAND).unwrap();
         let wanted = Outputs::all().iter().chain([Outputs::USUAL, Outputs::CENTROID | Outputs::SPEED]);
         // Those come back as pressures.
-        let of_pressures = Outputs::SELF_CONTACTS | Outputs::FORCE | Outputs::FIT;
+        let of_pressures = Outputs::SELF_CONTACTS | Outputs::FORCE;
         for outputs in wanted.filter(|outputs| !outputs.intersects(of_pressures)) {
             let plan = plan_of(&body, &Scene { outputs, ..Scene::default() });
             let cells = plan.fields.len() * size_of::<u32>();

@@ -10,7 +10,6 @@ pub(crate) mod adapter;
 mod bus;
 mod capacity;
 mod columns;
-mod fit;
 mod members;
 mod over_fields;
 mod pack;
@@ -38,7 +37,6 @@ pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 use self::adapter::Device;
 use self::capacity::FRAMES_A_BLOCK;
 use self::columns::{Columns, NOTHING};
-use self::fit::Descents;
 use self::over_fields::{Bound, OverFields};
 use self::pack::{Form, HEADER, Packer, STEP};
 use self::ring::{SETS, Set};
@@ -50,7 +48,6 @@ use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
-use crate::stage::fit::{Ends, Touch, numbers};
 use crate::stage::{layout, motion};
 
 /// The backend, with everything it needs on the device.
@@ -80,8 +77,6 @@ pub(crate) struct Gpu {
     units_m: Vec<f32>,
     /// By field, contact and centroid of the last frame, as hysteresis and motion keep them.
     memory: [wgpu::Buffer; 2],
-    /// Where contacts are fitted.
-    descents: Option<Descents>,
 }
 
 impl Gpu {
@@ -202,7 +197,6 @@ impl Gpu {
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
         let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
-        let descents = wanted.fit.then(|| Descents::new(&device, &shaders::fit(&numbers())));
         device.check()?;
         Ok(Self {
             plan: plan.clone(),
@@ -223,7 +217,6 @@ impl Gpu {
             pressures: wanted.pressures.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             memory: [touched, last],
-            descents,
         })
     }
 
@@ -340,11 +333,6 @@ impl Backend for Gpu {
         self.device.check()?;
         // What is on its way when something goes wrong is never collected: the device is not to be used again.
         self.stream(raw, percepts).inspect_err(|e| self.device.note(&e.to_string()))
-    }
-
-    fn descend(&mut self, touches: &[&Touch]) -> Result<Option<Vec<Option<Ends<f64>>>>> {
-        let Some(descents) = &mut self.descents else { return Ok(None) };
-        descents.run(&self.device, touches).inspect_err(|e| self.device.note(&e.to_string())).map(Some)
     }
 }
 

@@ -4,8 +4,6 @@
 use std::borrow::Cow;
 
 use crate::percept::COLUMNS;
-#[cfg(test)]
-use crate::stage::fit::numbers;
 use crate::stage::layout::PRESENT;
 
 /// A program's name, the stages that it computes, and its whole WGSL.
@@ -54,13 +52,6 @@ pub(crate) const CALIBRATE: Shader = shader!("calibrate"; "four_frames", "marks"
 pub(crate) const CHANGE: Shader = shader!("change"; "four_frames", "marks");
 pub(crate) const HYSTERESIS: Shader = shader!("hysteresis";);
 pub(crate) const MOTION: Shader = shader!("motion"; "angle");
-
-/// Descents of contacts, with [`crate::stage::fit::numbers`]: over touches, not over frames, and so without what the others share.
-pub(crate) fn fit(numbers: &[(String, f64)]) -> Shader {
-    let numbers: String = numbers.iter().map(|(name, number)| format!("const {name} = {number:?};\n")).collect();
-    let source = numbers + include_str!("../../../shaders/fit.wgsl");
-    Shader { name: "fit", stages: &["fit"], source: source.into() }
-}
 
 /// Frames that an invocation of the program over fields takes at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,6 +127,6 @@ pub(crate) fn all() -> Vec<Shader> {
             }
         }
     }
-    all.extend([HYSTERESIS, MOTION, fit(&numbers())]);
+    all.extend([HYSTERESIS, MOTION]);
     all
 }

@@ -7,7 +7,7 @@ use naga::{Module, TypeInner};
 
 use super::columns::NOTHING;
 use super::pack::Form;
-use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, fit, narrow_fields, wide_fields};
+use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, narrow_fields, wide_fields};
 use super::skips::skip;
 use super::stage::{GROUP, folded, pipeline};
 
@@ -18,7 +18,6 @@ use crate::field::FieldSet;
 use crate::percept::{Flags, Outputs, Percepts, Precision};
 use crate::scene::{Plan, Scene};
 use crate::signal::{Calibration, RawValue};
-use crate::stage::fit::numbers;
 use crate::stage::layout::PRESENT;
 use crate::stage::{calibrate, layout};
 
@@ -55,25 +54,6 @@ fn structs_lie_as_naga_lays_them() {
     same_layout!(&module, Member { slot, weight, u, v });
     same_layout!(&module, Step { dt_s, flags });
     same_layout!(&module, Still { least, rounding, per_taxel });
-    let module = parse(&fit(&numbers()));
-    same_layout!(&module, FitSensor { u, v, margin, pressure, variance, pressed });
-    same_layout!(
-        &module,
-        FitStart {
-            along_u,
-            along_v,
-            point_width,
-            line_width,
-            blob_width,
-            blob_length,
-            half_length,
-            gain_variance,
-            count,
-            steps,
-            is_long
-        }
-    );
-    same_layout!(&module, FitShape { u, v, along_u, along_v, force, width, length });
 }
 
 /// The value of the integer constant `name`.
@@ -109,13 +89,9 @@ fn bits_have_one_meaning() {
     let of_host = Flags::HELD | Flags::JUMPED | Flags::DRIFT_UNKNOWN | Flags::NO_UNIT;
     let of_host = of_host | Flags::STALE_POSE | Flags::NO_POSE;
     let of_sigma = Flags::NOISE_UNKNOWN | Flags::UNSURE;
-    let of_fit = Flags::FEW_TAXELS | Flags::OFF_FIELD | Flags::POOR_FIT | Flags::CURVED | Flags::NO_LAYER;
-    assert_eq!(Flags::all().bits() - shared, (of_host | of_sigma | of_fit).bits());
+    assert_eq!(Flags::all().bits() - shared, (of_host | of_sigma).bits());
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));
     assert_eq!(constant(&module, "GROUP"), Some(GROUP));
-    let fits = parse(&fit(&numbers()));
-    assert_eq!(constant(&fits, "GROUP"), Some(GROUP));
-    assert_eq!(constant(&fits, "KINDS"), Some(super::fit::KINDS as u32));
     let one = parse(&narrow_fields(Abreast::One, Values::Raw, Members::Few));
     assert_eq!(constant(&one, "FIELDS_GROUP"), Some(super::stage::FIELDS_GROUP));
     assert_eq!(constant(&module, "CHARTED"), Some(layout::CHARTED));
@@ -135,15 +111,6 @@ fn bits_have_one_meaning() {
     assert_eq!(constant(&change, "HUGE_BITS"), Some(calibrate::HUGE_BITS));
     assert_eq!(constant(&change, "TINY_BITS"), Some(calibrate::TINY_BITS));
     assert_eq!(constant(&module, "MISSING"), Some(RawValue::MISSING.to_bits()));
-}
-
-#[test]
-fn a_fit_on_the_device_has_every_number_of_the_fit_beside_it() {
-    let text = include_str!("../../../shaders/fit.wgsl");
-    for (name, _) in numbers() {
-        let uses = text.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| *word == name).count();
-        assert!(uses > 0 && !text.contains(&format!("const {name} ")), "{name}");
-    }
 }
 
 #[test]

@@ -48,7 +48,7 @@ pub(super) fn calibrate(
     let spec: SourceSpec = recording.parse()?;
     let mut source = spec.open(&ids, &VendorOptions { rate_hz, ..VendorOptions::default() })?;
     let channels = in_body(body, &*source)?;
-    let mut survey = GainsSurvey::new(body, calibration, &[], &channels)?;
+    let mut survey = GainsSurvey::new(body, calibration, &channels)?;
     let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("read");
     let mut frames = Vec::with_capacity(BATCH);

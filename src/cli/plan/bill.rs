@@ -3,7 +3,7 @@
 use somatic::scene::OrientationBy;
 use somatic::scene::PlannedStage;
 use somatic::tradeoff::{Combination, ladder};
-use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result};
+use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result, TouchOutputs, touch};
 
 use super::timed::{Played, measured, pressed};
 use crate::cli::input::{Input, RECORDED_BATCH};
@@ -62,11 +62,14 @@ impl Bill {
         let plan = engine.plan();
         let knobs = Combination { backend: kind, knobs: plan.knobs() };
         let rungs = ladder(plan);
-        let made = |outputs: Outputs, touches: bool| -> Result<Engine> {
+        let made = |outputs: Outputs, of_touches: Option<TouchOutputs>| -> Result<Engine> {
             let mut options = options.clone().backend(kind);
             options.scene.outputs = outputs;
-            options.scene.touches = options.scene.touches.filter(|_| touches);
-            if !outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) {
+            let touches = options.scene.touches.unwrap_or_default();
+            options.scene.touches = of_touches.map(|outputs| touch::Options { outputs, ..touches });
+            let fits = of_touches.is_some_and(|outputs| outputs.intersects(TouchOutputs::FIT));
+            let has_orientation = outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS);
+            if options.scene.knobs.orientation_by.steps().map_or(!has_orientation, |_| !fits) {
                 // A way to an orientation is for those that have one.
                 options.scene.knobs.orientation_by = OrientationBy::AsAsked;
             }
@@ -75,7 +78,8 @@ impl Bill {
         let planned = plan.explain().into_iter();
         let mut stages: Vec<Stage> = planned.map(|planned| Stage { planned, measured_us: None }).collect();
         let mut engines = rungs.iter().map(|rung| made(rung.outputs, rung.touches)).collect::<Result<Vec<_>>>()?;
-        let compared = (kind != BackendKind::Reference).then(|| made(plan.outputs(), true)).transpose()?;
+        let compared =
+            (kind != BackendKind::Reference).then(|| made(plan.outputs(), plan.touch_outputs())).transpose()?;
         engines.extend(compared);
         let (mut played, on) = played(asked, recorded, body, batch, &mut engines)?;
         let mut compared = (kind != BackendKind::Reference).then(|| engines.pop()).flatten();

@@ -62,8 +62,8 @@ pub(in crate::cli) struct Accuracy {
     pub(in crate::cli) charts: Option<Charts>,
 
     /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), principal_axis alone
-    /// (second-moments), or with it that of the contact fitted in one step (fit-1), two (fit-2) or all
-    /// (fit), and its place [default: as-asked].
+    /// (second-moments), or with it the direction and place of the contact fitted to each touch in one step (fit-1), two
+    /// (fit-2) or all (fit): touches.fit_direction and touches.fit_place [default: as-asked].
     #[arg(long, help_heading = ACCURACY, value_name = "WAY",
         value_parser = one_of::<OrientationBy>(OrientationBy::WORDS))]
     #[serde(deserialize_with = "word")]

@@ -66,12 +66,8 @@ impl RunOptions {
             ("--filter-time", self.filter_time.is_some()),
             ("--filter-over", self.filter_over.is_some()),
         ];
-        // Fitted contacts have motion over a time, too.
-        let measured = |flag: &str| match flag {
-            "--filter-over" => outputs.intersects(Outputs::FILTERED | Outputs::FIT_MOTION),
-            _ => outputs.intersects(Outputs::FILTERED),
-        };
-        if let Some((flag, _)) = given.iter().find(|(flag, given)| *given && !measured(flag)) {
+        let is_measured = outputs.intersects(Outputs::FILTERED);
+        if let Some((flag, _)) = given.iter().find(|(_, given)| *given && !is_measured) {
             return Err(Error::usage(format!(
                 "{flag} is for outputs that are not asked for; add --outputs filtered_direction, or others of filtered_*"
             )));

@@ -1,14 +1,17 @@
 //! The outputs that are asked for, and what help and schema say of them.
 
-use somatic::error::unknown;
 use somatic::scene::AskedOutputs;
 use somatic::{Error, Outputs, Result};
 
+/// The quantity of fields called `name`.
 pub(in crate::cli) fn output(name: &str) -> Result<Outputs> {
-    Outputs::named(name).ok_or_else(|| {
-        let names: Vec<String> = Outputs::all().names().collect();
-        Error::usage(unknown("output", name, names.iter().map(String::as_str)))
-    })
+    let asked: AskedOutputs = name.parse()?;
+    match asked.of_touches {
+        None => Ok(asked.of_fields),
+        Some(_) => {
+            Err(Error::usage(format!("`{name}` is of touches; give quantities of fields here, such as `total`")))
+        }
+    }
 }
 
 /// Says in a schema which outputs there are.
@@ -21,7 +24,7 @@ pub(in crate::cli) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
         "Compute only these quantities: touches, which touches.NAME adds to; and of fields {} [default: touches, and of fields all but \
-         self_contacts, speed_in_world, filtered_*, fit_* and *_sigma; force only where P has a unit]",
+         self_contacts, speed_in_world, filtered_* and *_sigma; force only where P has a unit]",
         names.join(", ")
     )
 }

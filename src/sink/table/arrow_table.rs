@@ -193,7 +193,6 @@ impl Builder {
                         skin.into_iter().flat_map(|skin| skin.links.iter().map(String::as_str)).collect()
                     }
                     ValueOf::Link => names.first().map(|name| name.world.as_str()).into_iter().collect(),
-                    ValueOf::Output(..) => ContactKind::ALL.map(ContactKind::name).to_vec(),
                     _ => Vec::new(),
                 };
                 let (mut words, mut key_of) = (Vec::new(), HashMap::new());

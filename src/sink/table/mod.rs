@@ -90,9 +90,8 @@ fn columns_of(
 }
 
 fn kind_of(column: &Column, session: &Session<'_>) -> TableType {
-    match column.unit {
-        Unit::Kind => TableType::Word,
-        _ if column.output == Outputs::ACTIVE => TableType::U32,
+    match column.output {
+        Outputs::ACTIVE => TableType::U32,
         _ if column.is_double() || session.is_double => TableType::F64,
         _ => TableType::F32,
     }

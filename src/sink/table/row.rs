@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::percept::{Column, ContactKind, Flags, Percepts, SelfContact, TOUCH_COLUMNS, Touch, TouchFlags, TouchFrame};
+use crate::percept::{Column, Flags, Percepts, SelfContact, TOUCH_COLUMNS, Touch, TouchFlags, TouchFrame};
 use crate::sink::{FieldNames, Session, SkinNames};
 
 /// A column of a table.
@@ -204,7 +204,7 @@ impl Row<'_> {
             ValueOf::Letter => name.letter.as_deref(),
             ValueOf::Signal => name.signal.as_deref(),
             ValueOf::SideLink(side) => words.link(self.contact?.sides[side].link),
-            _ => self.float(value).and_then(|kind| ContactKind::ALL.get(kind as usize)).map(|kind| kind.name()),
+            _ => None,
         }
     }
 

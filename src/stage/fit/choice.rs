@@ -8,7 +8,7 @@ use super::objective::Sensor;
 use super::real::Real;
 use super::shape::{Parameter, Shape};
 use super::touch::{Start, Touch};
-use crate::percept::{ContactKind, Fit, FitSigma, Flags};
+use crate::percept::{ContactKind, FitSigma, TouchFlags};
 use crate::stage::angle;
 
 /// What a parameter costs: two more lower χ² by over twice as much in one touch of a hundred by chance, e^−PENALTY.
@@ -18,6 +18,24 @@ const MISFIT: f64 = 4.0;
 /// A descent has come to rest when it could still lower χ² by this: parameters are within 0.1σ.
 const AT_REST: f64 = 0.01;
 
+/// A contact in the chart of its touch, as `docs/fit.md` has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Fit {
+    pub(crate) kind: ContactKind,
+    /// Its middle (u, v), m; of a line the point nearest to the touch's centroid.
+    pub(crate) place: [f64; 2],
+    /// Its force, in N where P is in Pa, else in the unit of P; absent where it goes on beyond the sensors.
+    pub(crate) force: Option<f64>,
+    /// Its direction along, rad in [0, π); absent for a point.
+    pub(crate) angle: Option<f64>,
+    /// The standard deviation of its pressure across, at the sensors, m.
+    pub(crate) width: f64,
+    /// Of a segment from end to end, m; of a blob the standard deviation of its pressure along.
+    pub(crate) length: Option<f64>,
+    /// Standard deviations, where the noise of the sensors is known.
+    pub(crate) sigma: Option<FitSigma>,
+}
+
 /// The fits of a touch, or of several in lanes. Those with more parameters are made for touches with enough taxels.
 #[derive(Clone, Copy)]
 pub(crate) struct Fits<R> {
@@ -26,43 +44,18 @@ pub(crate) struct Fits<R> {
     long: Option<[Fitted<R, 6>; 2]>,
 }
 
-/// Where the descents of a touch, or of several in lanes, ended.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Ends<R> {
-    pub(crate) point: Shape<R>,
-    pub(crate) line: Shape<R>,
-    /// Of a segment and a blob, for touches with enough taxels.
-    pub(crate) long: Option<[Shape<R>; 2]>,
-    pub(crate) gain_variance: R,
-}
-
-impl<R: Copy> Ends<R> {
-    /// A start that is there already: from it, a fit says how good it is.
-    #[inline(always)]
-    pub(crate) fn start(&self) -> Start<R> {
-        let Self { point, line, long, gain_variance } = *self;
-        let [segment, blob] = long.unwrap_or([line, point]);
-        let half_length = segment.length;
-        let reached = Some(segment);
-        Start { point, line, blob, half_length, gain_variance, steps: 0, is_long: long.is_some(), reached }
-    }
-}
-
 /// Fits all kinds to `sensors`, from `start`.
 #[inline(always)]
 pub(crate) fn fit<R: Real>(sensors: &[Sensor<R>], start: &Start<R>) -> Fits<R> {
     let (gains, steps) = (start.gain_variance, start.steps);
-    let is_reached = start.reached.is_some();
-    let point = if is_reached { start.point } else { with_force::<R, Point, 4>(sensors, start.point) };
-    let point = descend::<R, Point, 4>(sensors, gains, point, steps);
-    let line = if is_reached { start.line } else { with_force::<R, Line, 4>(sensors, start.line) };
-    let line = descend::<R, Line, 4>(sensors, gains, line, steps);
+    let point = descend::<R, Point, 4>(sensors, gains, with_force::<R, Point, 4>(sensors, start.point), steps);
+    let line = descend::<R, Line, 4>(sensors, gains, with_force::<R, Line, 4>(sensors, start.line), steps);
     let mut long = None;
     if start.is_long {
         // As much force as the line has on the segment's length.
         let force = line.shape.force + start.half_length + std::f64::consts::LN_2;
-        let segment = start.reached.unwrap_or(Shape { force, length: start.half_length, ..line.shape });
-        let blob = if is_reached { start.blob } else { with_force::<R, Blob, 6>(sensors, start.blob) };
+        let segment = Shape { force, length: start.half_length, ..line.shape };
+        let blob = with_force::<R, Blob, 6>(sensors, start.blob);
         long = Some([
             descend::<R, Segment, 6>(sensors, gains, segment, steps),
             descend::<R, Blob, 6>(sensors, gains, blob, steps),
@@ -92,13 +85,6 @@ fn with_force<R: Real, M: Kind<K>, const K: usize>(sensors: &[Sensor<R>], shape:
 }
 
 impl<R: Copy> Fits<R> {
-    /// Where the descents ended, under gains that vary with `gain_variance`.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn ends(&self, gain_variance: R) -> Ends<R> {
-        let long = self.long.as_ref().map(|long| long.each_ref().map(|fitted| fitted.shape));
-        Ends { point: self.point.shape, line: self.line.shape, long, gain_variance }
-    }
-
     /// Each number by `of`, as a lane's.
     pub(crate) fn map<T>(&self, of: impl Fn(R) -> T + Copy) -> Fits<T> {
         Fits {
@@ -106,16 +92,6 @@ impl<R: Copy> Fits<R> {
             line: mapped(&self.line, of),
             long: self.long.as_ref().map(|long| long.each_ref().map(|long| mapped(long, of))),
         }
-    }
-}
-
-#[cfg(test)]
-impl<R: Copy> Fits<R> {
-    /// By kind the cost, and what a step would still take away of it.
-    pub(crate) fn reached(&self) -> Vec<(R, R)> {
-        let mut all = vec![(self.point.cost, self.point.ahead), (self.line.cost, self.line.ahead)];
-        all.extend(self.long.iter().flatten().map(|fitted| (fitted.cost, fitted.ahead)));
-        all
     }
 }
 
@@ -215,19 +191,19 @@ impl Touch {
     }
 
     /// The fit of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent.
-    pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Fit>, Flags) {
-        let Some(best) = self.best(fits) else { return (None, Flags::FEW_TAXELS) };
+    pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Fit>, TouchFlags) {
+        let Some(best) = self.best(fits) else { return (None, TouchFlags::FEW_TAXELS) };
         let spare = (self.pressed - best.parameters) as f64;
         // Not a number is not within either. Of a descent that is cut short there is less to ask.
         let explains = self.steps < 2 || best.chi_squared <= MISFIT * spare;
         let rests = self.steps < STEPS || best.ahead <= AT_REST;
         if !(explains && rests) {
-            return (None, Flags::POOR_FIT);
+            return (None, TouchFlags::POOR_FIT);
         }
         self.checked(&best)
     }
 
-    fn checked(&self, best: &Candidate) -> (Option<Fit>, Flags) {
+    fn checked(&self, best: &Candidate) -> (Option<Fit>, TouchFlags) {
         let Shape { place, along, force, width, length } = best.shape;
         let (mut place, along) = (DVec2::from_array(place), DVec2::from_array(along));
         let (half, is_line) = (libm::exp(length), best.kind == ContactKind::Line);
@@ -236,7 +212,7 @@ impl Touch {
             place -= along * place.dot(along);
         }
         if !self.reaches(place) {
-            return (None, Flags::OFF_FIELD);
+            return (None, TouchFlags::OFF_SKIN);
         }
         let ends =
             if best.kind == ContactKind::Segment { [place - along * half, place + along * half] } else { [place; 2] };
@@ -270,6 +246,6 @@ impl Touch {
             length,
             sigma: self.has_noise.then_some(sigma),
         };
-        (Some(fit), if is_whole { Flags::empty() } else { Flags::OFF_FIELD })
+        (Some(fit), if is_whole { TouchFlags::empty() } else { TouchFlags::OFF_SKIN })
     }
 }

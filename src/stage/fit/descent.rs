@@ -8,10 +8,10 @@ use super::shape::Shape;
 /// How many steps a whole descent tries.
 pub(crate) const STEPS: usize = 6;
 /// The damping of the first step, and by how much it falls after a step that helps and rises after one that does not.
-pub(super) const DAMPING: f64 = 0.01;
-pub(super) const DAMPING_CHANGES: f64 = 10.0;
+const DAMPING: f64 = 0.01;
+const DAMPING_CHANGES: f64 = 10.0;
 /// Nothing on A's diagonal counts as less: what no sensor tells of stays where it is.
-pub(super) const LEAST: f64 = 1e-12;
+const LEAST: f64 = 1e-12;
 
 /// Where a descent ended.
 #[derive(Clone, Copy, Debug)]

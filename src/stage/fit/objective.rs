@@ -40,7 +40,7 @@ impl<R> Sensor<R> {
 /// A contact's spread is about this many times the layer's σ, by the prior.
 pub(crate) const USUAL_WIDTH: f64 = 1.2;
 /// The standard deviation of its logarithm there.
-pub(super) const WIDTH_VARIES: f64 = 0.3;
+const WIDTH_VARIES: f64 = 0.3;
 
 /// χ² and the prior at a shape, with A = JᵀJ, of which the lower half is made, and g = Jᵀr.
 #[derive(Clone, Copy)]

@@ -92,10 +92,10 @@ const EXP: [f64; 14] = [
     1.0,
 ];
 /// 1/√2π and √2π.
-pub(super) const PER_SQRT_TAU: f64 = 0.398_942_280_401_432_7;
-pub(super) const SQRT_TAU: f64 = 2.506_628_274_631_000_7;
+const PER_SQRT_TAU: f64 = 0.398_942_280_401_432_7;
+const SQRT_TAU: f64 = 2.506_628_274_631_000_7;
 /// Mills' ratio Φ(−z)/φ(z) as a quotient of polynomials, by Hart, as West has it.
-pub(super) const MILLS: [[f64; 7]; 2] = [
+const MILLS: [[f64; 7]; 2] = [
     [
         3.526_249_659_989_11e-2,
         0.700_383_064_443_688,
@@ -115,7 +115,7 @@ pub(super) const MILLS: [[f64; 7]; 2] = [
         793.826_512_519_948,
     ],
 ];
-pub(super) const MILLS_LAST: f64 = 440.413_735_824_752;
+const MILLS_LAST: f64 = 440.413_735_824_752;
 
 impl Real for f64 {
     type Mask = bool;

@@ -28,9 +28,9 @@ pub(crate) enum Parameter {
 }
 
 /// The longest step: of a place in σ, of a turn by its tangent, of a logarithm.
-pub(super) const LONGEST: f64 = 1.5;
+const LONGEST: f64 = 1.5;
 /// Spreads stay within e to this power times σ, on either side.
-pub(super) const WIDEST: f64 = 4.0;
+const WIDEST: f64 = 4.0;
 
 impl<R: Real> Shape<R> {
     /// (across, along) of a point.

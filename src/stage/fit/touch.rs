@@ -24,7 +24,7 @@ pub(crate) struct Layer {
 /// A taxel of a touch, or beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Taxel {
-    /// In the field's chart.
+    /// In the touch's chart.
     pub(crate) place_m: DVec2,
     pub(crate) area_m2: f64,
     /// The force that it feels, in N or in the unit of P; 0 if it is not pressed.
@@ -63,13 +63,10 @@ pub(crate) struct Start<R> {
     pub(crate) steps: usize,
     /// Whether there are taxels enough for segments and blobs.
     pub(crate) is_long: bool,
-    /// Where descents made elsewhere have ended already: the segment; the others in their places, forces and all. Else forces are still
-    /// to be found, and a segment starts from the line.
-    pub(crate) reached: Option<Shape<R>>,
 }
 
 impl<R: Real> Start<R> {
-    /// Several side by side, of numbers that `lanes` puts side by side; descents of all or of none have ended elsewhere.
+    /// Several side by side, of numbers that `lanes` puts side by side.
     #[inline(always)]
     pub(crate) fn abreast<const N: usize>(starts: [&Start<f64>; N], lanes: impl Fn([f64; N]) -> R + Copy) -> Self {
         Self {
@@ -80,10 +77,6 @@ impl<R: Real> Start<R> {
             gain_variance: lanes(starts.map(|start| start.gain_variance)),
             steps: starts.iter().map(|start| start.steps).max().unwrap_or(0),
             is_long: starts.iter().any(|start| start.is_long),
-            reached: starts
-                .iter()
-                .any(|start| start.reached.is_some())
-                .then(|| Shape::abreast(starts.map(|start| start.reached.as_ref().unwrap_or(&start.line)), lanes)),
         }
     }
 }
@@ -192,7 +185,6 @@ impl Touch {
             gain_variance: self.gain_spread * self.gain_spread,
             steps: self.steps,
             is_long: self.is_long(),
-            reached: None,
         })
     }
 }
