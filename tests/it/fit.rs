@@ -400,7 +400,7 @@ fn what_cannot_be_told_is_absent_with_its_reason() {
         [TouchFlags::OFF_SKIN, TouchFlags::FEW_TAXELS, TouchFlags::POOR_FIT].map(|flag| reasons(&beyond, flag));
     let given = beyond.iter().filter(|one| one.fit().is_some()).count();
     println!("beyond the edge: {off} off_skin, {few} few_taxels, {poor} poor_fit, {given} told");
-    assert!(off > 50, "{off}");
+    assert!(off > 20 && given == 0, "{off} {given}");
 
     // Nothing presses like a chequerboard, if it is one touch.
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
