@@ -8,7 +8,7 @@ use crate::touch;
 
 /// What is asked of touches whose fits are compared.
 pub(super) fn asked() -> touch::Options {
-    let outputs = TouchOutputs::FIT_PLACE | TouchOutputs::FIT_DIRECTION;
+    let outputs = TouchOutputs::FIT_PLACE | TouchOutputs::FIT_DIRECTION | TouchOutputs::FIELDS;
     touch::Options { outputs, ..touch::Options::default() }
 }
 
