@@ -18,6 +18,7 @@
 //! Results are the same on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties go to the lower index.
 
 mod coverage;
+mod fill;
 mod grid;
 pub mod group;
 pub mod icub;
@@ -35,6 +36,7 @@ mod recipe;
 pub mod recipe_values;
 mod refresh;
 mod region;
+mod relax;
 mod rest_surface;
 mod sample_neighbours;
 mod scatter;

@@ -28,6 +28,7 @@ struct File {
     #[serde(default)]
     seed: u64,
     unit: Option<Spanned<String>>,
+    even: Option<bool>,
     #[serde(default)]
     existing: Existing,
     #[serde(default)]
@@ -138,6 +139,7 @@ fn parse(recipe_text: RecipeText<'_>, folder: &Path) -> Result<Recipe> {
     let text = recipe_text.text;
     let file: File = text.parse()?;
     let mut recipe = Recipe { keeps_existing: file.existing == Existing::Keep, seed: file.seed, ..Recipe::none() };
+    recipe.is_scattered = file.even == Some(false);
     if let Some(unit) = &file.unit {
         let metres = unit_metres(unit.get_ref()).map_err(|e| text.wrong(unit.span(), e.to_string()))?;
         recipe.unit = Some((unit.get_ref().clone(), metres));

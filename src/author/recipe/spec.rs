@@ -54,6 +54,8 @@ pub struct Recipe {
     pub(in crate::author) places: Vec<PlaceSpec>,
     pub(in crate::author) fields: Vec<(FieldRule, Origin)>,
     pub(super) seed: u64,
+    /// Whether points that were sampled stay where they are, instead of moving until their cells are alike.
+    pub(in crate::author) is_scattered: bool,
 }
 
 /// Taxels of one kind on some regions.
@@ -164,6 +166,12 @@ impl Recipe {
     #[must_use]
     pub fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
+    }
+
+    /// The same where sampled taxels move until their cells are alike (`true`, as without this), or stay where they were scattered.
+    #[must_use]
+    pub fn with_even(self, even: bool) -> Self {
+        Self { is_scattered: !even, ..self }
     }
 
     /// The same with the mesh file's numbers in `unit`: `um`, `mm`, `cm` or `m`.

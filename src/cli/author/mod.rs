@@ -7,7 +7,7 @@ mod skin;
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use somatic::author::{Recipe, author};
 use somatic::body::Original;
 use somatic::error::nearest;
@@ -82,6 +82,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
+    /// Whether taxels move until the surface around each is alike (on), or stay where they were scattered (off) [default: the
+    /// recipe's, or on].
+    #[arg(long, value_name = "WORD")]
+    even: Option<EvenWord>,
+
     /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
@@ -106,6 +111,12 @@ pub(super) struct Arguments {
     /// Print what was placed as JSON.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EvenWord {
+    On,
+    Off,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
@@ -150,6 +161,9 @@ fn recipe(arguments: &Arguments) -> Result<Recipe> {
     };
     if let Some(seed) = arguments.seed {
         recipe = recipe.with_seed(seed);
+    }
+    if let Some(even) = arguments.even {
+        recipe = recipe.with_even(matches!(even, EvenWord::On));
     }
     if let Some(unit) = &arguments.unit {
         recipe = recipe.with_unit(unit).map_err(|e| e.at("--unit"))?;

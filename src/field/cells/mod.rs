@@ -3,8 +3,10 @@
 //! Windows run from all points at once, so that each ends soon beyond its own cell. In each triangle that several points
 //! reach, their distances to its corners give the borders (`polygon.rs`). Long edges are cut beforehand (`refine.rs`).
 
+mod coarsen;
 mod divided;
 mod marched;
+mod middles;
 mod parts;
 mod polygon;
 mod refine;
@@ -16,6 +18,7 @@ use glam::{DVec2, DVec3};
 
 pub(crate) use self::divided::{CellPoint, Divided};
 use self::marched::Marched;
+pub(crate) use self::middles::Relaxation;
 use self::parts::{Parts, corner_at};
 use self::polygon::{Candidate, Side, nearest_part, share, squared_at};
 use self::refine::refine;
