@@ -61,21 +61,22 @@ pub(super) fn evenly(
     eliminate(&samples, &reaches, count, progress)
 }
 
-/// As [`evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
+/// As [`evenly`], but no two neighbours closer than `spacing_m`, and only those that `keep` leaves; else the number that fit.
 pub(super) fn evenly_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     count: usize,
-    spacing_m: f64,
+    (spacing_m, keep): (f64, &dyn Fn(Vec<Placed>) -> Result<Vec<Placed>>),
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<std::result::Result<Vec<Placed>, usize>> {
-    let placed = evenly(positions, triangles, count, seed, progress)?;
+    let placed = keep(evenly(positions, triangles, count, seed, progress)?)?;
     let points: Vec<SurfacePoint> = placed.iter().map(|placed| placed.point).collect();
-    if nearest_on_its_side(&points).into_iter().flatten().all(|distance| distance >= spacing_m) {
+    let are_apart = nearest_on_its_side(&points).into_iter().flatten().all(|distance| distance >= spacing_m);
+    if placed.len() == count && are_apart {
         return Ok(Ok(placed));
     }
-    let packed = apart(positions, triangles, spacing_m, seed, progress)?;
+    let packed = keep(apart(positions, triangles, spacing_m, seed, progress)?)?;
     if packed.len() < count {
         return Ok(Err(packed.len()));
     }
@@ -184,7 +185,12 @@ fn check_count(count: usize) -> Result<()> {
 }
 
 /// Eliminates all but `count` samples.
-fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Progress<'_>) -> Result<Vec<Placed>> {
+pub(super) fn eliminate(
+    samples: &[Placed],
+    reaches_m: &[f64],
+    count: usize,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
     let ratio = count as f64 / samples.len() as f64;
     // Distances far below the final spacing all get the same weight.
     let closest = 1.0 - ratio * ratio.sqrt();

@@ -35,17 +35,15 @@ pub(super) enum Weight<'a> {
     Density(&'a dyn Fn(&Placed) -> f64),
 }
 
-/// `placed` on `triangles`, moved; in the order of the triangles. `area_m2` is what they share; vertices of different groups are never
-/// connected.
+/// `placed` on `triangles` with `topology`, moved; in the order of the triangles. `area_m2` is what they share.
 pub(super) fn relax(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
-    group_of: &dyn Fn(u32) -> u32,
+    topology: &Topology,
     placed: &[Placed],
     (area_m2, weight): (f64, &Weight<'_>),
     progress: Progress<'_>,
 ) -> Result<Vec<Placed>> {
-    let topology = Topology::of_groups(positions, triangles, group_of);
     if topology.triangles.is_empty() || placed.len() < 2 {
         return Ok(placed.to_vec());
     }
@@ -64,10 +62,10 @@ pub(super) fn relax(
     let corners = |triangle: usize| triangles[triangle].map(|v| positions[v as usize]);
     let rounds = if matches!(weight, Weight::Density(_)) { WEIGHTED_ROUNDS } else { ROUNDS };
     let mut relaxation = match weight {
-        Weight::Same => Relaxation::new(&topology, &points, spacing_m, None),
+        Weight::Same => Relaxation::new(topology, &points, spacing_m, None),
         Weight::Open(is_open) => {
             let weight = |p: DVec3, normal: DVec3| if is_open(p, normal) { 1.0 } else { 0.0 };
-            Relaxation::new(&topology, &points, spacing_m, Some(&weight))
+            Relaxation::new(topology, &points, spacing_m, Some(&weight))
         }
         Weight::Density(density) => {
             let index = SurfaceIndex::of_triangles((0..triangles.len()).map(corners));
@@ -75,7 +73,7 @@ pub(super) fn relax(
             let weight = |p: DVec3, normal: DVec3| {
                 on_surface(&index, corners, p, normal).map_or(0.0, |at| density(&at).max(0.0).powi(2))
             };
-            Relaxation::new(&topology, &points, spacing_m, Some(&weight))
+            Relaxation::new(topology, &points, spacing_m, Some(&weight))
         }
     };
     for round in 0..rounds {
@@ -163,7 +161,11 @@ mod tests {
             Weight::Same => evenly(&positions, &triangles, count, 1, &mut |_| true),
         };
         let mut placed = placed.unwrap();
-        let mut moved = relax(&positions, &triangles, &|_| 0, &placed, (1.0, weight), &mut |_| true).unwrap();
+        let mut moved =
+            relax(&positions, &triangles, &Topology::new(&positions, &triangles), &placed, (1.0, weight), &mut |_| {
+                true
+            })
+            .unwrap();
         for those in [&mut placed, &mut moved] {
             set_cell_areas(&positions, &triangles, &|_| 0, &vec![true; triangles.len()], those);
         }
@@ -215,10 +217,25 @@ mod tests {
     fn nothing_moves_where_there_is_nothing_to_share() {
         let (positions, triangles) = sheet(2);
         let one = evenly(&positions, &triangles, 1, 3, &mut |_| true).unwrap();
-        let same = relax(&positions, &triangles, &|_| 0, &one, (1.0, &Weight::Same), &mut |_| true).unwrap();
+        let same = relax(
+            &positions,
+            &triangles,
+            &Topology::new(&positions, &triangles),
+            &one,
+            (1.0, &Weight::Same),
+            &mut |_| true,
+        )
+        .unwrap();
         assert_eq!(one, same);
         let two = evenly(&positions, &triangles, 2, 3, &mut |_| true).unwrap();
-        let stopped = relax(&positions, &triangles, &|_| 0, &two, (1.0, &Weight::Same), &mut |_| false);
+        let stopped = relax(
+            &positions,
+            &triangles,
+            &Topology::new(&positions, &triangles),
+            &two,
+            (1.0, &Weight::Same),
+            &mut |_| false,
+        );
         assert!(stopped.unwrap_err().to_string().contains("stopped"));
     }
 }

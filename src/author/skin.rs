@@ -4,8 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::fill::{Fill, without_area};
+use super::cell_spread::cell_spread;
+use super::fill::{Fill, Filled, without_area};
 use super::group::{FilePaint, Grouper, Grouping, group_while};
+use super::lint::{DrawnPoses, Touchable};
 use super::origin::Origin;
 use super::place::nearest_on_its_side;
 use super::placed::{Progress, SurfacePoint, report_progress};
@@ -37,7 +39,7 @@ pub struct Authored {
 }
 
 /// The result of a place of a recipe.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlaceReport {
     /// Its name.
     pub name: String,
@@ -51,6 +53,10 @@ pub struct PlaceReport {
     pub mean_spacing_m: Option<f64>,
     /// For given places: the id, and how far the taxel was moved to the surface, m.
     pub moved_m: Vec<(u32, f64)>,
+    /// The 5th and the 95th percentile of the taxels' areas over their median; `None` if these are unknown.
+    pub cell_spread: Option<[f64; 2]>,
+    /// Surface of the place that nothing can touch, by name of the link, m².
+    pub hidden_m2: BTreeMap<String, f64>,
 }
 
 /// Adds the taxels and fields of `recipe` to `file` and replaces its layout. Its taxels stay if the recipe has no place or
@@ -115,6 +121,9 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     }
     let mut ids = UsedIds::default();
     ids.take(body.taxels.iter().map(|taxel| taxel.id), "the file", &Origin::default())?;
+    let drawn = DrawnPoses::of(&body);
+    let looks = !recipe.keeps_hidden && recipe.places.iter().any(|place| place.how.samples());
+    let touchable = looks.then(|| Touchable::new(&body, &drawn));
     let (mut reports, mut seated) = (Vec::new(), Vec::new());
     // What a place over all of the surface divides it into is what the edges of its taxels are made of.
     let is_alone = body.taxels.is_empty() && recipe.places.len() == 1;
@@ -133,10 +142,17 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         }
         let share = (PROGRESS_PLACED - PROGRESS_OPENED) / recipe.places.len() as f64;
         let tick = &mut |done: f64| go_on(PROGRESS_OPENED + share * (index as f64 + done));
-        let fill =
-            Fill { rest_surface: &rest_surface, place, seed: recipe.seed_of(place), is_scattered: recipe.is_scattered };
-        let placed = fill.place(&region, &mut notes, tick);
-        let (filled, cells) = placed.map_err(|e| place.at.put(e))?;
+        let fill = Fill {
+            rest_surface: &rest_surface,
+            place,
+            seed: recipe.seed_of(place),
+            is_scattered: recipe.is_scattered,
+            touchable: touchable.as_ref(),
+            clear_m: recipe.clear_m,
+        };
+        let Filled { taxels: filled, cells, hidden_m2, notes: more } =
+            fill.place(&region, tick).map_err(|e| place.at.put(e))?;
+        notes.extend(more);
         let last = u64::from(place.first_id) + filled.len() as u64;
         if last > u64::from(MAX_TAXEL_ID) + 1 {
             let what =
@@ -152,7 +168,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         let links = rest_surface.link.iter().zip(&region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();
         let seat = |(one, &id): (&Snapped, &u32)| rest_surface.mesh_taxel(&one.placed, id, place.modality, &links);
         seated.extend(filled.iter().zip(&own).map(seat));
-        reports.push(report(&rest_surface, place, own, &filled, &seated[first..]));
+        reports.push(report(&rest_surface, place, own, &filled, (&seated[first..], hidden_m2)));
     }
     report_progress(&mut go_on, PROGRESS_PLACED)?;
     let addition = taxel_nodes(&file, &rest_surface, seated);
@@ -214,7 +230,7 @@ fn report(
     place: &PlaceSpec,
     ids: Vec<u32>,
     filled: &[Snapped],
-    seated: &[MeshTaxel],
+    (seated, hidden_m2): (&[MeshTaxel], BTreeMap<usize, f64>),
 ) -> PlaceReport {
     let points: Vec<SurfacePoint> = filled.iter().map(|one| one.placed.point).collect();
     let near: Vec<f64> = nearest_on_its_side(&points).into_iter().flatten().collect();
@@ -224,9 +240,12 @@ fn report(
     }
     let moved = |(one, &id): (&Snapped, &u32)| (id, one.moved_m);
     let moved_m = if place.how.samples() { Vec::new() } else { filled.iter().zip(&ids).map(moved).collect() };
+    let hidden = |(link, area): (usize, f64)| (rest_surface.body.links[link].name.clone(), area);
     PlaceReport {
         name: place.name.clone(),
         links,
+        cell_spread: cell_spread(filled.iter().map(|one| one.placed.point.area)),
+        hidden_m2: hidden_m2.into_iter().map(hidden).collect(),
         least_spacing_m: near.iter().copied().reduce(f64::min),
         mean_spacing_m: (!near.is_empty()).then(|| near.iter().sum::<f64>() / near.len() as f64),
         moved_m,

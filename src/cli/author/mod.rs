@@ -66,7 +66,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "RECIPE.toml", conflicts_with_all = ["taxels", "spacing", "region"])]
     recipe: Option<PathBuf>,
 
-    /// How many taxels, as evenly as blue noise goes.
+    /// How many taxels, spread evenly where something can touch them.
     #[arg(long, value_name = "N")]
     taxels: Option<u64>,
 
@@ -86,6 +86,15 @@ pub(super) struct Arguments {
     /// recipe's, or on].
     #[arg(long, value_name = "WORD")]
     even: Option<EvenWord>,
+
+    /// What becomes of surface that nothing can touch, inside the body or under another link in all poses: none of it gets a
+    /// taxel (drop), or as much as elsewhere (keep) [default: the recipe's, or drop].
+    #[arg(long, value_name = "WORD")]
+    hidden: Option<HiddenWord>,
+
+    /// How far taxels are from borders of links and seams at least, such as 5mm [default: the recipe's, or as it comes].
+    #[arg(long, value_name = "LENGTH")]
+    clear: Option<String>,
 
     /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m].
     #[arg(long, value_name = "UNIT")]
@@ -117,6 +126,12 @@ pub(super) struct Arguments {
 enum EvenWord {
     On,
     Off,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum HiddenWord {
+    Drop,
+    Keep,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
@@ -164,6 +179,12 @@ fn recipe(arguments: &Arguments) -> Result<Recipe> {
     }
     if let Some(even) = arguments.even {
         recipe = recipe.with_even(matches!(even, EvenWord::On));
+    }
+    if let Some(hidden) = arguments.hidden {
+        recipe = recipe.with_hidden(matches!(hidden, HiddenWord::Keep));
+    }
+    if let Some(clear) = &arguments.clear {
+        recipe = recipe.with_clear(clear).map_err(|e| e.at("--clear"))?;
     }
     if let Some(unit) = &arguments.unit {
         recipe = recipe.with_unit(unit).map_err(|e| e.at("--unit"))?;
