@@ -12,7 +12,7 @@ use super::place::{apart, by_density, evenly, evenly_apart, nearest_on_its_side,
 use super::placed::{Placed, Progress, SurfacePoint};
 use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{PlaceSpec, Placement, shown};
-use super::relax::{Weight, relax};
+use super::relax::{MOST_POINTS, Weight, relax};
 use super::rest_surface::RestSurface;
 use super::shares::{left_out, scatter, shares};
 use crate::body::{Topology, listed};
@@ -190,14 +190,15 @@ impl Fill<'_> {
         filled: &mut Filled,
     ) {
         let Surface { positions, triangles, chosen, .. } = surface;
-        let mut is_skin = ground.skin(positions, triangles);
-        if let Some(density) = density {
-            let is_dense = skin_by_density(positions, triangles, density);
-            is_skin.iter_mut().zip(is_dense).for_each(|(is_skin, is_dense)| *is_skin &= is_dense);
-        }
+        let is_skin = ground.skin(positions, triangles);
+        let is_surface = match density {
+            Some(density) => skin_by_density(positions, triangles, density),
+            None => vec![true; triangles.len()],
+        };
         let group_of = |vertex| self.rest_surface.group_of(vertex);
-        let cells = set_cell_areas(positions, triangles, &group_of, &is_skin, &mut placed);
-        filled.cells = cells.filter(|_| !is_skin.contains(&false));
+        let skin = is_skin.contains(&false).then_some(&is_skin[..]);
+        let cells = set_cell_areas(positions, triangles, &group_of, (&is_surface, skin), &mut placed);
+        filled.cells = cells.filter(|_| !is_surface.contains(&false));
         let in_body = |one: Placed| Placed { triangle: chosen[one.triangle], ..one };
         let taxels = placed.into_iter().map(|one| Snapped { placed: in_body(one), id: None, moved_m: 0.0 });
         filled.taxels = taxels.collect();
@@ -248,13 +249,11 @@ impl Fill<'_> {
         }
         let link_of = |triangle: usize| self.rest_surface.link[chosen[triangle]] as usize;
         let pieces = shares(positions, triangles, topology, link_of, ground, count);
-        for (link, (pieces, area_m2)) in left_out(&pieces) {
-            let are = if pieces == 1 { "1 piece".to_owned() } else { format!("{pieces} pieces") };
+        notes.extend(self.too_small(&left_out(&pieces)));
+        if count > MOST_POINTS {
             notes.push(format!(
-                "place `{}`: {are} of `{}` without a taxel, each too small for one: {} in all",
-                self.place.name,
-                self.link_name(link),
-                square(area_m2)
+                "place `{}`: over {MOST_POINTS} taxels stay where they are scattered; give several places, by regions, for even ones",
+                self.place.name
             ));
         }
         let open_m2 = pieces.iter().map(|piece| piece.open_m2).sum();
@@ -267,6 +266,23 @@ impl Fill<'_> {
         let tick = &mut |share| progress(PROGRESS_SCATTERED + moving * share);
         let moved = relax(positions, triangles, topology, &scattered, (open_m2, &weight), tick)?;
         ground.settled(moved, &mut |share| progress(PROGRESS_MOVED + (1.0 - PROGRESS_MOVED) * share))
+    }
+
+    /// The note on pieces without a taxel, by link how many and their open area, m².
+    fn too_small(&self, left: &BTreeMap<usize, (usize, f64)>) -> Option<String> {
+        let mut links: Vec<(usize, (usize, f64))> = left.iter().map(|(&link, &left)| (link, left)).collect();
+        links.sort_by(|a, b| b.1.1.total_cmp(&a.1.1).then(a.0.cmp(&b.0)));
+        let named: Vec<String> = links
+            .iter()
+            .map(|&(link, (pieces, area))| format!("{pieces} of `{}` ({})", self.link_name(link), square(area)))
+            .collect();
+        let pieces: usize = left.values().map(|(pieces, _)| pieces).sum();
+        let what = match pieces {
+            0 => return None,
+            1 => "1 piece of the surface gets no taxel, as it is too small for one".to_owned(),
+            _ => format!("{pieces} pieces of the surface get no taxel, as each is too small for one"),
+        };
+        Some(format!("place `{}`: {what}: {}", self.place.name, listed(&named)))
     }
 
     /// The same with none closer than `apart_m`.

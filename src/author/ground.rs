@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::borders::Borders;
 use super::lint::{BodyPoint, Touchable};
+use super::place::widest_radius;
 use super::placed::{Placed, Progress, points_on_same_side};
 use super::rest_surface::RestSurface;
 use super::scatter::Pieces;
@@ -23,6 +24,9 @@ const MIN_OPEN_SHARE: f64 = 0.005;
 
 /// Nearest samples that are looked through for one on the same side.
 const MAX_CANDIDATES: usize = 16;
+
+/// A taxel beside another is nearer to it than this share of what is usual.
+const BESIDE: f64 = 0.5;
 
 const SEED: u64 = 0x6e0d;
 
@@ -91,6 +95,8 @@ pub(super) struct Ground<'a> {
     each_m2: f64,
     /// Whether rays tell nothing, as faces look inward.
     is_inside_out: bool,
+    /// Whether all points may get taxels.
+    is_all: bool,
 }
 
 impl<'a> Ground<'a> {
@@ -120,12 +126,13 @@ impl<'a> Ground<'a> {
         }
         let tree = point_tree(samples.iter().map(|sample| sample.point.position));
         let each_m2 = pieces.weight() / many as f64;
-        Ok(Self { rules, samples, states, tree, each_m2, is_inside_out })
+        let is_all = states.iter().all(|state| *state == State::Open);
+        Ok(Self { rules, samples, states, tree, each_m2, is_inside_out, is_all })
     }
 
     /// Whether all points may get taxels.
     pub(super) fn is_all(&self) -> bool {
-        self.states.iter().all(|state| *state == State::Open)
+        self.is_all
     }
 
     pub(super) fn is_inside_out(&self) -> bool {
@@ -189,7 +196,8 @@ impl<'a> Ground<'a> {
         triangles.iter().zip(counts).map(is_skin).collect()
     }
 
-    /// `placed`, of which those that may not be where they are went to the nearest open sample of their cells, else of all.
+    /// `placed`, of which those that may not be where they are went to the nearest open sample of their cells that is not beside another
+    /// of them, else of their cells, else of all.
     pub(super) fn settled(&self, mut placed: Vec<Placed>, progress: Progress<'_>) -> Result<Vec<Placed>> {
         let states = self.rules.states(&placed, progress)?;
         if states.iter().all(|state| *state == State::Open) {
@@ -197,20 +205,27 @@ impl<'a> Ground<'a> {
         }
         let tree = point_tree(placed.iter().map(|one| one.point.position));
         let mut is_taken = vec![false; self.samples.len()];
+        let beside_m = BESIDE * 2.0 * widest_radius(self.open().count() as f64 * self.each_m2, placed.len());
         let mut moves = Vec::new();
         for (index, _) in states.iter().enumerate().filter(|(_, state)| **state != State::Open) {
             let here = placed[index].point;
             let near = self.tree.nearest_neighbor_iter(here.position.to_array()).map(|spot| spot.data);
-            let mut open =
-                near.filter(|&sample| self.states[sample] == State::Open && !is_taken[sample]).take(4 * MAX_CANDIDATES);
-            let Some(first) = open.next() else { continue };
-            let is_of_cell = |sample: &usize| {
-                let point = &self.samples[*sample].point;
-                let mut owners = tree.nearest_neighbor_iter(point.position.to_array()).map(|spot| spot.data);
-                points_on_same_side(point, &here) && owners.next() == Some(index)
+            let is_free = |sample: &usize| self.states[*sample] == State::Open && !is_taken[*sample];
+            let open: Vec<usize> = near.filter(is_free).take(8 * MAX_CANDIDATES).collect();
+            // The taxels around a sample, the nearest first, without the one that moves.
+            let others = |sample: usize| {
+                let at = self.samples[sample].point.position.to_array();
+                let near = tree.nearest_neighbor_iter_with_distance_2(at).filter(|(spot, _)| spot.data != index);
+                near.map(|(_, squared)| squared.sqrt()).next().unwrap_or(f64::INFINITY)
             };
-            let own = if is_of_cell(&first) { Some(first) } else { open.find(is_of_cell) };
-            let sample = own.unwrap_or(first);
+            let is_of_cell = |sample: &&usize| {
+                let point = &self.samples[**sample].point;
+                points_on_same_side(point, &here) && others(**sample) > point.position.distance(here.position)
+            };
+            let is_alone = |sample: &&usize| others(**sample) > beside_m;
+            let own = open.iter().find(|sample| is_of_cell(sample) && is_alone(sample));
+            let own = own.or_else(|| open.iter().find(is_of_cell)).or_else(|| open.iter().find(is_alone));
+            let Some(&sample) = own.or(open.first()) else { continue };
             is_taken[sample] = true;
             moves.push((index, sample));
         }

@@ -13,6 +13,9 @@ use crate::field::geodesic::barycentric;
 const ROUNDS: usize = 30;
 const WEIGHTED_ROUNDS: usize = 10;
 
+/// More points at once stay where they are: rounds would take minutes, and gigabytes.
+pub(super) const MOST_POINTS: usize = 100_000;
+
 /// Where points are unequally dense, a surface is as fine as it takes for those that are nearer to each other than all but this share.
 const DENSE_SHARE: f64 = 0.2;
 
@@ -35,7 +38,8 @@ pub(super) enum Weight<'a> {
     Density(&'a dyn Fn(&Placed) -> f64),
 }
 
-/// `placed` on `triangles` with `topology`, moved; in the order of the triangles. `area_m2` is what they share.
+/// `placed` on `triangles` with `topology`, moved, unless they are over [`MOST_POINTS`]; in the order of the triangles. `area_m2` is
+/// what they share.
 pub(super) fn relax(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -44,7 +48,7 @@ pub(super) fn relax(
     (area_m2, weight): (f64, &Weight<'_>),
     progress: Progress<'_>,
 ) -> Result<Vec<Placed>> {
-    if topology.triangles.is_empty() || placed.len() < 2 {
+    if topology.triangles.is_empty() || !(2..=MOST_POINTS).contains(&placed.len()) {
         return Ok(placed.to_vec());
     }
     let mut sound = vec![NONE; triangles.len()];
@@ -167,7 +171,8 @@ mod tests {
             })
             .unwrap();
         for those in [&mut placed, &mut moved] {
-            set_cell_areas(&positions, &triangles, &|_| 0, &vec![true; triangles.len()], those);
+            let all = vec![true; triangles.len()];
+            set_cell_areas(&positions, &triangles, &|_| 0, (&all, None), those);
         }
         (placed, moved)
     }

@@ -67,7 +67,7 @@ fn cells_are_alike_and_links_get_what_their_surface_is_worth() {
     let [low, high] = place.cell_spread.unwrap();
     assert!(low > 0.85 && high < 1.15, "{low} {high}");
     let note = authored.notes.iter().find(|note| note.contains("`crumb`")).unwrap();
-    assert!(note.contains("1 piece of `crumb` without a taxel") && note.contains("1.5 cm²"), "{note}");
+    assert!(note.contains("1 piece") && note.contains("1 of `crumb` (1.5 cm²)"), "{note}");
     let scattered = made(&two, "even = false\n[[place]]\ntaxels = 500");
     let [lower, higher] = scattered.places[0].cell_spread.unwrap();
     assert!(lower < low - 0.05 && higher > high + 0.05, "{lower} {higher}");

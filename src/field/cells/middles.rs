@@ -14,8 +14,8 @@ use crate::body::{SurfaceIndex, Topology, area_vector};
 use crate::field::geodesic::{Start, SurfacePlace, walk_to_edge};
 
 /// Edges are at most this share of the distance that points will have, and short below the other.
-const LONGEST: f64 = 0.5;
-const SHORTEST: f64 = 0.3;
+const LONGEST: f64 = 0.65;
+const SHORTEST: f64 = 0.35;
 
 /// A surface with more triangles than this for each point is made coarser.
 const FINE_PER_POINT: usize = 30;
