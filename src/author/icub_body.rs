@@ -60,7 +60,7 @@ pub fn author_icub(files: &[impl AsRef<Path>]) -> Result<Authored> {
             links: BTreeMap::from([(file.part.clone(), taxels.len())]),
             least_spacing_m: None,
             mean_spacing_m: None,
-            moved_m: Vec::new(),
+            ..PlaceReport::default()
         });
         notes.extend(file.notes);
         first_id = (first_id + file.rows.len() as u32).next_multiple_of(ID_STEP);

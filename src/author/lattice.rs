@@ -5,10 +5,10 @@ use glam::{DVec2, DVec3};
 use super::grid::Grid;
 use super::placed::{Placed, Progress, SurfacePoint, report_progress, same_side};
 use super::rest_surface::RestSurface;
-use crate::body::{NONE, SurfaceIndex, Topology, area_vector, next};
+use crate::body::{SurfaceIndex, Topology, area_vector};
 use crate::error::{Error, Result, failed};
 use crate::field::default_u;
-use crate::field::geodesic::{FIRST_LIMIT, LogMap, SurfacePlace};
+use crate::field::geodesic::{FIRST_LIMIT, LogMap, SurfacePlace, walk};
 
 /// How often the limit is doubled before a part of the region counts as unreachable.
 const MAX_DOUBLINGS: u32 = 6;
@@ -161,59 +161,4 @@ fn extent(map: &LogMap<'_>, near: &[u32]) -> f64 {
     let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let places = near.iter().flat_map(|&triangle| corners.map(|barycentric| SurfacePlace { triangle, barycentric }));
     places.map(|place| map.reach(&place).map_or(f64::INFINITY, |way| way.distance_m)).fold(0.0, f64::max)
-}
-
-/// The end of a straight walk of `length` from `from` in `triangle`; at the surface's edge, an error with the length left.
-pub(super) fn walk(
-    topology: &Topology,
-    mut triangle: u32,
-    mut from: DVec3,
-    mut direction: DVec3,
-    mut length: f64,
-) -> Result<SurfacePlace, f64> {
-    let mut entered = NONE;
-    // A bound: a walk crosses a triangle again only after going around the surface.
-    for _ in 0..100 * topology.triangles.len().max(100) {
-        let corners = topology.corners(triangle);
-        let normal = area_vector(corners).normalize_or_zero();
-        let mut exit: Option<(f64, u32)> = None;
-        for side in 0..3_u32 {
-            let edge = 3 * triangle + side;
-            if edge == entered {
-                continue;
-            }
-            let (a, b) = (corners[side as usize], corners[(side as usize + 1) % 3]);
-            let outward = (b - a).cross(normal);
-            let towards = outward.dot(direction);
-            if towards > 0.0 {
-                let t = (outward.dot(a - from) / towards).max(0.0);
-                if exit.is_none_or(|(least, _)| t < least) {
-                    exit = Some((t, edge));
-                }
-            }
-        }
-        let Some((t, edge)) = exit else { return Err(length) };
-        if t >= length {
-            return Ok(SurfacePlace::in_triangle(topology, triangle, from + direction * length));
-        }
-        from += direction * t;
-        length -= t;
-        let beyond = topology.across[edge as usize];
-        if beyond == NONE {
-            return Err(length);
-        }
-        let [a, b] = [topology.ends(edge).0, topology.ends(edge).1].map(|v| topology.positions[v as usize]);
-        let along = (b - a).normalize_or_zero();
-        let (forward, aside) = (direction.dot(along.cross(normal)), direction.dot(along));
-        triangle = beyond / 3;
-        entered = beyond;
-        // Inward across the shared edge, in the plane of the triangle beyond.
-        let third = topology.positions[topology.ends(next(next(beyond))).0 as usize] - a;
-        let inward = (third - along * third.dot(along)).normalize_or_zero();
-        direction = (along * aside + inward * forward).normalize_or_zero();
-        if direction == DVec3::ZERO {
-            return Err(length);
-        }
-    }
-    Err(length)
 }

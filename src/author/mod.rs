@@ -17,8 +17,12 @@
 //!
 //! Results are the same on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties go to the lower index.
 
+mod borders;
+mod cell_spread;
 mod coverage;
+mod fill;
 mod grid;
+mod ground;
 pub mod group;
 pub mod icub;
 mod icub_body;
@@ -35,9 +39,11 @@ mod recipe;
 pub mod recipe_values;
 mod refresh;
 mod region;
+mod relax;
 mod rest_surface;
 mod sample_neighbours;
 mod scatter;
+mod shares;
 mod sheet;
 mod skin;
 mod skin_weights;
@@ -45,6 +51,7 @@ mod surface_search;
 mod table_body;
 mod voronoi;
 
+pub use cell_spread::cell_spread;
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
 pub use icub_body::author_icub;
 #[cfg(feature = "meshes")]

@@ -61,21 +61,22 @@ pub(super) fn evenly(
     eliminate(&samples, &reaches, count, progress)
 }
 
-/// As [`evenly`], but no two neighbours closer than `spacing_m`; else the number that fit.
+/// As [`evenly`], but no two neighbours closer than `spacing_m`, and only those that `keep` leaves; else the number that fit.
 pub(super) fn evenly_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     count: usize,
-    spacing_m: f64,
+    (spacing_m, keep): (f64, &dyn Fn(Vec<Placed>) -> Result<Vec<Placed>>),
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<std::result::Result<Vec<Placed>, usize>> {
-    let placed = evenly(positions, triangles, count, seed, progress)?;
+    let placed = keep(evenly(positions, triangles, count, seed, progress)?)?;
     let points: Vec<SurfacePoint> = placed.iter().map(|placed| placed.point).collect();
-    if nearest_on_its_side(&points).into_iter().flatten().all(|distance| distance >= spacing_m) {
+    let are_apart = nearest_on_its_side(&points).into_iter().flatten().all(|distance| distance >= spacing_m);
+    if placed.len() == count && are_apart {
         return Ok(Ok(placed));
     }
-    let packed = apart(positions, triangles, spacing_m, seed, progress)?;
+    let packed = keep(apart(positions, triangles, spacing_m, seed, progress)?)?;
     if packed.len() < count {
         return Ok(Err(packed.len()));
     }
@@ -101,7 +102,7 @@ pub fn place_by_density(
 ) -> Result<Vec<Placed>> {
     let mut placed = by_density(positions, triangles, count, seed, &density, progress)?;
     let is_skin = skin_by_density(positions, triangles, &density);
-    set_cell_areas(positions, triangles, &|_| 0, &is_skin, &mut placed);
+    set_cell_areas(positions, triangles, &|_| 0, (&is_skin, None), &mut placed);
     Ok(placed)
 }
 
@@ -184,7 +185,12 @@ fn check_count(count: usize) -> Result<()> {
 }
 
 /// Eliminates all but `count` samples.
-fn eliminate(samples: &[Placed], reaches_m: &[f64], count: usize, progress: Progress<'_>) -> Result<Vec<Placed>> {
+pub(super) fn eliminate(
+    samples: &[Placed],
+    reaches_m: &[f64],
+    count: usize,
+    progress: Progress<'_>,
+) -> Result<Vec<Placed>> {
     let ratio = count as f64 / samples.len() as f64;
     // Distances far below the final spacing all get the same weight.
     let closest = 1.0 - ratio * ratio.sqrt();
@@ -208,30 +214,34 @@ fn those(samples: &[Placed], kept: &[usize]) -> Vec<Placed> {
 
 /// `placed`, each with the area of its cell, if it is one surface.
 fn with_cells(positions: &[DVec3], triangles: &[[u32; 3]], mut placed: Vec<Placed>) -> Vec<Placed> {
-    set_cell_areas(positions, triangles, &|_| 0, &vec![true; triangles.len()], &mut placed);
+    let all = vec![true; triangles.len()];
+    set_cell_areas(positions, triangles, &|_| 0, (&all, None), &mut placed);
     placed
 }
 
-/// Gives each of `placed` the area of its cell on the triangles that are skin or hold a point; `group_of` a vertex is the surface
-/// that it belongs to. The cells, if there are any.
+/// Gives each of `placed` the area of its cell on the triangles that are surface or hold a point, of those of them that are skin, if that is given;
+/// `group_of` a vertex is the surface that it belongs to. The cells, if there are any.
 pub(super) fn set_cell_areas(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     group_of: &dyn Fn(u32) -> u32,
-    is_skin: &[bool],
+    (is_surface, is_skin): (&[bool], Option<&[bool]>),
     placed: &mut [Placed],
 ) -> Option<Divided> {
-    let mut counts = is_skin.to_vec();
+    let mut counts = is_surface.to_vec();
     placed.iter().for_each(|placed| counts[placed.triangle] = true);
     let mut number = vec![0; triangles.len()];
-    let mut skin = Vec::with_capacity(triangles.len());
+    let (mut skin, mut given) = (Vec::with_capacity(triangles.len()), Vec::with_capacity(triangles.len()));
     for (triangle, _) in counts.iter().enumerate().filter(|(_, counts)| **counts) {
         number[triangle] = skin.len();
         skin.push(triangles[triangle]);
+        given.push(triangle);
     }
     let point = |placed: &Placed| CellPoint { triangle: number[placed.triangle], ..placed.cell_point() };
     let points: Vec<CellPoint> = placed.iter().map(point).collect();
-    let (areas, divided) = Divided::with_areas(positions, &skin, group_of, &points);
+    let is_skin = is_skin.map(|is_skin| |triangle: usize| is_skin[given[triangle]]);
+    let is_skin = is_skin.as_ref().map(|is_skin| is_skin as &dyn Fn(usize) -> bool);
+    let (areas, divided) = Divided::with_areas(positions, &skin, group_of, is_skin, &points);
     placed.iter_mut().zip(areas).for_each(|(placed, area)| placed.point.area = area);
     divided
 }

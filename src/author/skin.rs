@@ -4,18 +4,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
+use super::cell_spread::cell_spread;
+use super::fill::{Fill, Filled, without_area};
 use super::group::{FilePaint, Grouper, Grouping, group_while};
-use super::lattice::Lattice;
+use super::lint::{DrawnPoses, Touchable};
 use super::origin::Origin;
-use super::place::{apart, by_density, evenly, evenly_apart, nearest_on_its_side, set_cell_areas, skin_by_density};
-use super::placed::{Placed, Progress, SurfacePoint, report_progress};
-use super::points::{Snapped, of_icub, of_marks, of_table, snap};
-use super::recipe::{PlaceSpec, Placement, Recipe, shown};
+use super::place::nearest_on_its_side;
+use super::placed::{Progress, SurfacePoint, report_progress};
+use super::points::Snapped;
+use super::recipe::{PlaceSpec, Recipe};
 use super::refresh::refresh;
 use super::region::Regions;
 use super::rest_surface::{MeshTaxel, RestSurface};
 use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Modality, Original, Skinning, Taxel, listed};
-use crate::error::{Error, Result, failed};
+use crate::error::{Error, Result};
 use crate::field::{Divided, TaxelGraph, unions};
 
 /// Progress before and after placing taxels, and when they are in fields.
@@ -37,7 +39,7 @@ pub struct Authored {
 }
 
 /// The result of a place of a recipe.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlaceReport {
     /// Its name.
     pub name: String,
@@ -51,6 +53,10 @@ pub struct PlaceReport {
     pub mean_spacing_m: Option<f64>,
     /// For given places: the id, and how far the taxel was moved to the surface, m.
     pub moved_m: Vec<(u32, f64)>,
+    /// The 5th and the 95th percentile of the taxels' areas over their median; `None` if these are unknown.
+    pub cell_spread: Option<[f64; 2]>,
+    /// Surface of the place that nothing can touch, by name of the link, m².
+    pub hidden_m2: BTreeMap<String, f64>,
 }
 
 /// Adds the taxels and fields of `recipe` to `file` and replaces its layout. Its taxels stay if the recipe has no place or
@@ -115,6 +121,9 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     }
     let mut ids = UsedIds::default();
     ids.take(body.taxels.iter().map(|taxel| taxel.id), "the file", &Origin::default())?;
+    let drawn = DrawnPoses::of(&body);
+    let looks = !recipe.keeps_hidden && recipe.places.iter().any(|place| place.how.samples());
+    let touchable = looks.then(|| Touchable::new(&body, &drawn));
     let (mut reports, mut seated) = (Vec::new(), Vec::new());
     // What a place over all of the surface divides it into is what the edges of its taxels are made of.
     let is_alone = body.taxels.is_empty() && recipe.places.len() == 1;
@@ -133,8 +142,17 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         }
         let share = (PROGRESS_PLACED - PROGRESS_OPENED) / recipe.places.len() as f64;
         let tick = &mut |done: f64| go_on(PROGRESS_OPENED + share * (index as f64 + done));
-        let placed = place_taxels(&rest_surface, &region, place, recipe.seed_of(place), &mut notes, tick);
-        let (filled, cells) = placed.map_err(|e| place.at.put(e))?;
+        let fill = Fill {
+            rest_surface: &rest_surface,
+            place,
+            seed: recipe.seed_of(place),
+            is_scattered: recipe.is_scattered,
+            touchable: touchable.as_ref(),
+            clear_m: recipe.clear_m,
+        };
+        let Filled { taxels: filled, cells, hidden_m2, notes: more } =
+            fill.place(&region, tick).map_err(|e| place.at.put(e))?;
+        notes.extend(more);
         let last = u64::from(place.first_id) + filled.len() as u64;
         if last > u64::from(MAX_TAXEL_ID) + 1 {
             let what =
@@ -150,7 +168,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         let links = rest_surface.link.iter().zip(&region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();
         let seat = |(one, &id): (&Snapped, &u32)| rest_surface.mesh_taxel(&one.placed, id, place.modality, &links);
         seated.extend(filled.iter().zip(&own).map(seat));
-        reports.push(report(&rest_surface, place, own, &filled, &seated[first..]));
+        reports.push(report(&rest_surface, place, own, &filled, (&seated[first..], hidden_m2)));
     }
     report_progress(&mut go_on, PROGRESS_PLACED)?;
     let addition = taxel_nodes(&file, &rest_surface, seated);
@@ -190,125 +208,6 @@ pub(super) fn store_edges(
     body.edges = Some(edges);
 }
 
-fn place_taxels(
-    rest_surface: &RestSurface<'_>,
-    region: &[bool],
-    place: &PlaceSpec,
-    seed: u64,
-    notes: &mut Vec<String>,
-    progress: Progress<'_>,
-) -> Result<(Vec<Snapped>, Option<Divided>)> {
-    let chosen: Vec<usize> = (0..region.len()).filter(|&triangle| region[triangle]).collect();
-    let triangles: Vec<[u32; 3]> = chosen.iter().map(|&triangle| rest_surface.triangles[triangle]).collect();
-    let positions = &rest_surface.positions;
-    let mut divided = None;
-    let mut on_skin = |mut placed: Vec<Placed>, is_skin: &[bool]| {
-        let group_of = |vertex| rest_surface.group_of(vertex);
-        let cells = set_cell_areas(positions, &triangles, &group_of, is_skin, &mut placed);
-        divided = cells.filter(|_| !is_skin.contains(&false));
-        let onto_canvas = |p: Placed| Placed { triangle: chosen[p.triangle], ..p };
-        placed.into_iter().map(|p| Snapped { placed: onto_canvas(p), id: None, moved_m: 0.0 }).collect()
-    };
-    let mut sampled = |placed: Vec<Placed>| on_skin(placed, &vec![true; triangles.len()]);
-    let filled = match &place.how {
-        Placement::Evenly { count, apart_m: None } => sampled(evenly(positions, &triangles, *count, seed, progress)?),
-        Placement::Evenly { count, apart_m: Some(apart_m) } => {
-            let area: f64 = chosen.iter().map(|&triangle| rest_surface.area(triangle)).sum();
-            let wrong = |most: String| {
-                failed!(
-                    "{count} taxels do not fit {} apart on {:.1} cm²; {most}, or ask for a smaller spacing",
-                    shown(*apart_m),
-                    area * 1e4
-                )
-            };
-            // The densest packing on both sides of thin parts.
-            let most = area * 2.0 / (3.0_f64.sqrt() * apart_m * apart_m);
-            if *count as f64 > most + 1.0 {
-                return Err(wrong(format!("not even the densest packing holds over {most:.0}")));
-            }
-            match evenly_apart(positions, &triangles, *count, *apart_m, seed, progress)? {
-                Ok(placed) => sampled(placed),
-                Err(fit) => return Err(wrong(format!("ask for at most {fit}"))),
-            }
-        }
-        Placement::Apart { spacing_m } => {
-            check_fits(rest_surface, &chosen, "spacing", *spacing_m)?;
-            sampled(apart(positions, &triangles, *spacing_m, seed, progress)?)
-        }
-        Placement::Density { count, attribute } => {
-            let painted = rest_surface.painted(attribute)?;
-            let density = |p: &Placed| {
-                let corners = triangles[p.triangle].map(|v| painted[v as usize].unwrap_or(0.0));
-                corners.iter().zip(p.barycentric).map(|(value, weight)| value * weight).sum()
-            };
-            let placed = by_density(positions, &triangles, *count, seed, density, progress)?;
-            on_skin(placed, &skin_by_density(positions, &triangles, density))
-        }
-        Placement::Grid { hexagonal, pitch_m, origin, u } => {
-            check_fits(rest_surface, &chosen, "pitch", *pitch_m)?;
-            let lattice = Lattice { hexagonal: *hexagonal, pitch_m: *pitch_m, origin: *origin, u: *u };
-            let laid = lattice.lay(rest_surface, region, progress)?;
-            if laid.placed.is_empty() {
-                return Err(Error::failed(
-                    "no place of the grid is on the region; make `pitch` smaller or move `origin`",
-                ));
-            }
-            if laid.reached_share < 0.999 {
-                notes.push(format!(
-                    "place `{}`: the grid covers the part of its region that is connected to the origin, {:.0} % of it; write \
-                     a [[place]] for each other part",
-                    place.name,
-                    100.0 * laid.reached_share
-                ));
-            }
-            let filled = laid.placed.into_iter().map(|placed| Snapped { placed, id: None, moved_m: 0.0 });
-            filled.collect()
-        }
-        Placement::Marks { names, within_m } => snap(rest_surface, region, &of_marks(rest_surface, names)?, *within_m)?,
-        Placement::Icub { path, link, within_m } => {
-            let (given, more) = of_icub(rest_surface, path, link.as_deref(), place.modality, place.first_id)?;
-            notes.extend(more);
-            snap(rest_surface, region, &given, *within_m)?
-        }
-        Placement::Table { path, within_m } => {
-            let given = of_table(rest_surface, path)?;
-            snap(rest_surface, region, &given, *within_m).map_err(|e| e.at(path.display()))?
-        }
-    };
-    Ok((filled, divided))
-}
-
-/// Rejects a length wider than the triangles `chosen`, which was not meant in metres.
-fn check_fits(rest_surface: &RestSurface<'_>, chosen: &[usize], key: &str, length_m: f64) -> Result<()> {
-    let corners = chosen.iter().flat_map(|&triangle| rest_surface.corners(triangle));
-    let (low, high) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-    let across_m = low.distance(high);
-    if length_m <= across_m {
-        return Ok(());
-    }
-    Err(failed!(
-        "a {key} of {} is wider than what it is for, which is {} across; numbers are metres: for millimetres write \"{} mm\"",
-        shown(length_m),
-        shown(across_m),
-        length_m
-    ))
-}
-
-/// The note on taxels without an area.
-fn without_area(place: &PlaceSpec, filled: &[Snapped], ids: &[u32]) -> Option<String> {
-    let lone = filled.iter().zip(ids).filter(|(one, _)| one.placed.point.area == 0.0);
-    let lone: Vec<u32> = lone.map(|(_, &id)| id).collect();
-    (!lone.is_empty()).then(|| {
-        format!(
-            "place `{}`: no area for {}, as no other taxel of the place is near on the same part of the surface; give it in \
-             the column `area` of a csv: {}",
-            place.name,
-            if lone.len() == 1 { "1 taxel".to_owned() } else { format!("{} taxels", lone.len()) },
-            listed(&lone)
-        )
-    })
-}
-
 #[derive(Default)]
 struct UsedIds(BTreeMap<u32, String>);
 
@@ -331,7 +230,7 @@ fn report(
     place: &PlaceSpec,
     ids: Vec<u32>,
     filled: &[Snapped],
-    seated: &[MeshTaxel],
+    (seated, hidden_m2): (&[MeshTaxel], BTreeMap<usize, f64>),
 ) -> PlaceReport {
     let points: Vec<SurfacePoint> = filled.iter().map(|one| one.placed.point).collect();
     let near: Vec<f64> = nearest_on_its_side(&points).into_iter().flatten().collect();
@@ -341,9 +240,12 @@ fn report(
     }
     let moved = |(one, &id): (&Snapped, &u32)| (id, one.moved_m);
     let moved_m = if place.how.samples() { Vec::new() } else { filled.iter().zip(&ids).map(moved).collect() };
+    let hidden = |(link, area): (usize, f64)| (rest_surface.body.links[link].name.clone(), area);
     PlaceReport {
         name: place.name.clone(),
         links,
+        cell_spread: cell_spread(filled.iter().map(|one| one.placed.point.area)),
+        hidden_m2: hidden_m2.into_iter().map(hidden).collect(),
         least_spacing_m: near.iter().copied().reduce(f64::min),
         mean_spacing_m: (!near.is_empty()).then(|| near.iter().sum::<f64>() / near.len() as f64),
         moved_m,

@@ -66,7 +66,7 @@ fn place(rows: &[TaxelRow], path: &Path) -> Result<Authored> {
             links: BTreeMap::from([((*link).to_owned(), taxels.len())]),
             least_spacing_m: None,
             mean_spacing_m: None,
-            moved_m: Vec::new(),
+            ..PlaceReport::default()
         });
     }
     let file = Original::from_bytes(&path.display().to_string(), &glb.to_bytes()?, None)?;

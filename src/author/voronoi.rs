@@ -9,11 +9,10 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::lattice::walk;
 use super::placed::{COINCIDENT_M, Placed, points_on_same_side};
 use super::rest_surface::RestSurface;
 use crate::body::{NONE, PointTree, SurfaceIndex, Topology, area_vector, point_tree};
-use crate::field::geodesic::{LogMap, SurfacePlace};
+use crate::field::geodesic::{LogMap, SurfacePlace, walk};
 
 /// Distance limits along the surface over the straight distances to the sixth nearest and the second nearest taxel.
 const REACH_OF_SIXTH: f64 = 2.0;

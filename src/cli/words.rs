@@ -19,6 +19,11 @@ pub(super) fn number(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// Percentiles of areas over their median, as text: `0.91–1.08`.
+pub(super) fn spread([low, high]: [f64; 2]) -> String {
+    format!("{low:.2}–{high:.2}")
+}
+
 /// `metres` in millimetres, in at most six characters while that is under a kilometre.
 pub(super) fn millimetres(metres: f64) -> String {
     let mm = metres * 1e3;

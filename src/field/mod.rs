@@ -22,7 +22,7 @@ mod surface_groups;
 mod unroll;
 
 pub(crate) use cell_surface::CellSurface;
-pub(crate) use cells::{COINCIDENT_M, CellPoint, Divided};
+pub(crate) use cells::{COINCIDENT_M, CellPoint, Divided, Relaxation};
 pub(crate) use chart::default_u;
 pub use chart::{Chart, NoChart};
 pub use distortion::Distortion;

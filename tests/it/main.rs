@@ -13,6 +13,7 @@ mod controller;
 mod draft;
 mod edited;
 mod endurance;
+mod even;
 mod extremes;
 mod filter;
 mod firmware;

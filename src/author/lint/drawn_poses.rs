@@ -43,6 +43,11 @@ impl DrawnPoses {
         }))
     }
 
+    /// Those of `body` with its own joints; rest alone if it keeps none.
+    pub(in crate::author) fn of(body: &Body) -> Self {
+        Self::of_own_joints(body).unwrap_or_else(|| Self::at_rest(body))
+    }
+
     /// By pose, body_from_link of link `link`.
     pub fn of_link(&self, link: usize) -> impl Iterator<Item = DAffine3> + '_ {
         self.body_from_link.iter().map(move |pose| pose[link])

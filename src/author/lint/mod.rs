@@ -8,6 +8,7 @@ mod hidden_findings;
 mod large;
 mod posed_surface;
 mod shells;
+mod touchable;
 
 pub(super) use checks::{SurfaceFit, drift};
 pub use checks::{lint, lint_in_poses, lint_with_progress};
@@ -17,3 +18,4 @@ pub(crate) use drawn_poses::drawn_position;
 pub use finding::{Finding, FindingKind, LinkShare};
 #[cfg(feature = "meshes")]
 pub(crate) use large::MAX_LIKELY_LINK_M;
+pub(super) use touchable::{BodyPoint, Touchable};

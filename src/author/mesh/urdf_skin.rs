@@ -60,7 +60,7 @@ fn place(robot: &Robot, path: &Path, options: &MeshOptions) -> Result<Authored> 
             ids,
             least_spacing_m: None,
             mean_spacing_m: None,
-            moved_m: Vec::new(),
+            ..PlaceReport::default()
         });
     }
     for (link, taxels) in &by_link {

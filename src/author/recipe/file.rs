@@ -28,6 +28,10 @@ struct File {
     #[serde(default)]
     seed: u64,
     unit: Option<Spanned<String>>,
+    even: Option<bool>,
+    #[serde(default)]
+    hidden: HiddenSurface,
+    clear: Option<Length>,
     #[serde(default)]
     existing: Existing,
     #[serde(default)]
@@ -45,6 +49,14 @@ struct File {
 enum Existing {
     #[default]
     Replace,
+    Keep,
+}
+
+#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+enum HiddenSurface {
+    #[default]
+    Drop,
     Keep,
 }
 
@@ -138,6 +150,9 @@ fn parse(recipe_text: RecipeText<'_>, folder: &Path) -> Result<Recipe> {
     let text = recipe_text.text;
     let file: File = text.parse()?;
     let mut recipe = Recipe { keeps_existing: file.existing == Existing::Keep, seed: file.seed, ..Recipe::none() };
+    recipe.is_scattered = file.even == Some(false);
+    recipe.keeps_hidden = file.hidden == HiddenSurface::Keep;
+    recipe.clear_m = file.clear.map(|length| length.metres);
     if let Some(unit) = &file.unit {
         let metres = unit_metres(unit.get_ref()).map_err(|e| text.wrong(unit.span(), e.to_string()))?;
         recipe.unit = Some((unit.get_ref().clone(), metres));

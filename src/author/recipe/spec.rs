@@ -54,6 +54,12 @@ pub struct Recipe {
     pub(in crate::author) places: Vec<PlaceSpec>,
     pub(in crate::author) fields: Vec<(FieldRule, Origin)>,
     pub(super) seed: u64,
+    /// Whether points that were sampled stay where they are, instead of moving until their cells are alike.
+    pub(in crate::author) is_scattered: bool,
+    /// Whether surface that nothing can touch gets sampled taxels, too.
+    pub(in crate::author) keeps_hidden: bool,
+    /// How far sampled taxels are from borders of links and seams at least, m.
+    pub(in crate::author) clear_m: Option<f64>,
 }
 
 /// Taxels of one kind on some regions.
@@ -73,7 +79,7 @@ pub(in crate::author) struct PlaceSpec {
 
 #[derive(Clone, Debug)]
 pub(in crate::author) enum Placement {
-    /// `count` as blue noise, with a minimum spacing if given.
+    /// `count` evenly, with a minimum spacing if given.
     Evenly { count: usize, apart_m: Option<f64> },
     /// `count` by a painted density.
     Density { count: usize, attribute: String },
@@ -118,7 +124,7 @@ impl Recipe {
         Self::default()
     }
 
-    /// A number of taxels as blue noise (`taxels`), a spacing (such as `8 mm`), or both, on the nodes, meshes or links whose
+    /// A number of taxels (`taxels`), spread evenly, a spacing (such as `8 mm`), or both, on the nodes, meshes or links whose
     /// names match one of `nodes`; without any, on the whole surface.
     ///
     /// # Errors
@@ -164,6 +170,27 @@ impl Recipe {
     #[must_use]
     pub fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
+    }
+
+    /// The same where sampled taxels move until their cells are alike (`true`, as without this), or stay where they were scattered.
+    #[must_use]
+    pub fn with_even(self, even: bool) -> Self {
+        Self { is_scattered: !even, ..self }
+    }
+
+    /// The same where surface that nothing can touch gets sampled taxels, too (`true`), or none (`false`, as without this).
+    #[must_use]
+    pub fn with_hidden(self, keep: bool) -> Self {
+        Self { keeps_hidden: keep, ..self }
+    }
+
+    /// The same with sampled taxels at least so far from borders of links and seams, such as `5 mm`.
+    ///
+    /// # Errors
+    /// It is no length.
+    pub fn with_clear(self, length: &str) -> Result<Self> {
+        let length: Length = length.parse().map_err(|e: Error| Error::usage(e.to_string()))?;
+        Ok(Self { clear_m: Some(length.metres), ..self })
     }
 
     /// The same with the mesh file's numbers in `unit`: `um`, `mm`, `cm` or `m`.

@@ -34,6 +34,6 @@ fn report(body: &Body, sheet: &Sheet) -> PlaceReport {
         ids,
         least_spacing_m: near.iter().copied().reduce(f64::min),
         mean_spacing_m: (!near.is_empty()).then(|| near.iter().sum::<f64>() / near.len() as f64),
-        moved_m: Vec::new(),
+        ..PlaceReport::default()
     }
 }

@@ -7,7 +7,7 @@ mod skin;
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use somatic::author::{Recipe, author};
 use somatic::body::Original;
 use somatic::error::nearest;
@@ -66,7 +66,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "RECIPE.toml", conflicts_with_all = ["taxels", "spacing", "region"])]
     recipe: Option<PathBuf>,
 
-    /// How many taxels, as evenly as blue noise goes.
+    /// How many taxels, spread evenly where something can touch them.
     #[arg(long, value_name = "N")]
     taxels: Option<u64>,
 
@@ -81,6 +81,20 @@ pub(super) struct Arguments {
     /// Which of many equally good placements [default: the recipe's, or 0].
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+
+    /// Whether taxels move until the surface around each is alike (on), or stay where they were scattered (off) [default: the
+    /// recipe's, or on].
+    #[arg(long, value_name = "WORD")]
+    even: Option<EvenWord>,
+
+    /// What becomes of surface that nothing can touch, inside the body or under another link in all poses: none of it gets a
+    /// taxel (drop), or as much as elsewhere (keep) [default: the recipe's, or drop].
+    #[arg(long, value_name = "WORD")]
+    hidden: Option<HiddenWord>,
+
+    /// How far taxels are from borders of links and seams at least, such as 5mm [default: the recipe's, or as it comes].
+    #[arg(long, value_name = "LENGTH")]
+    clear: Option<String>,
 
     /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m].
     #[arg(long, value_name = "UNIT")]
@@ -106,6 +120,18 @@ pub(super) struct Arguments {
     /// Print what was placed as JSON.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EvenWord {
+    On,
+    Off,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum HiddenWord {
+    Drop,
+    Keep,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
@@ -150,6 +176,15 @@ fn recipe(arguments: &Arguments) -> Result<Recipe> {
     };
     if let Some(seed) = arguments.seed {
         recipe = recipe.with_seed(seed);
+    }
+    if let Some(even) = arguments.even {
+        recipe = recipe.with_even(matches!(even, EvenWord::On));
+    }
+    if let Some(hidden) = arguments.hidden {
+        recipe = recipe.with_hidden(matches!(hidden, HiddenWord::Keep));
+    }
+    if let Some(clear) = &arguments.clear {
+        recipe = recipe.with_clear(clear).map_err(|e| e.at("--clear"))?;
     }
     if let Some(unit) = &arguments.unit {
         recipe = recipe.with_unit(unit).map_err(|e| e.at("--unit"))?;

@@ -9,7 +9,7 @@ use somatic::body::Body;
 use somatic::field::FieldSet;
 
 use crate::cli::table::{plain, shown};
-use crate::cli::words::{bullet, count, millimetres, title};
+use crate::cli::words::{bullet, count, millimetres, spread, title};
 
 /// Links, ids and moves that a person is shown.
 const MOST_LISTED: usize = 6;
@@ -86,7 +86,7 @@ fn centroids(authored: &Authored) -> String {
 }
 
 fn table(places: &[PlaceReport]) -> String {
-    let mut table = plain(["place", "taxels", "least mm", "mean mm", "ids", "links"], 1..4);
+    let mut table = plain(["place", "taxels", "least mm", "mean mm", "cells", "ids", "links"], 1..4);
     for place in places {
         let length = |metres: Option<f64>| Cell::new(metres.map_or_else(|| "–".to_owned(), millimetres));
         let run =
@@ -98,6 +98,7 @@ fn table(places: &[PlaceReport]) -> String {
             Cell::new(place.ids.len()),
             length(place.least_spacing_m),
             length(place.mean_spacing_m),
+            Cell::new(place.cell_spread.map_or_else(|| "–".to_owned(), spread)),
             Cell::new(listed(&ids)),
             Cell::new(listed(&links)),
         ]);
@@ -143,6 +144,12 @@ pub(super) fn summary(output: &Path, authored: &Authored) -> Value {
         });
         if let (Some(least), Some(mean)) = (place.least_spacing_m, place.mean_spacing_m) {
             object["spacing"] = json!({"least": least, "mean": mean});
+        }
+        if let Some([low, high]) = place.cell_spread {
+            object["cells"] = json!({"p5": low, "p95": high});
+        }
+        if !place.hidden_m2.is_empty() {
+            object["hidden"] = json!(place.hidden_m2);
         }
         if !moved.is_empty() {
             object["moved"] = moved.into();

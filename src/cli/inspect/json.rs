@@ -1,7 +1,7 @@
 //! A body as JSON.
 
 use serde_json::{Map, Value, json};
-use somatic::author::Finding;
+use somatic::author::{Finding, cell_spread};
 use somatic::body::Body;
 use somatic::field::{Field, WORLD};
 
@@ -50,6 +50,9 @@ pub(super) fn text(seen: &Inspection) -> String {
             })).collect::<Vec<_>>(),
         },
     });
+    if let Some([low, high]) = cell_spread(body.taxels.iter().map(|taxel| taxel.area)) {
+        whole["cells"] = json!({"p5": low, "p95": high});
+    }
     for (name, value) in seen.graph.json(body) {
         whole[name] = value;
     }

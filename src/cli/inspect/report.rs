@@ -3,13 +3,13 @@
 use comfy_table::ColumnConstraint;
 use console::style;
 use rstar::RTree;
-use somatic::author::Coverage;
+use somatic::author::{Coverage, cell_spread};
 use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, RestOverlap, WORLD};
 
 use super::inspection::Inspection;
 use crate::cli::table::{TextTable, plain, shown};
-use crate::cli::words::{bullet, count, millimetres, one_line, title};
+use crate::cli::words::{bullet, count, millimetres, one_line, spread, title};
 
 /// All there is to say, the oddest last, where it is read.
 pub(super) fn text(seen: &Inspection) -> String {
@@ -21,6 +21,9 @@ pub(super) fn text(seen: &Inspection) -> String {
     let surfaces = count(triangles as u64, "triangle");
     line("surfaces", format!("{} with {surfaces}", body.surfaces.len()));
     line("taxels", taxels(body));
+    if let Some(cells) = cell_spread(body.taxels.iter().map(|taxel| taxel.area)) {
+        line("cells", format!("{} of the median area, 5th to 95th percentile", spread(cells)));
+    }
     for (what, value) in coverage(body, &seen.coverage) {
         line(what, value);
     }

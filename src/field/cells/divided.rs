@@ -31,11 +31,13 @@ pub(crate) struct Divided {
 impl Divided {
     /// Per point the area of its cell on `triangles` over `positions`, m²; points at one place share theirs. Together they have the
     /// surface's area: pieces without a point belong to the nearest on their side, in a straight line. Vertices of different
-    /// groups are never connected. The second part is what they are of; `None` if there is no surface.
+    /// groups are never connected. Triangles for which `is_skin` is false, if given, have no area. The second part is what they
+    /// are of; `None` if there is no surface.
     pub(crate) fn with_areas(
         positions: &[DVec3],
         triangles: &[[u32; 3]],
         group_of: &dyn Fn(u32) -> u32,
+        is_skin: Option<&dyn Fn(usize) -> bool>,
         points: &[CellPoint],
     ) -> (Vec<f64>, Option<Self>) {
         let topology = Topology::of_groups(positions, triangles, group_of);
@@ -56,9 +58,15 @@ impl Divided {
         };
         let places: Option<Vec<SurfacePlace>> = points.iter().map(&mut place).collect();
         let Some(places) = places else { return (vec![0.0; points.len()], None) };
-        let mut cells = Cells::new(&topology, &places);
+        let mut cells = match is_skin {
+            Some(is_skin) => {
+                Cells::of_skin(&topology, &places, &|triangle| is_skin(topology.given[triangle as usize] as usize))
+            }
+            None => Cells::new(&topology, &places),
+        };
         let mut pieces = std::mem::take(&mut cells.pieces);
-        let left_out = (0..triangles.len()).filter(|&triangle| sound[triangle] == NONE);
+        let left_out = (0..triangles.len())
+            .filter(|&triangle| sound[triangle] == NONE && is_skin.is_none_or(|is_skin| is_skin(triangle)));
         let corners = |triangle: usize| triangles[triangle].map(|v| positions.get(v as usize).copied());
         let corners = left_out.filter_map(|triangle| match corners(triangle) {
             [Some(a), Some(b), Some(c)] => Some([a, b, c]),

@@ -201,17 +201,28 @@ impl<'a> Marched<'a> {
     }
 }
 
+impl Coming {
+    /// It rises with the distance, then with the point and the vertex: the bits of numbers from 0 up do as these.
+    fn key(&self) -> u128 {
+        (u128::from(self.distance_m.abs().to_bits()) << 64) | (u128::from(self.site) << 32) | u128::from(self.vertex)
+    }
+}
+
 impl Ord for Coming {
     fn cmp(&self, other: &Self) -> Ordering {
         // The nearest first; of equally near ones those with the lower numbers, for one order.
-        let nearest = other.distance_m.total_cmp(&self.distance_m);
-        nearest.then(other.site.cmp(&self.site)).then(other.vertex.cmp(&self.vertex))
+        other.key().cmp(&self.key())
     }
 }
 
 impl PartialOrd for Coming {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
+    }
+
+    // What the queue asks for.
+    fn le(&self, other: &Self) -> bool {
+        self.key() >= other.key()
     }
 }
 

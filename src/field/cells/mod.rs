@@ -3,8 +3,10 @@
 //! Windows run from all points at once, so that each ends soon beyond its own cell. In each triangle that several points
 //! reach, their distances to its corners give the borders (`polygon.rs`). Long edges are cut beforehand (`refine.rs`).
 
+mod coarsen;
 mod divided;
 mod marched;
+mod middles;
 mod parts;
 mod polygon;
 mod refine;
@@ -16,6 +18,7 @@ use glam::{DVec2, DVec3};
 
 pub(crate) use self::divided::{CellPoint, Divided};
 use self::marched::Marched;
+pub(crate) use self::middles::Relaxation;
 use self::parts::{Parts, corner_at};
 use self::polygon::{Candidate, Side, nearest_part, share, squared_at};
 use self::refine::refine;
@@ -43,6 +46,9 @@ const MARCHED_PER_POINT: usize = 400;
 /// How far cells of a surface reach that is asked for, in distances of a point to its nearest other where that is largest: over the
 /// side of a thin part that has points on its faces alone.
 const REACH: f64 = 2.0;
+
+/// The same beside hidden surface, which has no points: over skin that has, and not far into what has none.
+const REACH_HIDDEN: f64 = 3.0;
 
 /// Polygons with less of a triangle than this are rounding errors.
 const MIN_SHARE: f64 = 1e-12;
@@ -90,25 +96,30 @@ impl Cells {
     /// The cells of `places` on `topology`. Where a surface is too fine or too rough for windows,
     /// areas are within 2 % if its triangles are about as long as wide; on fans of long triangles single ones are off by 17 %.
     pub(crate) fn new(topology: &Topology, places: &[SurfacePlace]) -> Self {
-        Self::made(topology, places, MARCHED_PER_POINT, None)
+        Self::made(topology, places, (MARCHED_PER_POINT, None), None)
+    }
+
+    /// The same, where only triangles for which `is_skin` is true count for areas and pieces. Paths lead over all within [`REACH_HIDDEN`].
+    pub(crate) fn of_skin(topology: &Topology, places: &[SurfacePlace], is_skin: &dyn Fn(u32) -> bool) -> Self {
+        Self::made(topology, places, (MARCHED_PER_POINT, Some(is_skin)), None)
     }
 
     /// The same with [`Self::surface`], of what is within [`REACH`] of a point: bare surface around a skin is in no cell.
     pub(crate) fn with_surface(topology: &Topology, places: &[SurfacePlace]) -> Self {
-        Self::made(topology, places, MARCHED_PER_POINT, Some(Parts::default()))
+        Self::made(topology, places, (MARCHED_PER_POINT, None), Some(Parts::default()))
     }
 
     /// The same by windows alone, which are exact.
     #[cfg(test)]
     fn in_windows(topology: &Topology, places: &[SurfacePlace]) -> Self {
-        Self::made(topology, places, usize::MAX, None)
+        Self::made(topology, places, (usize::MAX, None), None)
     }
 
-    /// Parts with more than `marched_per_point` triangles for each point are marched over.
+    /// Parts with more than `marched_per_point` triangles for each point are marched over; areas are of triangles that are skin.
     fn made(
         topology: &Topology,
         places: &[SurfacePlace],
-        marched_per_point: usize,
+        (marched_per_point, skin): (usize, Option<&dyn Fn(u32) -> bool>),
         mut parts_of_cells: Option<Parts>,
     ) -> Self {
         let positions: Vec<DVec3> = places.iter().map(|place| place.position(topology)).collect();
@@ -119,7 +130,12 @@ impl Cells {
         let is_fine = fine_parts(topology, starts.iter().map(|&start| places[start].triangle), marched_per_point);
         let is_fine = |triangle: u32| is_fine[topology.part[triangle as usize] as usize];
         let spacing = Spacing::of(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
-        let reach_m = if parts_of_cells.is_some() { REACH * spacing.largest_m() } else { f64::INFINITY };
+        let reach_m = match (&parts_of_cells, skin) {
+            (Some(_), _) => REACH * spacing.largest_m(),
+            (None, Some(_)) => REACH_HIDDEN * spacing.largest_m(),
+            (None, None) => f64::INFINITY,
+        };
+        let is_skin = |triangle: u32| skin.is_none_or(|is_skin| is_skin(triangle));
         let most = CUTS_PER_TRIANGLE * topology.triangles.len() + CUTS_PER_POINT * starts.len();
         let [per_triangle, per_point] =
             if parts_of_cells.is_some() { AT_START } else { [WINDOWS_PER_TRIANGLE, WINDOWS_PER_POINT] };
@@ -130,7 +146,13 @@ impl Cells {
         match refined {
             None => {
                 let starts = starts.iter().map(|&start| (start, places[start])).collect();
-                cells.divide(topology, (starts, reach_m), is_fine, most_windows(topology), parts_of_cells.as_mut());
+                cells.divide(
+                    topology,
+                    (starts, reach_m),
+                    (is_fine, is_skin),
+                    most_windows(topology),
+                    parts_of_cells.as_mut(),
+                );
                 cells.surface =
                     parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(topology, |triangle| triangle, topology));
             }
@@ -149,8 +171,8 @@ impl Cells {
                 };
                 let parent = |part: u32| refined.parent[cut.given[part as usize] as usize];
                 let starts = starts.iter().filter_map(|&start| within(start)).collect();
-                let is_fine = |part| is_fine(parent(part));
-                cells.divide(&cut, (starts, reach_m), is_fine, most_windows(&cut), parts_of_cells.as_mut());
+                let of_part = (|part| is_fine(parent(part)), |part| is_skin(parent(part)));
+                cells.divide(&cut, (starts, reach_m), of_part, most_windows(&cut), parts_of_cells.as_mut());
                 cells.surface = parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(&cut, parent, topology));
             }
         }
@@ -167,12 +189,12 @@ impl Cells {
     }
 
     /// Divides what of `topology` is within `reach_m` of `starts`: points, each with its place. Parts whose triangles are fine are marched
-    /// over, and so is all where windows are more than `most_windows`.
+    /// over, and so is all where windows are more than `most_windows`. Areas are of triangles that are skin.
     fn divide(
         &mut self,
         topology: &Topology,
         (starts, reach_m): (Vec<(usize, SurfacePlace)>, f64),
-        is_fine: impl Fn(u32) -> bool,
+        (is_fine, is_skin): (impl Fn(u32) -> bool, impl Fn(u32) -> bool),
         most_windows: usize,
         mut parts: Option<&mut Parts>,
     ) {
@@ -216,7 +238,9 @@ impl Cells {
         for triangle in 0..topology.triangles.len() as u32 {
             let part = topology.part[triangle as usize] as usize;
             if !is_reached[part] {
-                self.pieces.push(Piece::of(topology.corners(triangle)));
+                if is_skin(triangle) {
+                    self.pieces.push(Piece::of(topology.corners(triangle)));
+                }
                 continue;
             }
             from += within[from..].iter().take_while(|(other, _)| *other < triangle).count();
@@ -229,10 +253,12 @@ impl Cells {
                 reaching(&waves, triangle, &mut candidates);
             }
             let corners = topology.corners(triangle);
-            let area = area_vector(corners).length() / 2.0;
+            let area = if is_skin(triangle) { area_vector(corners).length() / 2.0 } else { 0.0 };
             if candidates.is_empty() {
                 // Rounding hides it, as between needles.
-                self.pieces.push(Piece::of(corners));
+                if is_skin(triangle) {
+                    self.pieces.push(Piece::of(corners));
+                }
                 continue;
             }
             if let [candidate] = candidates[..] {

@@ -27,7 +27,7 @@ fn sheet(columns: u32, rows: u32, shape: impl Fn(DVec2) -> DVec3) -> Topology {
 }
 
 /// A sphere of radius 1 with 8·4ⁿ triangles.
-fn sphere(cuts: u32) -> Topology {
+pub(super) fn sphere(cuts: u32) -> Topology {
     let mut soup: Vec<[DVec3; 3]> = (0..8_u32)
         .map(|octant| {
             let sign = |axis: u32| if octant >> axis & 1 == 0 { 1.0 } else { -1.0 };
@@ -46,7 +46,7 @@ fn sphere(cuts: u32) -> Topology {
     Topology::new(&soup.concat(), &triangles)
 }
 
-fn places(topology: &Topology, points: &[DVec3]) -> Vec<SurfacePlace> {
+pub(super) fn places(topology: &Topology, points: &[DVec3]) -> Vec<SurfacePlace> {
     let index = SurfaceIndex::of_triangles((0..topology.triangles.len() as u32).map(|t| topology.corners(t)));
     let place = |&p: &DVec3| {
         let hit = index.nearest(p).unwrap();

@@ -10,6 +10,7 @@ mod log_map;
 mod place;
 mod queue;
 mod source;
+mod walk;
 mod waves;
 
 pub(crate) use log_map::{FIRST_LIMIT, MAX_WINDOWS};
@@ -17,6 +18,7 @@ pub use log_map::{LogMap, Reached, Rival};
 pub use place::SurfacePlace;
 pub(crate) use place::barycentric;
 pub(in crate::field) use source::Start;
+pub(crate) use walk::{walk, walk_to_edge};
 pub(in crate::field) use waves::Waves;
 
 #[cfg(test)]

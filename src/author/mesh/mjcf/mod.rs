@@ -142,7 +142,7 @@ fn place(places: &mut Places<'_>, sensor: &MjSensor, first_id: u32, skin: &mut S
         links,
         least_spacing_m: None,
         mean_spacing_m: None,
-        moved_m: Vec::new(),
+        ..PlaceReport::default()
     });
     Ok(count)
 }
