@@ -191,7 +191,8 @@ fn points_at_one_place_share_its_cell_and_parts_without_points_are_left() {
         CellPoint { triangle: topology.given[triangle as usize] as usize, ..point(x, y) }
     };
     // Two of the three are at one place; the sheet behind has none, and is given to the nearest.
-    let areas = Divided::with_areas(&positions, &triangles, &|_| 0, &[on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)]).0;
+    let points = [on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)];
+    let areas = Divided::with_areas(&positions, &triangles, &|_| 0, None, &points).0;
     assert!((areas.iter().sum::<f64>() - 2.0).abs() < 1e-9, "{areas:?}");
     assert!((areas[1] - 0.46).abs() < 0.05 && areas[1] == areas[2], "{areas:?}");
     let cells =
@@ -314,7 +315,7 @@ fn all_is_marched_over_where_windows_are_too_many() {
     for most_windows in [0, 100, usize::MAX] {
         let mut cells = Cells::empty((0..25).collect());
         let starts = places(&topology, &points).into_iter().enumerate().collect();
-        cells.divide(&topology, (starts, f64::INFINITY), |_| false, most_windows, None);
+        cells.divide(&topology, (starts, f64::INFINITY), (|_| false, |_| true), most_windows, None);
         assert!((cells.areas.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{most_windows}");
         assert_near(&cells.areas, &[0.04; 25], 0.02);
         // Across corners single ones may be of no length to speak of.
