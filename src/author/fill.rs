@@ -14,6 +14,7 @@ use super::points::{Snapped, of_icub, of_marks, of_table, snap};
 use super::recipe::{PlaceSpec, Placement, shown};
 use super::relax::{MOST_POINTS, Weight, relax};
 use super::rest_surface::RestSurface;
+use super::scatter::most_apart;
 use super::shares::{left_out, scatter, shares};
 use crate::body::{Topology, listed};
 use crate::error::{Error, Result, failed};
@@ -139,11 +140,10 @@ impl Fill<'_> {
         let topology = Topology::of_groups(positions, &triangles, &group_of);
         let surface = Surface { positions, triangles, chosen, topology };
         let area_m2: f64 = chosen.iter().map(|&triangle| self.rest_surface.area(triangle)).sum();
-        let most = |spacing_m: f64| (area_m2 * 2.0 / (3.0_f64.sqrt() * spacing_m * spacing_m)) as usize;
         let count = match &self.place.how {
             Placement::Apart { spacing_m } => {
                 check_fits(self.rest_surface, chosen, "spacing", *spacing_m)?;
-                most(*spacing_m)
+                most_apart(area_m2, *spacing_m)? as usize
             }
             Placement::Evenly { count, .. } | Placement::Density { count, .. } => *count,
             _ => 0,
@@ -190,7 +190,9 @@ impl Fill<'_> {
         filled: &mut Filled,
     ) {
         let Surface { positions, triangles, chosen, .. } = surface;
-        let is_skin = ground.skin(positions, triangles);
+        let mut is_skin = ground.skin(positions, triangles);
+        // Where a taxel is, something can touch the surface, if little of the triangle.
+        placed.iter().for_each(|one| is_skin[one.triangle] = true);
         let is_surface = match density {
             Some(density) => skin_by_density(positions, triangles, density),
             None => vec![true; triangles.len()],

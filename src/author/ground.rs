@@ -18,6 +18,7 @@ const PER_TAXEL: usize = 16;
 const MIN_SAMPLES: usize = 4_000;
 const MAX_SAMPLES: usize = 24_000;
 const LEAST_PER_TAXEL: usize = 2;
+const MOST_SAMPLES: usize = 400_000;
 
 /// Where less than this share of a surface is open, rays start inside it: its faces look inward.
 const MIN_OPEN_SHARE: f64 = 0.005;
@@ -109,7 +110,7 @@ impl<'a> Ground<'a> {
         progress: Progress<'_>,
     ) -> Result<Self> {
         let pieces = Pieces::whole(positions, triangles)?;
-        let many = (PER_TAXEL * count).clamp(MIN_SAMPLES, MAX_SAMPLES).max(LEAST_PER_TAXEL * count);
+        let many = (PER_TAXEL * count).clamp(MIN_SAMPLES, MAX_SAMPLES).max((LEAST_PER_TAXEL * count).min(MOST_SAMPLES));
         let samples = if rules.are_any() { pieces.scatter(many, SEED) } else { Vec::new() };
         let mut states = rules.states(&samples, progress)?;
         let hidden = states.iter().filter(|state| **state == State::Hidden).count();

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side, report_progress};
 use super::sample_neighbours::{SampleNeighbours, eliminate_crowded, pack};
-use super::scatter::Pieces;
+use super::scatter::{MAX_POINTS, Pieces, most_apart};
 use crate::body::point_tree;
 use crate::error::{Error, Result, failed};
 use crate::field::{CellPoint, Divided};
@@ -17,8 +17,6 @@ const OVERSAMPLING: usize = 5;
 
 /// Samples per disk of the densest packing, for a given spacing.
 const PACKED_OVERSAMPLING: f64 = 9.0;
-
-const MAX_POINTS: f64 = 4e6;
 
 /// The radius, m, of `count` disks in the densest packing of a plane of `area` (m²). No placement of `count` points has a
 /// smallest spacing over twice this.
@@ -155,17 +153,8 @@ pub(super) fn apart(
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<Vec<Placed>> {
-    if !(spacing_m.is_finite() && spacing_m > 0.0) {
-        return Err(failed!("taxels cannot lie {spacing_m} m apart; give a spacing over 0"));
-    }
     let pieces = Pieces::whole(positions, triangles)?;
-    let most = pieces.weight() * 2.0 / (3.0_f64.sqrt() * spacing_m * spacing_m);
-    if most > MAX_POINTS {
-        return Err(failed!(
-            "about {most:.1e} taxels {spacing_m} m apart would fit, over the {MAX_POINTS:.0e} that can be placed; is the \
-             spacing in metres?"
-        ));
-    }
+    let most = most_apart(pieces.weight(), spacing_m)?;
     let samples = pieces.scatter((most * PACKED_OVERSAMPLING).ceil() as usize + 1, seed);
     let reaches = vec![spacing_m; samples.len()];
     let crowd = SampleNeighbours::new(&samples, &reaches, |_, _| ());

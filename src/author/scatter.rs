@@ -7,6 +7,9 @@ use super::random::Random;
 use crate::body::area_vector;
 use crate::error::{Error, Result, failed};
 
+/// The most points that are placed at a time.
+pub(super) const MAX_POINTS: f64 = 4e6;
+
 /// Maximum number of subdivisions of a triangle.
 const MAX_CUTS: u32 = 12;
 
@@ -171,4 +174,19 @@ fn quarters([a, b, c]: [[f64; 3]; 3]) -> [[[f64; 3]; 3]; 4] {
     let middle = |p: [f64; 3], q: [f64; 3]| std::array::from_fn(|k| (p[k] + q[k]) / 2.0);
     let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
     [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+}
+
+/// How many points fit `spacing_m` apart on `area_m2`, if that can be placed.
+pub(super) fn most_apart(area_m2: f64, spacing_m: f64) -> Result<f64> {
+    if !(spacing_m.is_finite() && spacing_m > 0.0) {
+        return Err(failed!("taxels cannot lie {spacing_m} m apart; give a spacing over 0"));
+    }
+    let most = area_m2 * 2.0 / (3.0_f64.sqrt() * spacing_m * spacing_m);
+    if most > MAX_POINTS {
+        return Err(failed!(
+            "about {most:.1e} taxels {spacing_m} m apart would fit, over the {MAX_POINTS:.0e} that can be placed; is the \
+             spacing in metres?"
+        ));
+    }
+    Ok(most)
 }

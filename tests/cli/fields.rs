@@ -72,10 +72,9 @@ fn a_wrong_rule_is_named_with_its_line() {
     assert!(why.contains("recipe.toml: line 3") && why.contains("`plam`"), "{why}");
     let why = refused("hand", &format!("{place}[[fields]]\nname = \"a\"\npatchs = 3\n"));
     assert!(why.contains("line 5") && why.contains("did you mean `patches`?"), "{why}");
-    let text = format!(
-        "{place}[[fields]]\nname = \"a\"\n[[fields]]\nname = \"arm\"\nlink = \"left_forearm\"\nchart = \"plane\"\n"
-    );
-    let why = refused("humanoid", &text);
+    let text = "[[place]]\ntaxels = 500\n[[fields]]\nname = \"a\"\n[[fields]]\nname = \"arm\"\nlink = \"left_forearm\"\n\
+                chart = \"plane\"\n";
+    let why = refused("humanoid", text);
     assert!(why.contains("line 5") && why.contains("field `arm`") && why.contains("wrap = \"split\""), "{why}");
 }
 

@@ -31,7 +31,8 @@ fn json_has_the_keys_that_others_lean_on() {
         assert!((square("mean_normal") - 1.0).abs() < 1e-9, "{taxel}");
         assert_eq!((taxel["position"].as_array().unwrap().len(), &taxel["modality"]), (3, &json!("pressure")));
     }
-    let others = ["findings", "lint", "near_at_rest", "coverage", "edges", "islands", "without_edge", "few_edges"];
+    let others =
+        ["findings", "lint", "near_at_rest", "coverage", "cells", "edges", "islands", "without_edge", "few_edges"];
     assert_eq!(keys(&body)[3..], others);
     let [small] = &body["lint"].as_array().unwrap()[..] else { panic!("{}", body["lint"]) };
     assert_eq!(keys(small), ["kind", "taxels", "fields", "worst", "unit", "place", "links", "what"]);

@@ -536,6 +536,7 @@ const NO_FILES: &[&str] = &[
     "WIPERS",
     "WHICH",
     "X",
+    "WORD",
 ];
 
 /// What a help text has on flags and arguments with values: the flag, or the argument as it stands there, and the value's

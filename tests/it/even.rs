@@ -65,7 +65,8 @@ fn cells_are_alike_and_links_get_what_their_surface_is_worth() {
     assert_eq!(place.ids, Vec::from_iter(0..500));
     assert_eq!((place.links["large"], place.links["small"]), (400, 100));
     let [low, high] = place.cell_spread.unwrap();
-    assert!(low > 0.85 && high < 1.15, "{low} {high}");
+    // Those at creases too: away from these they are alike to within a tenth or so.
+    assert!(low > 0.8 && high < 1.2, "{low} {high}");
     let note = authored.notes.iter().find(|note| note.contains("`crumb`")).unwrap();
     assert!(note.contains("1 piece") && note.contains("1 of `crumb` (1.5 cm²)"), "{note}");
     let scattered = made(&two, "even = false\n[[place]]\ntaxels = 500");
@@ -96,7 +97,8 @@ fn what_nothing_can_touch_gets_no_taxel_and_is_named() {
     let open = body(&[("outer", block(cube(0.2), 6, true)), ("inner", block(cube(0.1), 6, false))]);
     let reached = made(&open, "[[place]]\ntaxels = 200");
     assert!(reached.places[0].links["inner"] > 8, "{:?}", reached.places[0].links);
-    let below = |position: DVec3| position.y < -0.049;
+    // Its sides are reached down to their ends.
+    let below = |position: DVec3| position.y < -0.05 + 1e-6;
     let inner = reached.body.link_index("inner").unwrap();
     let taxels = reached.body.taxels.iter().filter(|taxel| taxel.link == inner);
     assert!(!taxels.into_iter().any(|taxel| below(taxel.position_in_link)));

@@ -75,9 +75,12 @@ def dip(skin, frame, a, b):
         quarters = length / (0.25 * d)
         for count in {max(5, int(quarters * share) + 1) for share in (1 - CLOSE, 1 + CLOSE)}:
             steps = np.linspace(0, length, count)
-            weights = np.exp(-0.5 * ((along[beside][None] - steps[:, None]) / (0.5 * d)) ** 2)
-            means = weights @ frame.pressures[nodes[beside]] / weights.sum(axis=1)
-            yield means.min(), min(means[0], means[-1])
+            away = np.abs(along[beside][None] - steps[:, None])
+            weights = np.where(away <= 3 * d, np.exp(-0.5 * (away / (0.5 * d)) ** 2), 0)
+            # Places without a taxel as near as that say nothing.
+            known = weights.sum(axis=1) > 0
+            means = weights[known] @ frame.pressures[nodes[beside]] / weights[known].sum(axis=1)
+            yield (means.min(), min(means[0], means[-1])) if known[0] and known[-1] else (np.inf, 0.0)
 
 
 def are_two(skin, frame, sigma, a, b, saddle, were_two):
@@ -128,10 +131,11 @@ def regions(skin, frame, sigma, were_two):
             keeps.doubts |= goes.doubts | doubts
             for member in goes.members:
                 home[member] = keeps
-            pairs = [(keeps if a is goes else a, keeps if b is goes else b, d) for a, b, d in pairs]
+            # A region is known by its peak: what was found of a peak that is gone is found anew of the one that stays.
+            pairs = [(a, b, d) for a, b, d in pairs if a is not goes and b is not goes]
             own = keeps
     found = list({id(region): region for region in home.values()}.values())
-    return found, [(a, b, d) for a, b, d in pairs if a is not b]
+    return found, pairs
 
 
 # Quantities.

@@ -210,7 +210,9 @@ mod tests {
         let area = |of: &Topology| {
             (0..of.triangles.len() as u32).map(|t| area_vector(of.corners(t)).length() / 2.0).sum::<f64>()
         };
-        assert!((area(&coarse) - 5.0).abs() < 0.1, "{}", area(&coarse));
+        // Its eight edges may be cut off by the drift of a round, and lose 2 − √2 of that in area.
+        let most = 8.0 * (2.0 - 2.0_f64.sqrt()) * DRIFT * 0.2;
+        assert!((area(&coarse) - 5.0).abs() < most, "{}", area(&coarse));
         for edge in 0..3 * coarse.triangles.len() as u32 {
             let (a, b) = coarse.ends(edge);
             assert!(coarse.positions[a as usize].distance(coarse.positions[b as usize]) <= 0.4);

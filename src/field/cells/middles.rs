@@ -215,12 +215,19 @@ mod tests {
     /// The 5th and 95th percentile of cell areas over their median, of `count` points that are moved in `rounds`.
     fn spread(topology: &Topology, count: u32, rounds: usize) -> [f64; 2] {
         let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-        // Points that leave gaps: rings around the axis, uneven along it.
+        // As many everywhere, each moved by up to 0.4 of their distance along each axis, as scattered ones are.
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let apart = (4.0 * std::f64::consts::PI / f64::from(count)).sqrt();
         let seeds: Vec<DVec3> = (0..count)
             .map(|i| {
-                let z = 1.0 - 2.0 * ((f64::from(i) + 0.5) / f64::from(count)).powf(1.4);
+                let z = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(count);
                 let (sin, cos) = libm::sincos(golden * f64::from(i));
-                DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+                let even = DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
+                (even + 0.8 * apart * DVec3::new(random(), random(), random())).normalize()
             })
             .collect();
         let seated = places(topology, &seeds);
