@@ -191,11 +191,19 @@ fn points_at_one_place_share_its_cell_and_parts_without_points_are_left() {
         CellPoint { triangle: topology.given[triangle as usize] as usize, ..point(x, y) }
     };
     // Two of the three are at one place; the sheet behind has none, and is given to the nearest.
-    let areas = Divided::with_areas(&positions, &triangles, &|_| 0, &[on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)]).0;
+    let points = [on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)];
+    let areas = Divided::with_areas(&positions, &triangles, &|_| 0, None, &points).0;
     assert!((areas.iter().sum::<f64>() - 2.0).abs() < 1e-9, "{areas:?}");
     assert!((areas[1] - 0.46).abs() < 0.05 && areas[1] == areas[2], "{areas:?}");
-    let cells =
-        Cells::new(&topology, &places(&topology, &[on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)].map(|p| p.position)));
+    // What is no skin has no area, and no border where cells meet on it.
+    let is_skin = |triangle: usize| triangles[triangle].iter().any(|&v| positions[v as usize].x < 0.45);
+    let (areas, divided) = Divided::with_areas(&positions, &triangles, &|_| 0, Some(&is_skin), &points);
+    let skin = (0..triangles.len()).filter(|&triangle| is_skin(triangle));
+    let skin = skin.map(|triangle| area_vector(triangles[triangle].map(|v| positions[v as usize])).length() / 2.0);
+    assert!((areas.iter().sum::<f64>() - skin.sum::<f64>()).abs() < 1e-9, "{areas:?}");
+    assert!(areas[0] > 0.4 && areas[1] < 0.3, "{areas:?}");
+    assert!(divided.is_some());
+    let cells = Cells::new(&topology, &places(&topology, &points.map(|p| p.position)));
     assert_eq!(cells.first, [0, 1, 1]);
     assert!((cells.areas[1] - 0.5).abs() < 1e-6 && (cells.areas[0] - 0.5).abs() < 1e-6, "{:?}", cells.areas);
     let left: f64 = cells.pieces.iter().map(|piece| piece.area).sum();
@@ -314,7 +322,7 @@ fn all_is_marched_over_where_windows_are_too_many() {
     for most_windows in [0, 100, usize::MAX] {
         let mut cells = Cells::empty((0..25).collect());
         let starts = places(&topology, &points).into_iter().enumerate().collect();
-        cells.divide(&topology, (starts, f64::INFINITY), |_| false, most_windows, None);
+        cells.divide(&topology, (starts, f64::INFINITY), (|_| false, |_| true), most_windows, None);
         assert!((cells.areas.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{most_windows}");
         assert_near(&cells.areas, &[0.04; 25], 0.02);
         // Across corners single ones may be of no length to speak of.
