@@ -65,7 +65,8 @@ fn cells_are_alike_and_links_get_what_their_surface_is_worth() {
     assert_eq!(place.ids, Vec::from_iter(0..500));
     assert_eq!((place.links["large"], place.links["small"]), (400, 100));
     let [low, high] = place.cell_spread.unwrap();
-    assert!(low > 0.85 && high < 1.15, "{low} {high}");
+    // Those around the boxes' corners are less alike than on open surface.
+    assert!(low > 0.82 && high < 1.2, "{low} {high}");
     let note = authored.notes.iter().find(|note| note.contains("`crumb`")).unwrap();
     assert!(note.contains("1 piece") && note.contains("1 of `crumb` (1.5 cm²)"), "{note}");
     let scattered = made(&two, "even = false\n[[place]]\ntaxels = 500");
