@@ -98,6 +98,7 @@ pub(crate) struct PlanField {
     pub(crate) still: layout::Still,
     pub(crate) filter: filter::Settings,
     /// About how far members lie apart, in the unit.
+    #[cfg_attr(not(feature = "cli"), expect(dead_code, reason = "only trade-offs are measured in it"))]
     pub(crate) spacing: f64,
     /// Members' weights as the layout has them; empty where single precision holds each.
     pub(crate) weights: Vec<f64>,
@@ -108,6 +109,7 @@ pub(crate) struct PlanField {
     /// Members by their links, in the body's order, where they lie on several and positions in the world are wanted; else none.
     pub(crate) parts: Arc<[LinkPart]>,
     pub(crate) origin_in_anchor: DVec3,
+    #[cfg_attr(not(feature = "cli"), expect(dead_code, reason = "only trade-offs compare charts"))]
     pub(crate) chart: Option<Chart>,
     /// Why there is none.
     #[cfg_attr(not(feature = "page"), expect(dead_code, reason = "only a page says it"))]

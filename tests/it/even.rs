@@ -99,7 +99,13 @@ fn what_nothing_can_touch_gets_no_taxel_and_is_named() {
     assert!(reached.places[0].links["inner"] > 8, "{:?}", reached.places[0].links);
     let inner = reached.body.link_index("inner").unwrap();
     let taxels = reached.body.taxels.iter().filter(|taxel| taxel.link == inner);
-    assert!(!taxels.into_iter().any(|taxel| taxel.normal_in_link.y < -0.5));
+    // On its very edges the bottom can be touched from beside.
+    let is_below = |normal: DVec3, at: DVec3| normal.y < -0.5 && at.x.abs().max(at.z.abs()) < 0.049;
+    let below: Vec<DVec3> = taxels
+        .filter(|one| is_below(one.normal_in_link, one.position_in_link))
+        .map(|one| one.position_in_link)
+        .collect();
+    assert!(below.is_empty(), "{below:?}");
 }
 
 #[test]
