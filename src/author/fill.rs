@@ -71,7 +71,7 @@ impl Fill<'_> {
                 self.lay(&lattice, region, notes, progress)?
             }
             Placement::Marks { names, within_m } => {
-                snap(self.rest_surface, &region, &of_marks(self.rest_surface, names)?, *within_m)?
+                snap(self.rest_surface, region, &of_marks(self.rest_surface, names)?, *within_m)?
             }
             Placement::Icub { path, link, within_m } => {
                 let (given, more) =

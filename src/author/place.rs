@@ -59,12 +59,15 @@ pub(super) fn evenly(
     eliminate(&samples, &reaches, count, progress)
 }
 
+/// Leaves those points that may get taxels.
+pub(super) type Keep<'a> = dyn Fn(Vec<Placed>) -> Result<Vec<Placed>> + 'a;
+
 /// As [`evenly`], but no two neighbours closer than `spacing_m`, and only those that `keep` leaves; else the number that fit.
 pub(super) fn evenly_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     count: usize,
-    (spacing_m, keep): (f64, &dyn Fn(Vec<Placed>) -> Result<Vec<Placed>>),
+    (spacing_m, keep): (f64, &Keep<'_>),
     seed: u64,
     progress: Progress<'_>,
 ) -> Result<std::result::Result<Vec<Placed>, usize>> {

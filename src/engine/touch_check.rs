@@ -217,9 +217,6 @@ impl Beside<'_> {
     }
 
     fn of(&mut self, name: &str) -> &mut Comparison {
-        if !self.quantities.contains_key(name) {
-            self.quantities.insert(name.to_owned(), Comparison::default());
-        }
         self.quantities.entry(name.to_owned()).or_default()
     }
 
@@ -255,7 +252,7 @@ impl Beside<'_> {
         match (found, right) {
             (None, None) => {}
             (Some(found), Some(right)) => {
-                self.off(name, (found - right).abs(), bound, || format!("{found:?}, not {right:?}"))
+                self.off(name, (found - right).abs(), bound, || format!("{found:?}, not {right:?}"));
             }
             _ if bound.is_none() => self.too_close(name),
             _ => self.fails(name, format!("{name} is {found:?}, not {right:?}")),

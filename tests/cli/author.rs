@@ -65,6 +65,26 @@ fn a_mesh_gets_a_skin_that_is_inspected_and_run() {
 }
 
 #[test]
+fn flags_say_how_even_taxels_are_and_where() {
+    let spread = |more: &[&str]| -> [f64; 2] {
+        let (_folder, path, text) = skin(&[&["--taxels", "200", "--json"], more].concat());
+        let made: Value = serde_json::from_str(&text).unwrap();
+        let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+        let cells = |of: &Value| ["p5", "p95"].map(|key| of["cells"][key].as_f64().unwrap());
+        let (made, told) = (cells(&made["places"][0]), cells(&told));
+        // Areas are stored in single precision.
+        assert!((0..2).all(|end| (made[end] - told[end]).abs() < 1e-6), "{made:?} {told:?}");
+        told
+    };
+    let (even, scattered) = (spread(&[]), spread(&["--even", "off", "--hidden", "keep"]));
+    assert!(even[0] > 0.85 && even[1] < 1.15, "{even:?}");
+    assert!(scattered[0] < 0.85 && scattered[1] > 1.2, "{scattered:?}");
+    let out = ["author", "humanoid", "--taxels", "9", "-o", "/no/such/folder/out.glb"];
+    assert!(fails(2, &[&out[..], &["--clear", "wide"]].concat()).contains("--clear"));
+    assert!(fails(2, &[&out[..], &["--even", "maybe"]].concat()).contains("--even"));
+}
+
+#[test]
 fn a_sheet_needs_no_mesh() {
     let (folder, mask) = file("mask.csv", "0,1\n1,1\n1,0\n");
     let path = folder.path().join("sole.glb");

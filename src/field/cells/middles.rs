@@ -54,12 +54,13 @@ impl Relaxation {
         let mut has_points = vec![false; topology.parts()];
         points.iter().for_each(|(triangle, _)| has_points[topology.part[*triangle as usize] as usize] = true);
         let all = topology.triangles.iter().zip(&topology.part);
-        let triangles = all.filter(|(_, part)| has_points[**part as usize]).map(|(corners, _)| *corners).collect();
-        let kept = as_they_are(&topology.positions, triangles);
+        let triangles: Vec<[u32; 3]> =
+            all.filter(|(_, part)| has_points[**part as usize]).map(|(corners, _)| *corners).collect();
+        let kept = as_they_are(&topology.positions, &triangles);
         let longest_m = LONGEST * spacing_m;
         let most = CUTS_PER_POINT * points.len() + CUTS_PER_TRIANGLE * kept.triangles.len();
         let cut = match refine(&kept, longest_m, |_| longest_m, most) {
-            Some(refined) => as_they_are(&refined.positions, refined.triangles),
+            Some(refined) => as_they_are(&refined.positions, &refined.triangles),
             None => kept,
         };
         let fit = match cut.triangles.len() > FINE_PER_POINT * points.len() {
@@ -175,8 +176,8 @@ impl Relaxation {
 }
 
 /// The topology of triangles whose vertices are welded already: those of different parts at one place stay apart.
-fn as_they_are(positions: &[DVec3], triangles: Vec<[u32; 3]>) -> Topology {
-    Topology::of_groups(positions, &triangles, &|vertex| vertex)
+fn as_they_are(positions: &[DVec3], triangles: &[[u32; 3]]) -> Topology {
+    Topology::of_groups(positions, triangles, &|vertex| vertex)
 }
 
 /// Per vertex the mean normal of the surface around it.
@@ -203,7 +204,7 @@ fn compact(positions: &[DVec3], triangles: &[[u32; 3]]) -> Topology {
             number[corner as usize]
         }));
     }
-    as_they_are(&kept, renamed)
+    as_they_are(&kept, &renamed)
 }
 
 #[cfg(test)]

@@ -99,7 +99,7 @@ impl Cells {
         Self::made(topology, places, (MARCHED_PER_POINT, None), None)
     }
 
-    /// The same, where only triangles for which `is_skin` is true count for areas and pieces. Paths lead over all within [`REACH_HIDDEN`].
+    /// The same, where only triangles for which `is_skin` is true count for areas, borders and pieces. Paths lead over all within [`REACH_HIDDEN`].
     pub(crate) fn of_skin(topology: &Topology, places: &[SurfacePlace], is_skin: &dyn Fn(u32) -> bool) -> Self {
         Self::made(topology, places, (MARCHED_PER_POINT, Some(is_skin)), None)
     }
@@ -266,13 +266,15 @@ impl Cells {
                 if let Some(parts) = parts.as_deref_mut() {
                     parts.add_whole(triangle, candidate.site);
                 }
-                (0..3).for_each(|side| owner[3 * triangle as usize + side] = candidate.site);
+                if is_skin(triangle) {
+                    (0..3).for_each(|side| owner[3 * triangle as usize + side] = candidate.site);
+                }
                 continue;
             }
             for own in &candidates {
                 nearest_part(own, &candidates, &mut polygon, &mut spare);
                 let share = share(&polygon);
-                if share > MIN_SHARE {
+                if share > MIN_SHARE && is_skin(triangle) {
                     self.areas[own.site as usize] += share * area;
                     if let Some(parts) = parts.as_deref_mut() {
                         parts.add_polygon(triangle, own.site, &polygon);

@@ -195,8 +195,15 @@ fn points_at_one_place_share_its_cell_and_parts_without_points_are_left() {
     let areas = Divided::with_areas(&positions, &triangles, &|_| 0, None, &points).0;
     assert!((areas.iter().sum::<f64>() - 2.0).abs() < 1e-9, "{areas:?}");
     assert!((areas[1] - 0.46).abs() < 0.05 && areas[1] == areas[2], "{areas:?}");
-    let cells =
-        Cells::new(&topology, &places(&topology, &[on(0.25, 0.5), on(0.75, 0.5), on(0.75, 0.5)].map(|p| p.position)));
+    // What is no skin has no area, and no border where cells meet on it.
+    let is_skin = |triangle: usize| triangles[triangle].iter().any(|&v| positions[v as usize].x < 0.45);
+    let (areas, divided) = Divided::with_areas(&positions, &triangles, &|_| 0, Some(&is_skin), &points);
+    let skin = (0..triangles.len()).filter(|&triangle| is_skin(triangle));
+    let skin = skin.map(|triangle| area_vector(triangles[triangle].map(|v| positions[v as usize])).length() / 2.0);
+    assert!((areas.iter().sum::<f64>() - skin.sum::<f64>()).abs() < 1e-9, "{areas:?}");
+    assert!(areas[0] > 0.4 && areas[1] < 0.3, "{areas:?}");
+    assert!(divided.is_some());
+    let cells = Cells::new(&topology, &places(&topology, &points.map(|p| p.position)));
     assert_eq!(cells.first, [0, 1, 1]);
     assert!((cells.areas[1] - 0.5).abs() < 1e-6 && (cells.areas[0] - 0.5).abs() < 1e-6, "{:?}", cells.areas);
     let left: f64 = cells.pieces.iter().map(|piece| piece.area).sum();
