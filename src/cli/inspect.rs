@@ -38,16 +38,16 @@ pub(super) struct Arguments {
     #[arg(long)]
     json: bool,
 
-    /// Exit with 1 where anything is odd.
+    /// Exit with 1 if anything is odd.
     #[arg(long)]
     strict: bool,
 
-    /// How near taxels of two links must be to be told as near at rest, in metres [default: by the taxels' spacing, as for
+    /// Report links whose taxels are closer than this at rest, in metres [default: by the taxels' spacing, as for
     /// self_contacts].
     #[arg(long, value_name = "M")]
     contact_tolerance: Option<f64>,
 
-    /// Joints of the robot: a URDF. Taxels that are covered at rest are then looked for in other poses, too. A body that was
+    /// Joints of the robot: a URDF. Taxels that are covered at rest are then looked at in other poses, too. A body that was
     /// made from a URDF keeps its joints and needs none.
     #[arg(long, value_name = "URDF")]
     joints: Option<PathBuf>,

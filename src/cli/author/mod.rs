@@ -23,7 +23,7 @@ use super::stdio::{DONE, print};
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic author hand.glb --taxels 500 --seed 1 -o skin.glb     500 taxels, evenly over all of it
+  somatic author hand.glb --taxels 500 --seed 1 -o skin.glb     500 taxels, evenly spread
   somatic author arm.glb --spacing 8mm --region 'forearm*' -o skin.glb
   somatic author arm.gltf --unit mm --recipe arm.toml -o skin.glb
   somatic author --grid 31x11 --pitch 8.6mm -o insole.glb       a flat sheet; it needs no mesh
@@ -82,17 +82,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// Whether taxels move until the surface around each is alike (on), or stay where they were scattered (off) [default: the
-    /// recipe's, or on].
+    /// Whether taxels given by number move until the surface around each is alike (on), or stay where they were scattered (off)
+    /// [default: the recipe's, or on].
     #[arg(long, value_name = "WORD")]
     even: Option<EvenWord>,
 
-    /// What becomes of surface that nothing can touch, inside the body or under another link in all poses: none of it gets a
-    /// taxel (drop), or as much as elsewhere (keep) [default: the recipe's, or drop].
+    /// What to do with surface that nothing can touch, inside the body or under another link in all poses: place no taxels on it
+    /// (drop), or as many as elsewhere (keep) [default: the recipe's, or drop].
     #[arg(long, value_name = "WORD")]
     hidden: Option<HiddenWord>,
 
-    /// How far taxels are from borders of links and seams at least, such as 5mm [default: the recipe's, or as it comes].
+    /// The least distance of taxels from where a link, a mesh or the surface ends, such as 5mm [default: the recipe's, or none].
     #[arg(long, value_name = "LENGTH")]
     clear: Option<String>,
 
