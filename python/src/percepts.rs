@@ -61,7 +61,8 @@ impl PyPercepts {
                     format!("`{name}` was not asked for; add it to the scene's outputs")
                 }
                 _ => {
-                    let names: Vec<String> = AskedOutputs::names().filter(|name| name.starts_with("touches.")).collect();
+                    let names: Vec<String> =
+                        AskedOutputs::names().filter(|name| name.starts_with("touches.")).collect();
                     match new_name(name, names.iter().map(String::as_str)) {
                         Some(new) => format!("`{name}` is `{new}` now; see `.touches`"),
                         None => unknown("output", name, outputs.columns().map(|column| column.name)),
