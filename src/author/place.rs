@@ -62,7 +62,7 @@ pub(super) fn evenly(
 /// Leaves those points that may get taxels.
 pub(super) type Keep<'a> = dyn Fn(Vec<Placed>) -> Result<Vec<Placed>> + 'a;
 
-/// As [`evenly`], but no two neighbours closer than `spacing_m`, and only those that `keep` leaves; else the number that fit.
+/// As [`evenly`], but no two neighbours closer than `spacing_m`, and only points that `keep` leaves; else the number that fit.
 pub(super) fn evenly_apart(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -211,8 +211,9 @@ fn with_cells(positions: &[DVec3], triangles: &[[u32; 3]], mut placed: Vec<Place
     placed
 }
 
-/// Gives each of `placed` the area of its cell on the triangles that are surface or hold a point, of those of them that are skin, if that is given;
-/// `group_of` a vertex is the surface that it belongs to. The cells, if there are any.
+/// Gives each of `placed` the area of its cell. Cells divide the triangles that are surface or hold a point; only those of them that
+/// are skin have an area, or all if that is not given. `group_of` a vertex is the surface that it belongs to. The cells, if there
+/// are any.
 pub(super) fn set_cell_areas(
     positions: &[DVec3],
     triangles: &[[u32; 3]],

@@ -25,9 +25,6 @@ const SCATTERED_SHARE: f64 = 0.8;
 /// Points are on the surface that they were given up to this share of their distance.
 const DEVIATION: f64 = 0.5;
 
-/// A point lands on a triangle whose normal is within 45° of that where it was, if there is one.
-const MIN_NORMAL_COSINE: f64 = 0.7;
-
 /// How much surface counts.
 pub(super) enum Weight<'a> {
     /// All of it the same.
@@ -114,8 +111,7 @@ fn on_surface(
     position: DVec3,
     normal: DVec3,
 ) -> Option<Placed> {
-    let fits = |other: DVec3| other.dot(normal) > MIN_NORMAL_COSINE;
-    let hit = index.nearest_where(position, fits).or_else(|| index.nearest(position))?;
+    let hit = index.nearest_facing(position, normal)?;
     Some(placed_at(hit.triangle, corners, hit.position))
 }
 

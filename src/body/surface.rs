@@ -201,6 +201,12 @@ impl SurfaceIndex {
         Some(Hit { position: triangle.geom().nearest(p), normal, triangle: number as usize })
     }
 
+    /// The surface point nearest to `p` of the triangles that face within about 45° of the unit `normal`, if there are any, else of all.
+    pub(crate) fn nearest_facing(&self, p: DVec3, normal: DVec3) -> Option<Hit> {
+        let faces = |other: DVec3| other.dot(normal) > 0.7;
+        self.nearest_where(p, faces).or_else(|| self.nearest(p))
+    }
+
     /// The triangles within `within_m` of `p`, in any order.
     pub(crate) fn within(&self, p: DVec3, within_m: f64) -> impl Iterator<Item = usize> + '_ {
         let near = self.tree.locate_within_distance(p.to_array(), within_m * within_m);

@@ -1,7 +1,8 @@
 //! Which points of a body's surface something can touch.
 //!
 //! A ray starts 0.1 mm outside a point in each of 256 directions. The point is open if five of them escape at rest, or in one of the
-//! poses of the body's joints: of points from which one escapes, up to 7 % are closed to 256 others; with five, 0.1 %.
+//! poses of the body's joints. Of points from which only one escapes, up to 7 % are closed to 256 other directions; of those with
+//! five, 0.1 %.
 
 use glam::DVec3;
 

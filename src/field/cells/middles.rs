@@ -24,9 +24,6 @@ const FINE_PER_POINT: usize = 30;
 const CUTS_PER_POINT: usize = 60;
 const CUTS_PER_TRIANGLE: usize = 4;
 
-/// A point's triangle has a normal that is no farther from its own than 45°, if there is one.
-const MIN_NORMAL_COSINE: f64 = 0.7;
-
 /// A surface on which points move to the middles of their cells.
 pub(crate) struct Relaxation {
     topology: Topology,
@@ -73,8 +70,7 @@ impl Relaxation {
         let index = SurfaceIndex::of_triangles((0..fit.triangles.len() as u32).map(|t| fit.corners(t)));
         let place = |&(triangle, position): &(u32, DVec3)| {
             let normal = area_vector(topology.corners(triangle)).normalize_or_zero();
-            let fits = |other: DVec3| other.dot(normal) > MIN_NORMAL_COSINE;
-            let hit = index.nearest_where(position, fits).or_else(|| index.nearest(position));
+            let hit = index.nearest_facing(position, normal);
             let (triangle, position) = hit.map_or((0, position), |hit| (hit.triangle as u32, hit.position));
             SurfacePlace::in_triangle(&fit, triangle, position).inward()
         };

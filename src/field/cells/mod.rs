@@ -99,7 +99,8 @@ impl Cells {
         Self::made(topology, places, (MARCHED_PER_POINT, None), None)
     }
 
-    /// The same, where only triangles for which `is_skin` is true count for areas, borders and pieces. Paths lead over all within [`REACH_HIDDEN`].
+    /// The same, where only triangles for which `is_skin` is true count for areas, borders and pieces. Paths lead over the others too, as
+    /// far as [`REACH_HIDDEN`].
     pub(crate) fn of_skin(topology: &Topology, places: &[SurfacePlace], is_skin: &dyn Fn(u32) -> bool) -> Self {
         Self::made(topology, places, (MARCHED_PER_POINT, Some(is_skin)), None)
     }
