@@ -101,6 +101,12 @@ impl<'a> RestSurface<'a> {
         self.skinning.push(skinning);
     }
 
+    /// The vertices of part `part` in the body at rest, m.
+    pub(super) fn vertices(&self, part: usize) -> &[DVec3] {
+        let from = self.first_vertex[part] as usize;
+        &self.positions[from..][..self.body.surfaces[part].positions.len()]
+    }
+
     /// The group of surfaces that `vertex` is in; only those of one group are connected where they touch.
     pub(super) fn group_of(&self, vertex: u32) -> u32 {
         let part = self.first_vertex.partition_point(|&first| first <= vertex) - 1;

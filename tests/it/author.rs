@@ -151,6 +151,9 @@ fn meshes_of_other_tools_are_covered_through_their_transforms() {
             note.contains("chart") || note.contains("split into") || of_surface
         };
         assert!(made.notes.iter().all(of_charts), "{part}: {:?}", made.notes);
+        // A tube that is bent at rest is open where the weights of its joints put it, not where its heaviest joints would.
+        let is_tube = part.ends_with("03_skinned_cylinder.gltf");
+        assert!(!is_tube || made.places[0].hidden_m2.is_empty(), "{:?}", made.places[0].hidden_m2);
         lies_on_its_surface(&made.body);
         // Everything it needs is inside.
         assert_eq!(Body::from_bytes(part, &made.file.to_glb().unwrap()).unwrap().taxels.len(), 800);

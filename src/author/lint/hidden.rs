@@ -82,7 +82,7 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn F
             &rest
         }
     };
-    let surface = PosedSurface::new(body, drawn);
+    let surface = PosedSurface::new(body, drawn, |_| None);
     if surface.is_empty() || body.taxels.is_empty() {
         return Hidden::default();
     }

@@ -39,16 +39,19 @@ pub(super) struct PosedSurface<'a> {
 }
 
 impl<'a> PosedSurface<'a> {
-    pub(super) fn new(body: &Body, poses: &'a DrawnPoses) -> Self {
+    /// Of `body` in `poses`, the first of which is rest. `at_rest` has the vertices of a surface in the body at rest, m, by the weights of
+    /// all their joints; where it has none, each follows its heaviest joint.
+    pub(super) fn new<'v>(body: &Body, poses: &'a DrawnPoses, at_rest: impl Fn(usize) -> Option<&'v [DVec3]>) -> Self {
         let poses = &poses.body_from_link[..];
         let mut rigid: Vec<Vec<[DVec3; 3]>> = vec![Vec::new(); body.links.len()];
         let mut parts = Vec::new();
-        for surface in &body.surfaces {
+        for (index, surface) in body.surfaces.iter().enumerate() {
             match &surface.home {
                 Home::Rigid { link, link_from_mesh } => rigid[*link].extend(surface.corners_through(*link_from_mesh)),
                 Home::Skinned { joints, .. } => {
                     let links = joints.iter().map(|(link, _)| *link).collect();
-                    let in_body = poses.iter().map(|pose| RayTree::new(skinned(surface, pose))).collect();
+                    let rest = at_rest(index).map(|vertices| (&poses[0][..], vertices));
+                    let in_body = poses.iter().map(|pose| RayTree::new(skinned(surface, pose, rest))).collect();
                     parts.push(Part::Skinned { links, in_body });
                 }
             }
@@ -133,15 +136,31 @@ impl<'a> PosedSurface<'a> {
     }
 }
 
-/// The triangles of a skinned mesh in the body; each corner follows its heaviest joint.
-fn skinned<'a>(surface: &'a Surface, pose: &[DAffine3]) -> impl Iterator<Item = [DVec3; 3]> + use<'a> {
+/// The triangles of a skinned mesh in the body; each corner follows its heaviest joint, from where it is at rest if `rest` says that: the
+/// pose at rest and the vertices in it.
+fn skinned<'a>(
+    surface: &'a Surface,
+    pose: &[DAffine3],
+    rest: Option<(&[DAffine3], &[DVec3])>,
+) -> impl Iterator<Item = [DVec3; 3]> + use<'a> {
     let mut points = surface.positions.clone();
     let mut is_mirrored = false;
     if let Home::Skinned { joints, heaviest } = &surface.home {
         let ways: Vec<DAffine3> = joints.iter().map(|(link, way)| pose[*link] * *way).collect();
         is_mirrored = ways.first().is_some_and(|way| way.matrix3.determinant() < 0.0);
-        for (point, joint) in points.iter_mut().zip(heaviest) {
-            *point = ways[*joint].transform_point3(*point);
+        match rest {
+            None => {
+                for (point, joint) in points.iter_mut().zip(heaviest) {
+                    *point = ways[*joint].transform_point3(*point);
+                }
+            }
+            Some((at_rest, vertices)) => {
+                let moved: Vec<DAffine3> =
+                    joints.iter().map(|(link, _)| pose[*link] * at_rest[*link].inverse()).collect();
+                for ((point, vertex), joint) in points.iter_mut().zip(vertices).zip(heaviest) {
+                    *point = moved[*joint].transform_point3(*vertex);
+                }
+            }
         }
     }
     surface.triangles.iter().map(move |&[a, b, c]| {

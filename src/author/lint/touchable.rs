@@ -36,9 +36,14 @@ pub(in crate::author) struct Touchable<'a> {
 }
 
 impl<'a> Touchable<'a> {
-    /// For `body` in `poses`, the first of which is rest.
-    pub(in crate::author) fn new(body: &'a Body, poses: &'a DrawnPoses) -> Self {
-        Self { body, surface: PosedSurface::new(body, poses), directions: directions() }
+    /// For `body` in `poses`, the first of which is rest; `at_rest` has the vertices of each of its surfaces in the body at rest, m.
+    pub(in crate::author) fn new<'v>(
+        body: &'a Body,
+        poses: &'a DrawnPoses,
+        at_rest: impl Fn(usize) -> &'v [DVec3],
+    ) -> Self {
+        let surface = PosedSurface::new(body, poses, |index| Some(at_rest(index)));
+        Self { body, surface, directions: directions() }
     }
 
     /// Per point whether it is open. `progress` gets the share that is done, and says whether to go on; `None` if it does not.
