@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -159,12 +160,13 @@ class Scene:
                 self.somatic("simulate", toml, "-o", table, "--force")
                 break
             except SystemExit as error:
-                why = str(error)
-                named = [k for k in range(len(part)) if f"touch `{k}`" in why or f"`{k}`" in why]
-                if not named:
+                # The error names a line of the touch that cannot be.
+                line = re.search(r"line (\d+)", str(error))
+                before = toml.read_text().splitlines()[: int(line[1])].count("[[touch]]") if line else 0
+                if before == 0:
                     raise
-                out.append(part[named[0]][0])
-                part = [entry for k, entry in enumerate(part) if k != named[0]]
+                out.append(part[before - 1][0])
+                part = part[: before - 1] + part[before:]
         stem.with_suffix(".left_out").write_text(json.dumps(out))
         return part
 
