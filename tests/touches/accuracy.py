@@ -1,19 +1,20 @@
 """Measures how true touches of the whole body are, by simulated presses on bodies and on flat sheets.
 
-    accuracy.py SOMATIC FOLDER --body BODY [--presses N] [--strokes N] [--pairs N] [--seed N] [--size X] [--seconds N]
+    accuracy.py SOMATIC FOLDER --body BODY [--presses N] [--strokes N] [--pairs N] [--seed N] [--size X] [--layer X] [--seconds N]
 
 BODY is a file, or hand, mat or humanoid. Prints a table and, last, a JSON object. What was simulated stays in FOLDER, and is used
 again. --seconds stops simulating after that time; what is done is measured.
 
 **Presses** are at random places of the skin: balls, fingertips, rods, and straps that wrap, of sizes for cells of (16.2 mm)²,
 times --size [default: the root of the body's mean cell, its spacing, by 16.2 mm]. The same indenters with the same forces press a flat sheet of taxels that are
-scattered alike, as many on a square metre. σ of the layer is half a spacing. Sensors feel the force on their cells; they have 10
+spread alike, as many on a square metre. σ of the layer is --layer spacings [default: 0.5]. Sensors feel the force on their cells; they have 10
 bits, noise of 1.5 % of the press's largest value, and are 0 up to six σ, as `simulate` has it. Touches of three taxels and more
 count. Errors of position are distances from the truth's place; those of axes angles to the truth's axis in its tangent plane, of touches
 with an anisotropy of at least 0.4 that are not wrapped. A touch is good if the RMS angle of its taxels' normals is under 35° and under 15 %
 of its taxels have fewer than five edges.
 
-**Strokes** are rods' and balls' of 20 to 80 mm; each should be one identity from onset to release.
+**Strokes** are rods' and balls' of 20 to 80 mm; each should be one identity from onset to release. Those that press in two places
+(without noise, a saddle under 0.7 of the lower peak) and those whose truth leaps by over a spacing from frame to frame are told apart.
 
 **Pairs** are two balls 1.5 to 4 contact widths apart, with gains that are lognormal with an SD of 5, 10 and 20 % and noise of 1 to 3 %.
 """
@@ -145,15 +146,22 @@ def strokes(scene, arguments):
         drawn.append(Press(kind, shape, [start, scene.at_taxel(int(rng.choice(ends)))], newton))
     scene.press(drawn, arguments.seconds, frames=12)
     found = scene.found(np.random.default_rng(arguments.seed + 3), noise=0.015, judge=judge)
-    one = Counter()
-    several = []
+    spacing = spacing_of(scene.skin)
+    one, several = Counter(), []
     for index in sorted({entry["index"] for entry in found}):
-        ids = Counter(i for entry in found if entry["index"] == index for i in entry["ids"])
-        one[len(ids) == 1] += 1
+        frames = [entry for entry in found if entry["index"] == index]
+        ids = Counter(i for entry in frames for i in entry["ids"])
+        # A rod over a hollow presses twice, and a path may leap to what is beside it.
+        is_two = any(entry.get("between", 1) < 0.7 for entry in frames)
+        leaps = any(np.linalg.norm(a["truth"] - b["truth"]) > spacing for a, b in zip(frames, frames[1:]))
+        what = "pressed in two places" if is_two else "leaping" if leaps else frames[0]["kind"]
+        one[what, len(ids) == 1] += 1
         if len(ids) > 1:
-            several.append({"stroke": index, "frames_of_ids": sorted(ids.values(), reverse=True)})
-    total = sum(one.values())
-    return {"strokes": total, "one_identity": one[True] / total if total else None, "several": several[:20]}
+            several.append({"stroke": index, "what": what, "frames_of_ids": sorted(ids.values(), reverse=True)})
+    share = lambda kinds: [sum(one[kind, True] for kind in kinds), sum(one[kind, is_one] for kind in kinds for is_one in (True, False))]
+    of = {kind: share([kind]) for kind in ("ball", "rod", "pressed in two places", "leaping")}
+    total = share(of)
+    return {"strokes": total[1], "one_identity": total[0] / total[1] if total[1] else None, "one_identity_of": of, "several": several[:20]}
 
 
 def pairs(scene, arguments):
@@ -172,10 +180,10 @@ def pairs(scene, arguments):
             found = scene.found(np.random.default_rng(arguments.seed + 5), noise, judge, spread)
             for one in found:
                 kind = one["kind"]
-                if kind == "pair" and not one["saddle"] < 0.7:
-                    kind = "pair, high saddle"
+                if kind == "pair":
+                    kind = next((f"pair, saddle under {most}" for most in (0.4, 0.55, 0.7) if one["saddle"] < most), "pair, higher saddle")
                 told[kind] += 1
-                right[kind] += one["touches"] == (2 if kind == "pair" else 1)
+                right[kind] += one["touches"] == (2 if "under" in kind else 1)
         results[f"gains {spread}"] = {kind: {"of": n, "as_many_as_wanted": right[kind] / n} for kind, n in told.items()}
     return results
 
@@ -190,6 +198,7 @@ def main():
     parser.add_argument("--pairs", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--size", type=float)
+    parser.add_argument("--layer", type=float, default=0.5)
     parser.add_argument("--seconds", type=float, default=1e9)
     arguments = parser.parse_args()
     somatic, folder = Program(arguments.somatic), arguments.folder
@@ -203,13 +212,13 @@ def main():
     began = time.time()
     result = {"body": body.stem, "size": size}
     if arguments.presses:
-        scene = Scene(somatic, folder / f"{body.stem}-presses", body, skin, size)
-        flat = sheet(somatic, folder, skin, size, arguments.seed)
+        scene = Scene(somatic, folder / f"{body.stem}-presses", body, skin, size, arguments.layer)
+        flat = sheet(somatic, folder, skin, size, arguments.seed, arguments.layer)
         result["presses"] = presses(scene, flat, arguments)
     if arguments.strokes:
-        result["strokes"] = strokes(Scene(somatic, folder / f"{body.stem}-strokes", body, skin, size), arguments)
+        result["strokes"] = strokes(Scene(somatic, folder / f"{body.stem}-strokes", body, skin, size, arguments.layer), arguments)
     if arguments.pairs:
-        result["pairs"] = pairs(Scene(somatic, folder / f"{body.stem}-pairs", body, skin, size), arguments)
+        result["pairs"] = pairs(Scene(somatic, folder / f"{body.stem}-pairs", body, skin, size, arguments.layer), arguments)
     result["seconds"] = time.time() - began
     print(json.dumps(result, indent=1, default=float))
 

@@ -83,8 +83,8 @@ def random_place(skin, rng, inner=None):
         return Place(at, normals[triangle], f'{{ link = "{skin.links[link]}", at = [{text}] }}')
 
 
-def sheet(somatic, folder, skin, size, seed):
-    """A flat sheet of taxels that are scattered alike, as many on a square metre as `skin` has."""
+def sheet(somatic, folder, skin, size, seed, layer=0.5):
+    """A flat sheet of taxels that are spread alike, as many on a square metre as `skin` has."""
     side, count = 0.42 * size, 24
     number = round(side * side / skin.cell.mean())
     path = folder / f"sheet-{side:.4f}-{number}.glb"
@@ -100,7 +100,7 @@ def sheet(somatic, folder, skin, size, seed):
         somatic("author", mesh, "--taxels", number, "--seed", seed, "-o", path)
     listed = path.with_suffix(".json")
     listed.write_text(somatic("inspect", path, "--json"))
-    found = Scene(somatic, folder / path.stem, path, Skin(path, listed), size)
+    found = Scene(somatic, folder / path.stem, path, Skin(path, listed), size, layer)
     found.inner = 0.3
     return found
 
@@ -108,8 +108,10 @@ def sheet(somatic, folder, skin, size, seed):
 class Scene:
     """Presses on a body, simulated without noise; each has `frames` frames, and then the skin is at rest."""
 
-    def __init__(self, somatic, folder, body, skin, size):
+    def __init__(self, somatic, folder, body, skin, size, layer=0.5):
         self.somatic, self.folder, self.body, self.skin, self.size = somatic, folder, body, skin, size
+        # σ of the layer in spacings.
+        self.layer = layer
         self.inner = None
         folder.mkdir(parents=True, exist_ok=True)
 
@@ -118,7 +120,7 @@ class Scene:
 
     def simulation(self, presses, frames):
         lasts = frames + 1
-        sigma = spacing_of(self.skin) / 2
+        sigma = spacing_of(self.skin) * self.layer
         text = f'body = "{self.body}"\nrate_hz = 25\nduration_s = {lasts * len(presses) / 25}\n'
         text += f'[layer]\nthickness_m = {sigma * 3**0.5:.9f}\nstiffness_pa = {STIFFNESS}\n[sensor]\nkind = "ideal"\n'
         for index, press in enumerate(presses):
@@ -160,13 +162,16 @@ class Scene:
                 self.somatic("simulate", toml, "-o", table, "--force")
                 break
             except SystemExit as error:
-                # The error names a line of the touch that cannot be.
-                line = re.search(r"line (\d+)", str(error))
-                before = toml.read_text().splitlines()[: int(line[1])].count("[[touch]]") if line else 0
-                if before == 0:
+                # It names a line of the touch that cannot be, or the touch.
+                line, name = re.search(r"line (\d+)", str(error)), re.search(r"touch `(\d+)`", str(error))
+                if line:
+                    bad = toml.read_text().splitlines()[: int(line[1])].count("[[touch]]") - 1
+                elif name:
+                    bad = int(name[1])
+                else:
                     raise
-                out.append(part[before - 1][0])
-                part = part[: before - 1] + part[before:]
+                out.append(part[bad][0])
+                part = part[:bad] + part[bad + 1 :]
         stem.with_suffix(".left_out").write_text(json.dumps(out))
         return part
 
@@ -205,7 +210,9 @@ class Scene:
                         continue
                     answer = judge(self.skin, truths[frame][0], touches) | {"index": index, "kind": press.kind, "frame": frame}
                     if press.kind == "pair":
-                        answer["saddle"] = self.saddle(felt[frame], order, truths[frame])
+                        answer["saddle"] = self.saddle_of_pair(felt[frame], order, truths[frame])
+                    if len(touches) > 1:
+                        answer["between"] = self.saddle_of_touches(felt[frame], order, touches)
                     answers.append(answer)
         return answers
 
@@ -220,11 +227,14 @@ class Scene:
                 })
         return found
 
-    def saddle(self, felt, order, truths):
-        """The highest pass between the two peaks without noise, as a share of the lower peak; 1 where they have one peak."""
-        skin = self.skin
-        pressures = np.zeros(len(skin.ids))
+    def by_node(self, felt, order):
+        pressures = np.zeros(len(self.skin.ids))
         pressures[order] = felt
+        return pressures
+
+    def saddle_of_pair(self, felt, order, truths):
+        """The highest pass between the peaks of two indenters without noise, as a share of the lower peak; 1 where they have one peak."""
+        skin, pressures = self.skin, self.by_node(felt, order)
         places = [skin.into_body(skin.links.index(t["link"]), np.array(t["place"]), True) for t in truths]
         if len(places) < 2:
             return 1.0
@@ -235,11 +245,21 @@ class Scene:
             if len(near) == 0:
                 return 1.0
             peaks.append(int(near[pressures[near].argmax()]))
+        return self.saddle(pressures, peaks)
+
+    def saddle_of_touches(self, felt, order, touches):
+        """The same between the peaks of the two largest touches that were found."""
+        pressures = self.by_node(felt, order)
+        largest = sorted(touches, key=lambda touch: -touch["total"])[:2]
+        nodes = [[self.skin.node_of[taxel] for taxel in touch["taxels"]] for touch in largest]
+        return self.saddle(pressures, [of[int(pressures[of].argmax())] for of in nodes])
+
+    def saddle(self, pressures, peaks):
         if peaks[0] == peaks[1]:
             return 1.0
         home = {}
         for node in sorted(np.flatnonzero(pressures > 0), key=lambda node: -pressures[node]):
-            joined = {id(home[o]): home[o] for o in skin.beside[node] if o in home}
+            joined = {id(home[o]): home[o] for o in self.skin.beside[node] if o in home}
             region = {int(node)}.union(*joined.values())
             for member in region:
                 home[member] = region

@@ -41,7 +41,7 @@ impl TouchOfBody {
     ) -> Result<Vec<Truth>> {
         let (touch, &Moment { frame, t_s, before_s, .. }) = (&self.touch, moment);
         let Some(force_newton) = touch.force(t_s) else { return Ok(Vec::new()) };
-        let off = |t_s: f64| Error::failed(leaves_skin(t_s));
+        let off = |t_s: f64| Error::failed(format!("touch `{}`: {}", touch.name, leaves_skin(t_s)));
         let contacts = touch.press(skin, t_s, force_newton, forces_newton).ok_or_else(|| off(t_s))?;
         let places = |contacts: &[Contact]| contacts.iter().map(|contact| contact.position).collect::<Vec<DVec3>>();
         let known = self.last.take().filter(|(number, _)| number + 1 == frame).map(|(_, places)| places);
