@@ -182,6 +182,8 @@ def pairs(scene, arguments):
                 kind = one["kind"]
                 if kind == "pair":
                     kind = next((f"pair, saddle under {most}" for most in (0.4, 0.55, 0.7) if one["saddle"] < most), "pair, higher saddle")
+                elif one.get("between", 1) < 0.7:
+                    kind += ", pressed in two places"
                 told[kind] += 1
                 right[kind] += one["touches"] == (2 if "under" in kind else 1)
         results[f"gains {spread}"] = {kind: {"of": n, "as_many_as_wanted": right[kind] / n} for kind, n in told.items()}
