@@ -27,6 +27,7 @@ pub mod group;
 pub mod icub;
 mod icub_body;
 mod lattice;
+mod link_pairs;
 mod lint;
 #[cfg(feature = "meshes")]
 pub mod mesh;

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::cell_spread::cell_spread;
 use super::fill::{Fill, Filled, without_area};
-use super::group::{FilePaint, Grouper, Grouping, group_while};
+use super::group::{FilePaint, Grouper, Grouping};
 use super::lint::{DrawnPoses, Touchable};
 use super::origin::Origin;
 use super::place::nearest_on_its_side;
@@ -297,10 +297,11 @@ fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
 /// The fields of `recipe` over the taxels of `body`, with notes.
 fn group(body: &Body, details: &Details, recipe: &Recipe, progress: Progress<'_>) -> Result<Grouping> {
     let painted = FilePaint { body, details };
+    let mut grower = Grouper::new(body, &painted).with_pairs(&[]);
     if recipe.fields.is_empty() {
-        return group_while(body, &painted, &[], progress);
+        grower.apply_usual()?;
+        return grower.finish_while(progress).map_err(|(_, e)| e);
     }
-    let mut grower = Grouper::new(body, &painted);
     for (rule, at) in &recipe.fields {
         grower.apply(rule).map_err(|e| at.put(e))?;
     }
