@@ -1,0 +1,184 @@
+//! The same taxels on both sides of a body, with ids and fields in pairs; names of fields that say where they are.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use glam::DVec3;
+use somatic::author::{Authored, Recipe, author};
+use somatic::body::{Body, MeshData, Original};
+use somatic::bundled;
+
+use crate::even::{block, body, made};
+
+/// A box from `low` to `high`, m.
+fn bar(low: [f64; 3], high: [f64; 3], n: u32) -> MeshData {
+    block([low, high].map(DVec3::from_array), n, false)
+}
+
+/// A torso across the plane, which cuts squares of it, and two arms beside it.
+fn figure() -> Original {
+    body(&[
+        ("torso", bar([-0.1, 0.0, -0.05], [0.1, 0.4, 0.05], 5)),
+        ("left_arm", bar([0.15, 0.1, -0.03], [0.21, 0.4, 0.03], 3)),
+        ("right_arm", bar([-0.21, 0.1, -0.03], [-0.15, 0.4, 0.03], 4)),
+    ])
+}
+
+fn why(file: &Original, text: &str) -> String {
+    let recipe = Recipe::parse("recipe.toml", text, Path::new("")).unwrap();
+    let line = author(file.clone(), &recipe, |_| {}).unwrap_err().to_string();
+    assert!(!line.contains('\n') && line.contains("`mirror`"), "{line}");
+    line
+}
+
+/// `name` with left for right.
+fn exchanged(name: &str) -> String {
+    name.replace("left", "\0").replace("right", "left").replace('\0', "right")
+}
+
+/// The place and the normal of a taxel in the body.
+fn in_body(body: &Body, id: u32) -> (DVec3, DVec3, usize) {
+    let taxel = &body.taxels[body.taxel_index(id).unwrap()];
+    let way = body.links[taxel.link].body_from_link;
+    (way.transform_point3(taxel.position_in_link), way.transform_vector3(taxel.normal_in_link), taxel.link)
+}
+
+fn mirrored(v: DVec3) -> DVec3 {
+    DVec3::new(-v.x, v.y, v.z)
+}
+
+/// That taxels are pairs of mirror images up to `within_m`, on links that are, with ids 2k and 2k + 1 after `first`.
+fn are_pairs(body: &Body, first: u32, within_m: f64) {
+    for id in (first..).step_by(2).take(body.taxels.len() / 2) {
+        let ((left, left_normal, link), (right, right_normal, other)) = (in_body(body, id), in_body(body, id + 1));
+        assert!(left.x > 0.0, "{id}: {left}");
+        assert!(mirrored(left).distance(right) < within_m, "{id}: {left} {right}");
+        assert!(mirrored(left_normal).dot(right_normal) > 0.7, "{id}: {left_normal} {right_normal}");
+        assert_eq!(exchanged(&body.links[link].name), body.links[other].name);
+    }
+}
+
+/// That the mirror image of each field is the field of the exchanged name.
+fn fields_are_pairs(body: &Body) {
+    let ids: BTreeMap<&str, BTreeSet<u32>> =
+        body.fields.iter().map(|field| (field.name.as_str(), field.members.keys().copied().collect())).collect();
+    for (name, own) in &ids {
+        let images: BTreeSet<u32> = own.iter().map(|id| id ^ 1).collect();
+        assert_eq!(ids.get(exchanged(name).as_str()), Some(&images), "{name} in {:?}", ids.keys());
+    }
+}
+
+fn names(authored: &Authored) -> Vec<&str> {
+    authored.body.fields.iter().map(|field| field.name.as_str()).collect()
+}
+
+#[test]
+fn both_sides_get_the_same_taxels_in_pairs_of_ids_and_fields() {
+    let authored = made(&figure(), "mirror = \"y\"\n[[place]]\ntaxels = 400");
+    assert_eq!(authored.places[0].ids, Vec::from_iter(0..400));
+    are_pairs(&authored.body, 0, 1e-6);
+    let areas: Vec<f64> = authored.body.taxels.iter().map(|taxel| taxel.area).collect();
+    assert!(areas.chunks(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() < 0.02), "{areas:?}");
+    let [low, high] = authored.places[0].cell_spread.unwrap();
+    assert!(low > 0.75 && high < 1.3, "{low} {high}");
+    fields_are_pairs(&authored.body);
+    for name in ["torso", "torso/front_left_1", "torso/left_1", "left_arm/outer_1", "right_arm/inner_1"] {
+        assert!(names(&authored).contains(&name), "{name} in {:?}", names(&authored));
+    }
+    // A patch of a mirrored link does not reach over the plane.
+    for field in authored.body.fields.iter().filter(|field| field.name.contains('/')) {
+        assert!(field.members.keys().all(|id| id % 2 == field.members.keys().next().unwrap() % 2), "{}", field.name);
+    }
+    assert!(authored.notes.iter().any(|note| note.contains("200 pairs")), "{:?}", authored.notes);
+    // The same bytes again, and none of that without it.
+    let again = made(&figure(), "mirror = \"y\"\n[[place]]\ntaxels = 400");
+    assert_eq!(authored.file.to_glb().unwrap(), again.file.to_glb().unwrap());
+    let plain = made(&figure(), "[[place]]\ntaxels = 400");
+    let off = |id: u32| mirrored(in_body(&plain.body, id).0).distance(in_body(&plain.body, id + 1).0);
+    assert!((0..400).step_by(2).any(|id| off(id) > 0.05));
+}
+
+#[test]
+fn ids_begin_where_they_are_told_and_rules_make_pairs_too() {
+    let text = "mirror = \"y\"\n[[place]]\ntaxels = 200\nfirst_id = 1000\n\
+                [[fields]]\nname = \"left/arm\"\nlink = \"left_arm\"\npatches = { of = 9 }\nwrap = \"split\"\n\
+                [[fields]]\nname = \"right/arm\"\nlink = \"right_arm\"\npatches = { of = 9 }\nwrap = \"split\"\n\
+                [[fields]]\nname = \"torso\"\nlink = \"torso\"\nwrap = \"split\"";
+    let authored = made(&figure(), text);
+    are_pairs(&authored.body, 1000, 1e-6);
+    fields_are_pairs(&authored.body);
+    assert!(authored.body.fields.len() > 10, "{:?}", names(&authored));
+}
+
+#[test]
+fn a_skinned_body_is_mirrored_on_its_links() {
+    let file = Original::from_bytes("humanoid", bundled::HUMANOID, None).unwrap();
+    let authored = made(&file, "mirror = \"y\"\n[[place]]\ntaxels = 600");
+    assert_eq!(authored.body.taxels.len(), 600);
+    // The mesh is nearly symmetric: a tenth of the spacing is allowed.
+    are_pairs(&authored.body, 0, 0.003);
+    fields_are_pairs(&authored.body);
+    assert!(names(&authored).contains(&"left_forearm/outer_1"), "{:?}", names(&authored));
+}
+
+#[test]
+fn what_cannot_be_mirrored_is_refused() {
+    let file = figure();
+    let odd = why(&file, "mirror = \"y\"\n[[place]]\ntaxels = 401");
+    assert!(odd.contains("400 or 402"), "{odd}");
+    for place in ["spacing = \"20 mm\"", "taxels = 40\nspacing = \"5 mm\"", "grid = \"hexagonal\"\npitch = \"10 mm\""] {
+        let line = why(&file, &format!("mirror = \"y\"\n[[place]]\n{place}"));
+        assert!(line.contains("number of `taxels`"), "{line}");
+    }
+    assert!(why(&file, "mirror = \"y\"\neven = false\n[[place]]\ntaxels = 40").contains("`even`"));
+    let one_arm = body(&[
+        ("torso", bar([-0.1, 0.0, -0.05], [0.1, 0.4, 0.05], 5)),
+        ("left_arm", bar([0.15, 0.1, -0.03], [0.21, 0.4, 0.03], 3)),
+    ]);
+    let line = why(&one_arm, "mirror = \"y\"\n[[place]]\ntaxels = 100");
+    assert!(line.contains("`left_arm`") && line.contains("no partner"), "{line}");
+    let shifted = body(&[
+        ("left_arm", bar([0.15, 0.1, -0.03], [0.21, 0.4, 0.03], 3)),
+        ("right_arm", bar([-0.22, 0.1, -0.03], [-0.16, 0.4, 0.03], 3)),
+    ]);
+    let line = why(&shifted, "mirror = \"y\"\n[[place]]\ntaxels = 100");
+    assert!(line.contains("`left_arm` lies up to 10.0 mm") && line.contains("`right_arm`"), "{line}");
+    let right = body(&[("box", bar([-0.2, 0.0, 0.0], [-0.1, 0.1, 0.1], 2))]);
+    assert!(why(&right, "mirror = \"y\"\n[[place]]\ntaxels = 10").contains("left of the plane"));
+    let recipe = "mirror = \"x\"\n[[place]]\ntaxels = 10";
+    assert!(Recipe::parse("recipe.toml", recipe, Path::new("")).unwrap_err().to_string().contains("line 1"));
+}
+
+#[test]
+fn fields_are_named_by_side_and_links_without_prefix() {
+    let file = body(&[
+        ("mixamorig:LeftHand", bar([0.1, 0.0, 0.0], [0.3, 0.2, 0.2], 3)),
+        ("mixamorig:RightHand", bar([-0.3, 0.0, 0.0], [-0.1, 0.2, 0.2], 3)),
+        ("mixamorig:Head", bar([-0.1, 0.5, 0.0], [0.1, 0.7, 0.2], 3)),
+    ]);
+    let authored = made(&file, "[[place]]\ntaxels = 540");
+    let side = |name: &str| {
+        let field = authored.body.fields.iter().find(|field| field.name == name);
+        let field = field.unwrap_or_else(|| panic!("{name} in {:?}", names(&authored)));
+        let all = field.members.keys().map(|&id| in_body(&authored.body, id));
+        let (sum, normal) = all.fold((DVec3::ZERO, DVec3::ZERO), |(p, n), (at, normal, _)| (p + at, n + normal));
+        (sum / field.members.len() as f64, normal / field.members.len() as f64)
+    };
+    // A body faces +z, and its left is +x.
+    for (name, out) in [("Head/front", DVec3::Z), ("Head/left", DVec3::X), ("Head/top", DVec3::Y)] {
+        assert!(side(&format!("{name}_1")).1.dot(out) > 0.5, "{name}");
+    }
+    for (name, out) in [("LeftHand/inner", -DVec3::X), ("RightHand/inner", DVec3::X), ("LeftHand/outer", DVec3::X)] {
+        assert!(side(&format!("{name}_1")).1.dot(out) > 0.5, "{name}");
+    }
+    assert!(!names(&authored).iter().any(|name| name.contains("Hand/left") || name.contains("mixamo")));
+    // From top to bottom.
+    let has = |number: usize| names(&authored).contains(&format!("Head/front_{number}").as_str());
+    assert!(has(2), "{:?}", names(&authored));
+    for number in (2..).take_while(|&number| has(number)) {
+        let [above, below] = [number - 1, number].map(|number| side(&format!("Head/front_{number}")).0.y);
+        assert!(above >= below - 1e-5, "{number}: {above} {below}");
+    }
+    // The link keeps its name.
+    assert!(authored.body.link_index("mixamorig:LeftHand").is_some());
+}
