@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::body::Body;
+use glam::DVec3;
+
+use crate::body::{Body, Link, WORLD_FROM_BODY};
 
 /// Words of names for the two sides: left and right, also of a front, rear, hind or back leg.
 const SIDES: [[&str; 2]; 10] = [
@@ -19,23 +21,27 @@ const SIDES: [[&str; 2]; 10] = [
     ["lr", "rr"],
 ];
 
+/// Links of a pair are beside each other if so much of the way from one to the other is to the left or right.
+const BESIDE: f64 = 0.5;
+
 /// Per link of a body its partner on the other side.
 pub(super) struct LinkPairs {
     partners: Vec<Option<usize>>,
+    /// Whether it is on the left of its partner, in the world at rest.
+    is_left: Vec<Option<bool>>,
 }
 
 impl LinkPairs {
     /// Those of `body`: two links are a pair if the words for sides in their names are opposite, and all else is the same.
     pub(super) fn new(body: &Body) -> Self {
-        Self::of_names(&body.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>())
-    }
-
-    fn of_names(names: &[&str]) -> Self {
-        let index: BTreeMap<&str, usize> = names.iter().copied().zip(0..).collect();
-        let candidate = |name: &&str| other_sides(name).into_iter().find_map(|name| index.get(name.as_str()).copied());
-        let first: Vec<Option<usize>> = names.iter().map(candidate).collect();
-        let is_mutual = |(link, partner): (usize, &Option<usize>)| partner.filter(|&other| first[other] == Some(link));
-        Self { partners: first.iter().enumerate().map(is_mutual).collect() }
+        let partners = partners(&body.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>());
+        let middles = middles(body);
+        let is_left = |(link, partner): (usize, &Option<usize>)| {
+            let way = middles[link] - middles[(*partner)?];
+            (way.y.abs() > BESIDE * way.length()).then_some(way.y > 0.0)
+        };
+        let is_left = partners.iter().enumerate().map(is_left).collect();
+        Self { partners, is_left }
     }
 
     /// The partner of `link`, if it has one.
@@ -43,10 +49,38 @@ impl LinkPairs {
         self.partners[link]
     }
 
+    /// Whether `link` is on the left of its partner; `None` if it has none, or one that is not beside it.
+    pub(super) fn is_left(&self, link: usize) -> Option<bool> {
+        self.is_left[link]
+    }
+
     /// The link that a mirror image of `link` is on: its partner, else itself.
     pub(super) fn image(&self, link: usize) -> usize {
         self.partners[link].unwrap_or(link)
     }
+}
+
+/// Per link of `body` the mean place of its taxels in the world at rest, or without any its origin, m.
+fn middles(body: &Body) -> Vec<DVec3> {
+    let mut sums = vec![(DVec3::ZERO, 0.0_f64); body.links.len()];
+    for taxel in &body.taxels {
+        let (sum, count) = &mut sums[taxel.link];
+        *sum += taxel.position_in_link;
+        *count += 1.0;
+    }
+    let in_world = |(link, (sum, count)): (&Link, (DVec3, f64))| {
+        WORLD_FROM_BODY.transform_point3(link.body_from_link.transform_point3(sum / count.max(1.0)))
+    };
+    body.links.iter().zip(sums).map(in_world).collect()
+}
+
+/// Per one of `names` the one of its partner.
+fn partners(names: &[&str]) -> Vec<Option<usize>> {
+    let index: BTreeMap<&str, usize> = names.iter().copied().zip(0..).collect();
+    let candidate = |name: &&str| other_sides(name).into_iter().find_map(|name| index.get(name.as_str()).copied());
+    let first: Vec<Option<usize>> = names.iter().map(candidate).collect();
+    let is_mutual = |(link, partner): (usize, &Option<usize>)| partner.filter(|&other| first[other] == Some(link));
+    first.iter().enumerate().map(is_mutual).collect()
 }
 
 /// `name` with all words for a side exchanged; none if it has no such word, two if a word has two opposites.
@@ -136,9 +170,6 @@ mod tests {
     #[test]
     fn links_are_pairs_where_both_are_there() {
         let names = ["torso", "LR_hip", "RR_hip", "left_eye", "l_arm", "r_arm"];
-        let pairs = LinkPairs::of_names(&names);
-        let partners: Vec<Option<usize>> = (0..names.len()).map(|link| pairs.partner(link)).collect();
-        assert_eq!(partners, [None, Some(2), Some(1), None, Some(5), Some(4)]);
-        assert_eq!([pairs.image(0), pairs.image(4)], [0, 5]);
+        assert_eq!(partners(&names), [None, Some(2), Some(1), None, Some(5), Some(4)]);
     }
 }

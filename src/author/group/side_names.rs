@@ -17,9 +17,6 @@ const SAME: f64 = 1e-6;
 /// Heights and the like are equal up to this, m.
 const SAME_M: f64 = 1e-5;
 
-/// Links of a pair are beside each other if most of the way from one to the other is to the left or right.
-const BESIDE: f64 = 0.5;
-
 /// A side of the body at rest, by the axes of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
@@ -111,7 +108,7 @@ impl Grouper<'_> {
         // The left half of a mirrored layout has the mirror plane on its right, as a left link of a pair has.
         let is_left = match (is_right, has_both) {
             (Some(_), true) => Some(true),
-            _ => taxels.first().and_then(|&taxel| self.is_left(body.taxels[taxel].link)),
+            _ => taxels.first().and_then(|&taxel| self.pairs.is_left(body.taxels[taxel].link)),
         };
         let faces = match (side, is_left) {
             (Side::Left, Some(is_left)) => Some(!is_left),
@@ -139,21 +136,5 @@ impl Grouper<'_> {
             Side::Left | Side::Right => [up, forward, across],
         };
         Spot { word, order }
-    }
-
-    /// Whether `link` is the left one of a pair of links that are beside each other.
-    fn is_left(&self, link: usize) -> Option<bool> {
-        let partner = self.pairs.partner(link)?;
-        let from_partner = self.middle_of(link) - self.middle_of(partner);
-        let is_beside = from_partner.y.abs() > BESIDE * from_partner.length();
-        is_beside.then_some(from_partner.y > 0.0)
-    }
-
-    /// The mean place of the taxels of `link` in the world at rest, or without any of its origin, m.
-    fn middle_of(&self, link: usize) -> DVec3 {
-        let body_from_link = self.body.links[link].body_from_link;
-        let own = || self.body.taxels.iter().filter(|taxel| taxel.link == link).map(|taxel| taxel.position_in_link);
-        let middle = own().sum::<DVec3>() / own().count().max(1) as f64;
-        WORLD_FROM_BODY.transform_point3(body_from_link.transform_point3(middle))
     }
 }
