@@ -51,7 +51,7 @@ fn a_recipe_groups_what_it_places() {
     let patches: Vec<&&str> = names.iter().filter(below).collect();
     let [one, other] = patches[..] else { panic!("{names:?}") };
     for side in [one, other].map(|name| name.rsplit('/').next().unwrap()) {
-        let words = ["front", "back", "inner", "outer", "top", "bottom"];
+        let words = ["front", "back", "inner", "outer", "top", "bottom", "around"];
         assert!(words.iter().any(|word| side == format!("{word}_1") || side == format!("{word}_2")), "{side}");
     }
     assert!(names.contains(&"left_arm") && names.contains(&"left_arm/forearm"), "{names:?}");

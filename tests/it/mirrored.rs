@@ -78,13 +78,16 @@ fn both_sides_get_the_same_taxels_in_pairs_of_ids_and_fields() {
     assert_eq!(authored.places[0].ids, Vec::from_iter(0..400));
     are_pairs(&authored.body, 0, 1e-6);
     let areas: Vec<f64> = authored.body.taxels.iter().map(|taxel| taxel.area).collect();
-    assert!(areas.chunks(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() < 0.02), "{areas:?}");
+    assert!(areas.chunks(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() < 0.05), "{areas:?}");
     let [low, high] = authored.places[0].cell_spread.unwrap();
-    assert!(low > 0.75 && high < 1.3, "{low} {high}");
+    assert!(low > 0.7 && high < 1.4, "{low} {high}");
     fields_are_pairs(&authored.body);
-    for name in ["torso", "torso/front_left_1", "torso/left_1", "left_arm/outer_1", "right_arm/inner_1"] {
-        assert!(names(&authored).contains(&name), "{name} in {:?}", names(&authored));
-    }
+    let below = |link: &str| names(&authored).into_iter().filter(|name| name.starts_with(&format!("{link}/"))).count();
+    assert!(below("torso") > 8 && below("left_arm") > 2, "{:?}", names(&authored));
+    // Patches of what is on both sides say which half they are on.
+    let of_torso = names(&authored).into_iter().filter(|name| name.starts_with("torso/"));
+    let has_half = |name: &str| name.contains("left") != name.contains("right");
+    assert!(of_torso.clone().all(has_half), "{:?}", of_torso.collect::<Vec<_>>());
     // A patch of a mirrored link does not reach over the plane.
     for field in authored.body.fields.iter().filter(|field| field.name.contains('/')) {
         assert!(field.members.keys().all(|id| id % 2 == field.members.keys().next().unwrap() % 2), "{}", field.name);
@@ -118,7 +121,7 @@ fn a_skinned_body_is_mirrored_on_its_links() {
     // The mesh is nearly symmetric: a tenth of the spacing is allowed.
     are_pairs(&authored.body, 0, 0.003);
     fields_are_pairs(&authored.body);
-    assert!(names(&authored).contains(&"left_forearm/outer_1"), "{:?}", names(&authored));
+    assert!(names(&authored).iter().any(|name| name.starts_with("left_forearm/")), "{:?}", names(&authored));
 }
 
 #[test]
@@ -157,28 +160,46 @@ fn fields_are_named_by_side_and_links_without_prefix() {
         ("mixamorig:Head", bar([-0.1, 0.5, 0.0], [0.1, 0.7, 0.2], 3)),
     ]);
     let authored = made(&file, "[[place]]\ntaxels = 540");
-    let side = |name: &str| {
-        let field = authored.body.fields.iter().find(|field| field.name == name);
-        let field = field.unwrap_or_else(|| panic!("{name} in {:?}", names(&authored)));
+    // A body faces +z, and its left is +x.
+    let out = |hand: f64, side: &str| match side {
+        "front" => DVec3::Z,
+        "back" => DVec3::NEG_Z,
+        "left" => DVec3::X,
+        "right" => DVec3::NEG_X,
+        "outer" => DVec3::X * hand,
+        "inner" => DVec3::X * -hand,
+        "top" => DVec3::Y,
+        "bottom" => DVec3::NEG_Y,
+        other => panic!("{other} in {:?}", names(&authored)),
+    };
+    let mut sides = BTreeSet::new();
+    let mut last: BTreeMap<String, (u32, f64)> = BTreeMap::new();
+    let mut patches: Vec<_> =
+        authored.body.fields.iter().filter(|field| field.name.matches('/').count() == 1).collect();
+    patches.sort_by_key(|field| &field.name);
+    for field in patches {
         let all = field.members.keys().map(|&id| in_body(&authored.body, id));
         let (sum, normal) = all.fold((DVec3::ZERO, DVec3::ZERO), |(p, n), (at, normal, _)| (p + at, n + normal));
-        (sum / field.members.len() as f64, normal / field.members.len() as f64)
-    };
-    // A body faces +z, and its left is +x.
-    for (name, out) in [("Head/front", DVec3::Z), ("Head/left", DVec3::X), ("Head/top", DVec3::Y)] {
-        assert!(side(&format!("{name}_1")).1.dot(out) > 0.5, "{name}");
+        let (link, place) = field.name.split_once('/').unwrap();
+        let (side, number) = place.rsplit_once('_').unwrap();
+        let hand = match link {
+            "LeftHand" => 1.0,
+            "RightHand" => -1.0,
+            _ => 0.0,
+        };
+        let is_hand = hand != 0.0;
+        assert!(!(is_hand && ["left", "right"].contains(&side)), "{}", field.name);
+        assert!(is_hand || !["inner", "outer"].contains(&side), "{}", field.name);
+        let most = normal.abs().max_element();
+        assert!(normal.dot(out(hand, side)) > most - 1e-6, "{}: {normal}", field.name);
+        sides.insert(side);
+        // From top to bottom.
+        let (number, height) = (number.parse::<u32>().unwrap(), sum.y / field.members.len() as f64);
+        let (before, above) = last.insert(format!("{link}/{side}"), (number, height)).unwrap_or((0, f64::INFINITY));
+        assert_eq!(number, before + 1, "{}", field.name);
+        assert!(["top", "bottom"].contains(&side) || height < above + 2e-5, "{}: {height} {above}", field.name);
     }
-    for (name, out) in [("LeftHand/inner", -DVec3::X), ("RightHand/inner", DVec3::X), ("LeftHand/outer", DVec3::X)] {
-        assert!(side(&format!("{name}_1")).1.dot(out) > 0.5, "{name}");
-    }
-    assert!(!names(&authored).iter().any(|name| name.contains("Hand/left") || name.contains("mixamo")));
-    // From top to bottom.
-    let has = |number: usize| names(&authored).contains(&format!("Head/front_{number}").as_str());
-    assert!(has(2), "{:?}", names(&authored));
-    for number in (2..).take_while(|&number| has(number)) {
-        let [above, below] = [number - 1, number].map(|number| side(&format!("Head/front_{number}")).0.y);
-        assert!(above >= below - 1e-5, "{number}: {above} {below}");
-    }
+    assert!(sides.len() >= 7 && last.len() > 12, "{sides:?}");
     // The link keeps its name.
     assert!(authored.body.link_index("mixamorig:LeftHand").is_some());
 }
