@@ -58,11 +58,11 @@ fn are_pairs(body: &Body, first: u32, within_m: f64) {
     }
 }
 
-/// That the mirror image of each field is the field of the exchanged name.
-fn fields_are_pairs(body: &Body) {
+/// That the mirror image of each field of up to so many levels is the field of the exchanged name.
+fn fields_are_pairs(body: &Body, levels: usize) {
     let ids: BTreeMap<&str, BTreeSet<u32>> =
         body.fields.iter().map(|field| (field.name.as_str(), field.members.keys().copied().collect())).collect();
-    for (name, own) in &ids {
+    for (name, own) in ids.iter().filter(|(name, _)| name.matches('/').count() < levels) {
         let images: BTreeSet<u32> = own.iter().map(|id| id ^ 1).collect();
         assert_eq!(ids.get(exchanged(name).as_str()), Some(&images), "{name} in {:?}", ids.keys());
     }
@@ -77,11 +77,11 @@ fn both_sides_get_the_same_taxels_in_pairs_of_ids_and_fields() {
     let authored = made(&figure(), "mirror = \"y\"\n[[place]]\ntaxels = 400");
     assert_eq!(authored.places[0].ids, Vec::from_iter(0..400));
     are_pairs(&authored.body, 0, 1e-6);
-    let areas: Vec<f64> = authored.body.taxels.iter().map(|taxel| taxel.area).collect();
-    assert!(areas.chunks(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() < 0.05), "{areas:?}");
+    let area = |side: usize| authored.body.taxels.iter().skip(side).step_by(2).map(|taxel| taxel.area).sum::<f64>();
+    assert!((area(0) / area(1) - 1.0).abs() < 0.01, "{} {}", area(0), area(1));
     let [low, high] = authored.places[0].cell_spread.unwrap();
     assert!(low > 0.7 && high < 1.4, "{low} {high}");
-    fields_are_pairs(&authored.body);
+    fields_are_pairs(&authored.body, 2);
     let below = |link: &str| names(&authored).into_iter().filter(|name| name.starts_with(&format!("{link}/"))).count();
     assert!(below("torso") > 8 && below("left_arm") > 2, "{:?}", names(&authored));
     // Patches of what is on both sides say which half they are on.
@@ -109,7 +109,7 @@ fn ids_begin_where_they_are_told_and_rules_make_pairs_too() {
                 [[fields]]\nname = \"torso\"\nlink = \"torso\"\nwrap = \"split\"";
     let authored = made(&figure(), text);
     are_pairs(&authored.body, 1000, 1e-6);
-    fields_are_pairs(&authored.body);
+    fields_are_pairs(&authored.body, 3);
     assert!(authored.body.fields.len() > 10, "{:?}", names(&authored));
 }
 
@@ -120,7 +120,8 @@ fn a_skinned_body_is_mirrored_on_its_links() {
     assert_eq!(authored.body.taxels.len(), 600);
     // The mesh is nearly symmetric: a tenth of the spacing is allowed.
     are_pairs(&authored.body, 0, 0.003);
-    fields_are_pairs(&authored.body);
+    // A patch may have a chart on one side only, and is then split on the other.
+    fields_are_pairs(&authored.body, 2);
     assert!(names(&authored).iter().any(|name| name.starts_with("left_forearm/")), "{:?}", names(&authored));
 }
 

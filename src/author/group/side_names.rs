@@ -106,9 +106,9 @@ impl Grouper<'_> {
         let count = taxels.len().max(1) as f64;
         let (side, at) = (Side::of(normal / count), position / count);
         // The left half of a mirrored layout has the mirror plane on its right, as a left link of a pair has.
-        let is_left = match (is_right, has_both) {
-            (Some(_), true) => Some(true),
-            _ => taxels.first().and_then(|&taxel| self.pairs.is_left(body.taxels[taxel].link)),
+        let is_left = match is_right {
+            Some(_) => Some(true),
+            None => taxels.first().and_then(|&taxel| self.pairs.is_left(body.taxels[taxel].link)),
         };
         let faces = match (side, is_left) {
             (Side::Left, Some(is_left)) => Some(!is_left),
