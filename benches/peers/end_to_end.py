@@ -52,13 +52,13 @@ force_newton = [[0, 200], [10, 200]]
 """),
     "humanoid": (400, """
 [[touch]]
-on = "torso/waist/patch_04"
+on = "torso/waist/left_1"
 indenter = "fingertip"
 path = [[0, 0]]
 press = { from_s = 0, to_s = 10, newton = 20, ramp_s = 0.2 }
 
 [[touch]]
-on = "head/neck/patch_01"
+on = "head/neck/back_1"
 indenter = "fingertip"
 path = [[0, 0]]
 press = { from_s = 1, to_s = 9, newton = 20, ramp_s = 0.2 }

@@ -37,6 +37,6 @@ def stroke(half):
     return [[-half if i % 2 == 0 else half, 0.0] for i in range(turns + 1)]
 
 
-touch("left_arm/forearm/patch_01", stroke(0.008), 6)
-touch("left_arm/forearm/patch_10", stroke(0.006), 6)
-touch("left_arm/forearm/patch_18", stroke(0.006), 4)
+touch("left_arm/forearm/back_2", stroke(0.008), 6)
+touch("left_arm/forearm/outer_1", stroke(0.006), 6)
+touch("left_arm/forearm/outer_4", stroke(0.006), 4)

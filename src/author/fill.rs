@@ -36,6 +36,8 @@ pub(super) struct Fill<'a> {
     pub(super) touchable: Option<&'a Touchable<'a>>,
     /// How far from borders of links and seams taxels are at least, m.
     pub(super) clear_m: Option<f64>,
+    /// Whether the two sides of the body get the same taxels.
+    pub(super) is_mirrored: bool,
 }
 
 /// What a place is filled with.
@@ -47,15 +49,17 @@ pub(super) struct Filled {
     /// Hidden surface of the place by link, m².
     pub(super) hidden_m2: BTreeMap<usize, f64>,
     pub(super) notes: Vec<String>,
+    /// Whether each second taxel is the mirror image of the one before it.
+    pub(super) is_mirrored: bool,
 }
 
 /// The triangles of a place.
-struct Surface<'a> {
-    positions: &'a [DVec3],
-    triangles: Vec<[u32; 3]>,
+pub(super) struct Surface<'a> {
+    pub(super) positions: &'a [DVec3],
+    pub(super) triangles: Vec<[u32; 3]>,
     /// Per triangle its number among all.
-    chosen: &'a [usize],
-    topology: Topology,
+    pub(super) chosen: &'a [usize],
+    pub(super) topology: Topology,
 }
 
 impl Fill<'_> {
@@ -63,6 +67,9 @@ impl Fill<'_> {
     pub(super) fn place(&self, region: &[bool], progress: Progress<'_>) -> Result<Filled> {
         let mut filled = Filled::default();
         let chosen: Vec<usize> = (0..region.len()).filter(|&triangle| region[triangle]).collect();
+        if self.is_mirrored {
+            return self.sample_mirrored(&chosen, progress);
+        }
         let notes = &mut filled.notes;
         filled.taxels = match &self.place.how {
             Placement::Grid { hexagonal, pitch_m, origin, u } => {
@@ -113,7 +120,13 @@ impl Fill<'_> {
             let topology = self.rest_surface.topology();
             Borders::new(self.rest_surface, &chosen, topology, clear_m)
         });
-        let rules = Rules { rest_surface: self.rest_surface, chosen: &chosen, touchable: self.touchable, borders };
+        let rules = Rules {
+            rest_surface: self.rest_surface,
+            chosen: &chosen,
+            touchable: self.touchable,
+            borders,
+            mirror: None,
+        };
         let count = placed.len();
         let kept = rules.without_closed(placed.clone(), progress)?;
         let placed = match kept.len() {
@@ -131,14 +144,19 @@ impl Fill<'_> {
         Ok(placed.into_iter().map(|placed| Snapped { placed, id: None, moved_m: 0.0 }).collect())
     }
 
+    /// The triangles `chosen`.
+    pub(super) fn surface<'s>(&'s self, chosen: &'s [usize]) -> Surface<'s> {
+        let positions = &self.rest_surface.positions[..];
+        let triangles: Vec<[u32; 3]> = chosen.iter().map(|&triangle| self.rest_surface.triangles[triangle]).collect();
+        let topology = Topology::of_groups(positions, &triangles, &|vertex| self.rest_surface.group_of(vertex));
+        Surface { positions, triangles, chosen, topology }
+    }
+
     /// Taxels sampled on the triangles `chosen`.
     fn sample(&self, chosen: &[usize], progress: Progress<'_>) -> Result<Filled> {
         let mut filled = Filled::default();
-        let group_of = |vertex| self.rest_surface.group_of(vertex);
-        let positions = &self.rest_surface.positions[..];
-        let triangles: Vec<[u32; 3]> = chosen.iter().map(|&triangle| self.rest_surface.triangles[triangle]).collect();
-        let topology = Topology::of_groups(positions, &triangles, &group_of);
-        let surface = Surface { positions, triangles, chosen, topology };
+        let surface = self.surface(chosen);
+        let positions = surface.positions;
         let area_m2: f64 = chosen.iter().map(|&triangle| self.rest_surface.area(triangle)).sum();
         let count = match &self.place.how {
             Placement::Apart { spacing_m } => {
@@ -149,7 +167,7 @@ impl Fill<'_> {
             _ => 0,
         };
         let borders = self.clear_m.map(|clear_m| Borders::new(self.rest_surface, chosen, &surface.topology, clear_m));
-        let rules = Rules { rest_surface: self.rest_surface, chosen, touchable: self.touchable, borders };
+        let rules = Rules { rest_surface: self.rest_surface, chosen, touchable: self.touchable, borders, mirror: None };
         let seen = &mut |share| progress(PROGRESS_SEEN * share);
         let ground = Ground::new(rules, positions, &surface.triangles, count, seen)?;
         let progress = &mut |share| progress(PROGRESS_SEEN + (1.0 - PROGRESS_SEEN) * share);
@@ -181,7 +199,7 @@ impl Fill<'_> {
     }
 
     /// Puts `placed` into `filled`, each with the area of its cell on what is skin, and notes what is hidden.
-    fn set_areas(
+    pub(super) fn set_areas(
         &self,
         surface: &Surface<'_>,
         ground: &Ground<'_>,
@@ -212,20 +230,24 @@ impl Fill<'_> {
                  turn them round"
             ));
         }
-        if !filled.hidden_m2.is_empty() {
+        if let Some(links) = self.listed_areas(&filled.hidden_m2) {
             let whole: f64 = chosen.iter().map(|&triangle| self.rest_surface.area(triangle)).sum();
             let hidden: f64 = filled.hidden_m2.values().sum();
-            let mut links: Vec<(usize, f64)> = filled.hidden_m2.iter().map(|(&link, &area)| (link, area)).collect();
-            links.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-            let named = |&(link, area): &(usize, f64)| format!("`{}` {}", self.link_name(link), square(area));
-            let links: Vec<String> = links.iter().map(named).collect();
             filled.notes.push(format!(
                 "place `{name}`: nothing can touch {} of its surface, {:.0} %, which gets no taxel: {}",
                 square(hidden),
                 100.0 * hidden / whole,
-                listed(&links)
+                links
             ));
         }
+    }
+
+    /// Links with their areas, the largest first; `None` if there are none.
+    pub(super) fn listed_areas(&self, area_m2: &BTreeMap<usize, f64>) -> Option<String> {
+        let mut links: Vec<(usize, f64)> = area_m2.iter().map(|(&link, &area)| (link, area)).collect();
+        links.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let named = |&(link, area): &(usize, f64)| format!("`{}` {}", self.link_name(link), square(area));
+        (!links.is_empty()).then(|| listed(&links.iter().map(named).collect::<Vec<_>>()))
     }
 
     fn link_name(&self, link: usize) -> &str {
@@ -233,7 +255,7 @@ impl Fill<'_> {
     }
 
     /// `count` taxels on what `ground` leaves, shared among links and their pieces, and moved until their cells are alike.
-    fn evenly(
+    pub(super) fn evenly(
         &self,
         surface: &Surface<'_>,
         ground: &Ground<'_>,

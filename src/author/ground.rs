@@ -6,8 +6,9 @@ use glam::DVec3;
 
 use super::borders::Borders;
 use super::lint::{BodyPoint, Touchable};
+use super::mirror::Mirror;
 use super::place::widest_radius;
-use super::placed::{Placed, Progress, points_on_same_side};
+use super::placed::{Placed, Progress, SurfacePoint, points_on_same_side};
 use super::rest_surface::RestSurface;
 use super::scatter::Pieces;
 use crate::body::{PointTree, area_vector, point_tree};
@@ -29,6 +30,9 @@ const MAX_CANDIDATES: usize = 16;
 /// A taxel beside another is nearer to it than this share of what is usual.
 const BESIDE: f64 = 0.5;
 
+/// Where more than this share of a surface has no mirror image, its halves are not alike.
+const MAX_ALONE_SHARE: f64 = 0.01;
+
 const SEED: u64 = 0x6e0d;
 
 /// Why a point gets no taxel.
@@ -38,6 +42,8 @@ enum State {
     Hidden,
     /// It is too near to a border.
     Rim,
+    /// It has no mirror image.
+    Alone,
 }
 
 /// What says which points may get taxels.
@@ -48,12 +54,14 @@ pub(super) struct Rules<'a> {
     /// What stands before the surface, if hidden points are left out.
     pub(super) touchable: Option<&'a Touchable<'a>>,
     pub(super) borders: Option<Borders>,
+    /// What finds mirror images, if points without one are left out; for those with one, the image is in the same state.
+    pub(super) mirror: Option<&'a Mirror<'a>>,
 }
 
 impl Rules<'_> {
     /// Whether they leave any point out.
     pub(super) fn are_any(&self) -> bool {
-        self.touchable.is_some() || self.borders.is_some()
+        self.touchable.is_some() || self.borders.is_some() || self.mirror.is_some()
     }
 
     /// Those of `placed` that they leave.
@@ -63,21 +71,44 @@ impl Rules<'_> {
     }
 
     fn states(&self, placed: &[Placed], progress: Progress<'_>) -> Result<Vec<State>> {
-        let point = |one: &Placed| BodyPoint {
-            link: self.rest_surface.link[self.chosen[one.triangle]] as usize,
-            position: one.point.position,
-            normal: one.point.normal,
-        };
-        let mut states = vec![State::Open; placed.len()];
+        let points: Vec<BodyPoint> = placed.iter().map(|one| self.body_point(one)).collect();
+        let Some(mirror) = self.mirror else { return self.states_of(&points, progress) };
+        let mut states = self.states_of(&points, &mut |share| progress(0.5 * share))?;
+        let (mut images, mut of_image) = (Vec::new(), Vec::new());
+        for (index, (state, point)) in states.iter_mut().zip(&points).enumerate() {
+            if *state != State::Open {
+                continue;
+            }
+            match mirror.image(point.link, point.position, point.normal) {
+                Ok(image) => {
+                    let (link, SurfacePoint { position, normal, .. }) = (mirror.link_of(&image), image.point);
+                    images.push(BodyPoint { link, position, normal });
+                    of_image.push(index);
+                }
+                Err(_) => *state = State::Alone,
+            }
+        }
+        let image_states = self.states_of(&images, &mut |share| progress(0.5 + 0.5 * share))?;
+        of_image.into_iter().zip(image_states).for_each(|(index, state)| states[index] = state);
+        Ok(states)
+    }
+
+    fn body_point(&self, one: &Placed) -> BodyPoint {
+        let SurfacePoint { position, normal, .. } = one.point;
+        BodyPoint { link: self.rest_surface.link[self.chosen[one.triangle]] as usize, position, normal }
+    }
+
+    /// The states of `points`, whatever their images are.
+    fn states_of(&self, points: &[BodyPoint], progress: Progress<'_>) -> Result<Vec<State>> {
+        let mut states = vec![State::Open; points.len()];
         if let Some(touchable) = self.touchable {
-            let points: Vec<BodyPoint> = placed.iter().map(point).collect();
             let stopped = || Error::failed("stopped before all taxels were placed");
-            let open = touchable.are_open(&points, progress).ok_or_else(stopped)?;
+            let open = touchable.are_open(points, progress).ok_or_else(stopped)?;
             states.iter_mut().zip(open).filter(|(_, open)| !open).for_each(|(state, _)| *state = State::Hidden);
         }
         if let Some(borders) = &self.borders {
-            for (state, one) in states.iter_mut().zip(placed).filter(|(state, _)| **state == State::Open) {
-                if !borders.are_clear_of(one.point.position) {
+            for (state, point) in states.iter_mut().zip(points).filter(|(state, _)| **state == State::Open) {
+                if !borders.are_clear_of(point.position) {
                     *state = State::Rim;
                 }
             }
@@ -119,6 +150,13 @@ impl<'a> Ground<'a> {
         if is_inside_out {
             rules.touchable = None;
             states = rules.states(&samples, progress)?;
+        }
+        let is_alone = |(_, state): &(&Placed, &State)| **state == State::Alone;
+        let alone = samples.iter().zip(&states).filter(is_alone).map(|(sample, _)| rules.body_point(sample));
+        let alone: Vec<_> = alone.map(|point| (point.link, point.position, point.normal)).collect();
+        let share = alone.len() as f64 / samples.len().max(1) as f64;
+        if let Some(mirror) = rules.mirror.filter(|_| share > MAX_ALONE_SHARE) {
+            return Err(mirror.refusal(&alone, share));
         }
         if !samples.is_empty() && !states.contains(&State::Open) {
             return Err(Error::failed(
@@ -163,12 +201,20 @@ impl<'a> Ground<'a> {
 
     /// Per link its hidden area, m², if it has any.
     pub(super) fn hidden_m2(&self) -> BTreeMap<usize, f64> {
-        let mut hidden = BTreeMap::new();
-        for (sample, _) in self.samples.iter().zip(&self.states).filter(|(_, state)| **state == State::Hidden) {
-            let link = self.rules.rest_surface.link[self.rules.chosen[sample.triangle]] as usize;
-            *hidden.entry(link).or_insert(0.0) += self.each_m2;
+        self.area_m2(State::Hidden)
+    }
+
+    /// Per link its area without a mirror image, m², if it has any.
+    pub(super) fn alone_m2(&self) -> BTreeMap<usize, f64> {
+        self.area_m2(State::Alone)
+    }
+
+    fn area_m2(&self, wanted: State) -> BTreeMap<usize, f64> {
+        let mut area_m2 = BTreeMap::new();
+        for (sample, _) in self.samples.iter().zip(&self.states).filter(|(_, state)| **state == wanted) {
+            *area_m2.entry(self.rules.body_point(sample).link).or_insert(0.0) += self.each_m2;
         }
-        hidden
+        area_m2
     }
 
     pub(super) fn rules(&self) -> &Rules<'a> {

@@ -127,6 +127,21 @@ impl<'a> RestSurface<'a> {
         area_vector(self.corners(triangle)).length() / 2.0
     }
 
+    /// Whether `triangle` is one of `link`, or on a skinned mesh one that moves with it to some extent.
+    pub(super) fn carries(&self, triangle: usize, link: usize) -> bool {
+        let part = self.origin[triangle].0 as usize;
+        let (Home::Skinned { joints, .. }, Some(skinning)) = (&self.body.surfaces[part].home, &self.skinning[part])
+        else {
+            return self.link[triangle] as usize == link;
+        };
+        let is_held = |corner: u32| {
+            let vertex = (corner - self.first_vertex[part]) as usize;
+            let mut held = skinning.joints[vertex].iter().zip(&skinning.weights[vertex]);
+            held.any(|(&joint, &weight)| weight > 0.0 && joints[usize::from(joint)].0 == link)
+        };
+        self.triangles[triangle].into_iter().any(is_held)
+    }
+
     /// The numbers painted as `name` (`_DENSITY`, `COLOR_0.r`), per vertex; `None` on parts without it, an error if no part has it.
     pub(super) fn painted(&self, name: &str) -> Result<Vec<Option<f64>>> {
         let mut values = vec![None; self.positions.len()];

@@ -6,18 +6,19 @@ use glam::DVec3;
 
 use super::cell_spread::cell_spread;
 use super::fill::{Fill, Filled, without_area};
-use super::group::{FilePaint, Grouper, Grouping, group_while};
+use super::group::{FilePaint, Grouper, Grouping};
+use super::link_pairs::LinkPairs;
 use super::lint::{DrawnPoses, Touchable};
 use super::origin::Origin;
 use super::place::nearest_on_its_side;
-use super::placed::{Progress, SurfacePoint, report_progress};
+use super::placed::{Placed, Progress, SurfacePoint, report_progress};
 use super::points::Snapped;
 use super::recipe::{PlaceSpec, Recipe};
 use super::refresh::refresh;
 use super::region::Regions;
 use super::rest_surface::{MeshTaxel, RestSurface};
 use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Modality, Original, Skinning, Taxel, listed};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, failed};
 use crate::field::{Divided, TaxelGraph, unions};
 
 /// Progress before and after placing taxels, and when they are in fields.
@@ -98,6 +99,11 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     if body.surfaces.is_empty() && !recipe.places.is_empty() {
         return Err(Error::failed("it has no triangles to place taxels on; export a mesh").at(file.name()));
     }
+    if recipe.is_mirrored && recipe.places.is_empty() {
+        return Err(
+            Error::usage("`mirror` is for taxels to be placed; give a number of them, or leave it out").at(file.name())
+        );
+    }
     report_progress(&mut go_on, PROGRESS_OPENED)?;
     let mut notes = std::mem::take(&mut file.notes);
     if !body.taxels.is_empty() {
@@ -125,6 +131,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     let looks = !recipe.keeps_hidden && recipe.places.iter().any(|place| place.how.samples());
     let touchable = looks.then(|| Touchable::new(&body, &drawn, |part| rest_surface.vertices(part)));
     let (mut reports, mut seated) = (Vec::new(), Vec::new());
+    let mut pairs = Vec::new();
     // What a place over all of the surface divides it into is what the edges of its taxels are made of.
     let is_alone = body.taxels.is_empty() && recipe.places.len() == 1;
     let mut divided = None;
@@ -149,8 +156,9 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
             is_scattered: recipe.is_scattered,
             touchable: touchable.as_ref(),
             clear_m: recipe.clear_m,
+            is_mirrored: recipe.is_mirrored,
         };
-        let Filled { taxels: filled, cells, hidden_m2, notes: more } =
+        let Filled { taxels: filled, cells, hidden_m2, notes: more, is_mirrored } =
             fill.place(&region, tick).map_err(|e| place.at.put(e))?;
         notes.extend(more);
         let last = u64::from(place.first_id) + filled.len() as u64;
@@ -168,6 +176,17 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         let links = rest_surface.link.iter().zip(&region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();
         let seat = |(one, &id): (&Snapped, &u32)| rest_surface.mesh_taxel(&one.placed, id, place.modality, &links);
         seated.extend(filled.iter().zip(&own).map(seat));
+        if is_mirrored {
+            let images = filled.iter().map(|one| &one.placed).skip(1).step_by(2);
+            seat_images(&rest_surface, images, &mut seated[first..]).map_err(|e| place.at.put(e))?;
+            pairs.extend(own.chunks_exact(2).map(|ids| [ids[0], ids[1]]));
+            notes.push(format!(
+                "place `{}`: {} pairs; id {} and every second one from there is on the left, and its mirror image has the next id",
+                place.name,
+                filled.len() / 2,
+                place.first_id
+            ));
+        }
         reports.push(report(&rest_surface, place, own, &filled, (&seated[first..], hidden_m2)));
     }
     report_progress(&mut go_on, PROGRESS_PLACED)?;
@@ -176,7 +195,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     file.add(&addition);
     let (body, details) = file.read()?;
     let tick = &mut |done: f64| go_on(PROGRESS_PLACED + (PROGRESS_GROUPED - PROGRESS_PLACED) * done);
-    let Grouping { fields, notes: more } = group(&body, &details, recipe, tick)?;
+    let Grouping { fields, notes: more } = group(&body, &details, recipe, &pairs, tick)?;
     notes.extend(more);
     notes.extend(without_field(&body, &fields));
     add_fields(&mut file, &body, &details, &fields);
@@ -294,13 +313,44 @@ fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
     })
 }
 
-/// The fields of `recipe` over the taxels of `body`, with notes.
-fn group(body: &Body, details: &Details, recipe: &Recipe, progress: Progress<'_>) -> Result<Grouping> {
-    let painted = FilePaint { body, details };
-    if recipe.fields.is_empty() {
-        return group_while(body, &painted, &[], progress);
+/// Puts each second one of `seated`, which are at `images`, on the link that mirrors that of the one before it.
+fn seat_images<'p>(
+    rest_surface: &RestSurface<'_>,
+    images: impl Iterator<Item = &'p Placed>,
+    seated: &mut [MeshTaxel],
+) -> Result<()> {
+    let pairs = LinkPairs::new(rest_surface.body);
+    for (pair, image) in seated.chunks_exact_mut(2).zip(images) {
+        let [one, other] = pair else { continue };
+        let link = pairs.image(one.taxel.link);
+        *other = rest_surface.mesh_taxel(image, other.taxel.id, other.taxel.modality, &BTreeSet::from([link as u32]));
+        if other.taxel.link != link {
+            let name = |link: usize| &rest_surface.body.links[link].name;
+            return Err(failed!(
+                "`mirror`: taxel {} is on link `{}`, but its mirror image is not on `{}`: the mesh is bound to the two unlike; leave                  `mirror` out",
+                one.taxel.id,
+                name(one.taxel.link),
+                name(link)
+            ));
+        }
     }
-    let mut grower = Grouper::new(body, &painted);
+    Ok(())
+}
+
+/// The fields of `recipe` over the taxels of `body`, with notes; `pairs` has the ids of taxels that are mirror images.
+fn group(
+    body: &Body,
+    details: &Details,
+    recipe: &Recipe,
+    pairs: &[[u32; 2]],
+    progress: Progress<'_>,
+) -> Result<Grouping> {
+    let painted = FilePaint { body, details };
+    let mut grower = Grouper::new(body, &painted).with_pairs(pairs);
+    if recipe.fields.is_empty() {
+        grower.apply_usual()?;
+        return grower.finish_while(progress).map_err(|(_, e)| e);
+    }
     for (rule, at) in &recipe.fields {
         grower.apply(rule).map_err(|e| at.put(e))?;
     }

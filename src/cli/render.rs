@@ -21,7 +21,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic render robot.glb -o robot.png
   somatic render hand -o palm.png --field 'hand/palm*' --view top,bottom
-  somatic render humanoid -o chart.png --uv head/skull/patch_14
+  somatic render humanoid -o chart.png --uv head/skull/front_2
   somatic render hand -o hand.png --ids --look-at hand/palm --view bottom
   somatic render hand -o edges.png --edges
   somatic render hand -o touch.png --source touch.csv --at 2.9

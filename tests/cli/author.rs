@@ -82,6 +82,20 @@ fn flags_say_how_even_taxels_are_and_where() {
     let out = ["author", "humanoid", "--taxels", "9", "-o", "/no/such/folder/out.glb"];
     assert!(fails(2, &[&out[..], &["--clear", "wide"]].concat()).contains("--clear"));
     assert!(fails(2, &[&out[..], &["--even", "maybe"]].concat()).contains("--even"));
+    assert!(fails(2, &[&out[..], &["--mirror", "x"]].concat()).contains("--mirror"));
+    assert!(fails(2, &["author", "humanoid", "--mirror", "y", "-o", "/no/such/folder/out.glb"]).contains("--taxels"));
+}
+
+#[test]
+fn a_mirrored_skin_says_which_ids_are_pairs() {
+    let (_folder, path, text) = skin(&["--taxels", "300", "--mirror", "y"]);
+    assert!(text.contains("150 pairs"), "{text}");
+    let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    let all = told["fields"].as_array().unwrap().iter().filter_map(|field| field["name"].as_str());
+    let names: Vec<&str> = all.filter(|name| name.matches('/').count() < 2).collect();
+    let paired = |left: &&&str| left.contains("left") && names.contains(&left.replace("left", "right").as_str());
+    let lefts = names.iter().filter(|name| name.contains("left")).count();
+    assert!(lefts > 10 && names.iter().filter(paired).count() == lefts, "{names:?}");
 }
 
 #[test]

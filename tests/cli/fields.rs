@@ -38,28 +38,34 @@ fn a_recipe_groups_what_it_places() {
         patches = 2
         wrap = "split"
         [[fields]]
-        within = "left_arm/forearm/patch_*"
+        within = "left_arm/forearm/*"
         name = "spot"
-        seeds = "left_arm/forearm/patch_*"
+        seeds = "left_arm/forearm/*"
         radius = "15 mm"
         chart = "plane"
         wrap = "bare"
     "#;
     let (_, seen) = author("humanoid", text);
     let names = names(&seen);
-    for name in ["left_arm", "left_arm/forearm", "left_arm/forearm/patch_01", "left_arm/forearm/patch_02"] {
-        assert!(names.contains(&name), "{name} in {names:?}");
+    let below = |name: &&&str| name.starts_with("left_arm/forearm/") && name.matches('/').count() == 2;
+    let patches: Vec<&&str> = names.iter().filter(below).collect();
+    let [one, other] = patches[..] else { panic!("{names:?}") };
+    for side in [one, other].map(|name| name.rsplit('/').next().unwrap()) {
+        let words = ["front", "back", "inner", "outer", "top", "bottom", "around"];
+        assert!(words.iter().any(|word| side == format!("{word}_1") || side == format!("{word}_2")), "{side}");
     }
+    assert!(names.contains(&"left_arm") && names.contains(&"left_arm/forearm"), "{names:?}");
     let find = |name: &str| seen["fields"].as_array().unwrap().iter().find(|field| field["name"] == name).unwrap();
-    assert_eq!(find("left_arm/forearm/patch_02")["parent"], "left_arm/forearm");
+    assert_eq!(find(other)["parent"], "left_arm/forearm");
     assert_eq!(find("left_arm/forearm")["anchor"], "left_forearm");
     // Everything of the forearm is in one of its patches.
     let members = |name: &str| find(name)["members"].as_array().unwrap().len();
     let whole = members("left_arm/forearm");
-    assert_eq!(members("left_arm/forearm/patch_01") + members("left_arm/forearm/patch_02"), whole);
+    assert_eq!(members(one) + members(other), whole);
     // Each leaf that holds the forearm's skin has a chart, or was split into some that have.
     let has_children = |name: &str| names.iter().any(|other| other.starts_with(&format!("{name}/")));
-    let leaves = names.iter().filter(|name| name.contains("/part_") && !has_children(name));
+    let is_part = |name: &&&str| name.starts_with("left_arm/forearm/") && name.matches('/').count() == 3;
+    let leaves = names.iter().filter(is_part).filter(|name| !name.contains("/spot") && !has_children(name));
     for leaf in leaves {
         assert!(find(leaf)["chart"].is_object(), "{leaf}");
     }

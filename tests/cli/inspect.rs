@@ -63,7 +63,7 @@ fn json_has_the_keys_that_others_lean_on() {
 fn a_report_names_links_fields_and_why_a_chart_is_missing() {
     let text = done(&["inspect", "humanoid"]);
     for words in
-        ["960", "coverage  99.", "├ left_upper_arm", "head/skull/patch_14", "none: its taxels sit on 17 links", "plane"]
+        ["960", "coverage  99.", "├ left_upper_arm", "head/skull/front_2", "none: its taxels sit on 17 links", "plane"]
     {
         assert!(text.contains(words), "{words}: {text}");
     }

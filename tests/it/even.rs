@@ -7,7 +7,7 @@ use somatic::author::{Authored, Recipe, author, cell_spread, place_evenly};
 use somatic::body::{Glb, MeshData, Original};
 
 /// A box between two corners, outside out, six sides of `n` × `n` squares; without the one on top if it is `open`.
-fn block([low, high]: [DVec3; 2], n: u32, is_open: bool) -> MeshData {
+pub(crate) fn block([low, high]: [DVec3; 2], n: u32, is_open: bool) -> MeshData {
     let mut mesh = MeshData::default();
     for axis in 0..3 {
         for side in 0..2 {
@@ -36,7 +36,7 @@ fn block([low, high]: [DVec3; 2], n: u32, is_open: bool) -> MeshData {
 }
 
 /// Links with a mesh each.
-fn body(meshes: &[(&str, MeshData)]) -> Original {
+pub(crate) fn body(meshes: &[(&str, MeshData)]) -> Original {
     let mut glb = Glb::new();
     for (name, mesh) in meshes {
         let link = glb.node(name, None, DVec3::ZERO);
@@ -45,7 +45,7 @@ fn body(meshes: &[(&str, MeshData)]) -> Original {
     Original::from_bytes("boxes", &glb.to_bytes().unwrap(), None).unwrap()
 }
 
-fn made(file: &Original, text: &str) -> Authored {
+pub(crate) fn made(file: &Original, text: &str) -> Authored {
     author(file.clone(), &Recipe::parse("recipe.toml", text, Path::new("")).unwrap(), |_| {}).unwrap()
 }
 

@@ -250,7 +250,7 @@ fn fields_nest_and_overlap_at_once() {
         name = "left_arm/forearm"
         patches = 4
         [[fields]]
-        within = "left_arm/forearm/patch_*"
+        within = "left_arm/forearm/top_*"
         radius = "9 mm"
         overlap = 0.5
         [[fields]]
@@ -258,7 +258,7 @@ fn fields_nest_and_overlap_at_once() {
         taxels = [3, "10..=20"]
         weight = 0.5
         [[fields]]
-        within = "left_arm/forearm/patch_0[12]"
+        within = "left_arm/forearm/top_[34]"
         name = "core"
         taxels = ["0..=200"]
     "#;
@@ -266,13 +266,13 @@ fn fields_nest_and_overlap_at_once() {
     let spot = field(&grouping, "left_arm/spot");
     assert_eq!(ids(spot), [3].into_iter().chain(10..=20).collect::<Vec<_>>());
     assert!(spot.members.values().all(|member| member.weight == 0.5));
-    assert_eq!(field(&grouping, "left_arm/forearm/patch_01").parent.as_deref(), Some("left_arm/forearm"));
+    assert_eq!(field(&grouping, "left_arm/forearm/top_1").parent.as_deref(), Some("left_arm/forearm"));
     assert_eq!(field(&grouping, "left_arm/forearm").parent.as_deref(), Some("left_arm"));
     assert_eq!(field(&grouping, "left_arm").parent, None);
-    let patch: BTreeSet<u32> = ids(field(&grouping, "left_arm/forearm/patch_02")).into_iter().collect();
-    let disc = field(&grouping, "left_arm/forearm/patch_02/disc_01");
+    let patch: BTreeSet<u32> = ids(field(&grouping, "left_arm/forearm/top_2")).into_iter().collect();
+    let disc = field(&grouping, "left_arm/forearm/top_2/disc_01");
     assert!(ids(disc).iter().all(|id| patch.contains(id)));
-    assert!(ids(field(&grouping, "left_arm/forearm/patch_01/core")).iter().all(|&id| id <= 200));
+    assert!(ids(field(&grouping, "left_arm/forearm/top_4/core")).iter().all(|&id| id <= 200));
     // Every parent comes before its children, and all of it is what a file can hold.
     let mut seen = BTreeSet::new();
     for field in &grouping.fields {
@@ -368,7 +368,9 @@ fn a_field_around_a_limb_is_named_split_or_refused() {
         let complete = complete(&limb, &grouping);
         assert!(complete.fields[0].chart.is_err() && complete.fields[0].members.len() == limb.taxels.len());
         let parts = &complete.fields[1..];
-        assert!(parts.iter().all(|part| part.name.starts_with("arm/part_0") && part.parent == Some(0)));
+        // Each says where it is: no two are on the same side of so few.
+        let sides = ["front", "back", "left", "right"].map(|side| format!("arm/{side}_1"));
+        assert!(parts.iter().all(|part| sides.contains(&part.name) && part.parent == Some(0)), "{parts:?}");
         assert_eq!(parts.iter().map(|part| part.members.len()).sum::<usize>(), limb.taxels.len());
         parts.iter().map(|part| part.chart.clone().unwrap()).collect::<Vec<_>>()
     };

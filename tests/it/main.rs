@@ -33,6 +33,7 @@ mod legal;
 mod letters;
 mod lint;
 mod meshes;
+mod mirrored;
 mod motion;
 mod on_skin;
 mod paths;

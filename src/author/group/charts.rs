@@ -6,7 +6,6 @@ use glam::{DVec2, DVec3};
 
 use super::axis::least_axis;
 use super::chart_notes::{self, ChartNotes, POOR_DISTORTION};
-use super::divide::numbered;
 use super::grouper::{FieldDraft, Grouper, Grouping};
 use super::rule::{ChartWish, Wrap};
 use crate::author::placed::{Progress, report_progress};
@@ -190,8 +189,9 @@ impl Grouper<'_> {
         let parts = self.parts(made, whole, bare, &taxels, most);
         let mut parts = parts?;
         parts.sort_by_key(|part| part.members.keys().next().copied());
-        let names = numbered("part", vec![Vec::new(); parts.len()]);
-        for (part, (name, _)) in parts.iter_mut().zip(names) {
+        let members = |part: &FieldSpec| part.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
+        let names = self.side_names(&parts.iter().map(members).collect::<Vec<_>>());
+        for (part, name) in parts.iter_mut().zip(names) {
             part.name = format!("{}/{name}", whole.name);
         }
         Some(parts)
@@ -206,6 +206,19 @@ impl Grouper<'_> {
         taxels: &[usize],
         most: usize,
     ) -> Option<Vec<FieldSpec>> {
+        let halves = self.halves.of(taxels);
+        if halves.iter().all(|half| !half.is_empty()) {
+            // A mirrored layout is divided where it is mirrored.
+            let mut parts = Vec::new();
+            for (half, after) in halves.iter().zip([1, 0]) {
+                let room = most.checked_sub(parts.len() + after).filter(|&room| room > 0)?;
+                match self.part(made, whole, bare, half) {
+                    Some(part) => parts.push(part),
+                    None => parts.extend(self.parts(made, whole, bare, half, room)?),
+                }
+            }
+            return Some(parts);
+        }
         for count in SECTOR_COUNTS {
             let sectors = self.sectors(taxels, count);
             if sectors.len() > 1
@@ -248,8 +261,13 @@ impl Grouper<'_> {
         self.fit(made, &part, plane).ok()
     }
 
-    /// `taxels` in `count` sectors by the direction of their normals around the axis most perpendicular to them.
+    /// `taxels` in `count` sectors by the direction of their normals around the axis most perpendicular to them; on the right half of a
+    /// mirrored layout the images of those of their images.
     fn sectors(&self, taxels: &[usize], count: usize) -> Vec<Vec<usize>> {
+        if self.halves.is_right(taxels) == Some(true) {
+            let of_images = self.sectors(&self.halves.images(taxels), count);
+            return of_images.iter().map(|sector| self.halves.images(sector)).collect();
+        }
         let normals: Vec<DVec3> = taxels.iter().map(|&taxel| self.body.taxels[taxel].normal_in_link).collect();
         let axis = least_axis(&normals);
         let mean = normals.iter().sum::<DVec3>();

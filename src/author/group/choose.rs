@@ -124,7 +124,7 @@ impl Grouper<'_> {
         let mut nameless = 0;
         for &taxel in chosen {
             let name = match each {
-                Each::Link => Some(body.links[body.taxels[taxel].link].name.clone()),
+                Each::Link => Some(self.link_names[body.taxels[taxel].link].clone()),
                 Each::Mesh => self.taxel_place(taxel).map(|(s, ..)| body.surfaces[s].name.clone()),
                 Each::Material => {
                     self.taxel_place(taxel).and_then(|(s, t, _)| painted.material(s, t)).map(str::to_owned)

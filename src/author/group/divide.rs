@@ -46,7 +46,10 @@ impl Grouper<'_> {
         if let Some(wanted) = rule.patches {
             let count = match wanted {
                 Patches::Number(number) => number,
-                Patches::Of { of, even: true } => return Ok(numbered(&stem("patch"), self.even_patches(chosen, of))),
+                Patches::Of { of, even: true } => {
+                    let patches = self.even_patches(chosen, of);
+                    return Ok(self.named(rule, patches));
+                }
                 Patches::Of { of, .. } => chosen.len().div_ceil(of),
             };
             // No patch is empty.
@@ -59,7 +62,7 @@ impl Grouper<'_> {
                     patches.len()
                 ));
             }
-            return Ok(numbered(&stem("patch"), patches));
+            return Ok(self.named(rule, patches));
         }
         if rule.radius.is_some() || rule.seeds.is_some() {
             let discs = self.discs(rule, chosen)?;
@@ -72,6 +75,14 @@ impl Grouper<'_> {
             return Ok(self.runs(chosen, columns, &stem("column"), false));
         }
         Ok(Vec::new())
+    }
+
+    /// `patches` by the stem that `rule` gives, or by the sides that they are on.
+    fn named(&self, rule: &FieldRule, patches: Vec<Vec<usize>>) -> Children {
+        match &rule.stem {
+            Some(stem) => numbered(stem, patches),
+            None => self.side_names(&patches).into_iter().zip(patches).collect(),
+        }
     }
 
     fn rule_name(&self, rule: &FieldRule) -> String {
@@ -95,6 +106,30 @@ impl Grouper<'_> {
 
     /// `chosen` in `count` patches, or more if they are on more links or surface parts, ordered by lowest id.
     pub(super) fn patches(&mut self, chosen: &[usize], count: usize, most_rounds: usize) -> Vec<Vec<usize>> {
+        self.by_halves(chosen, |grouper, taxels| {
+            let share = (count * taxels.len()).div_ceil(chosen.len().max(1));
+            grouper.compact_patches(taxels, share, most_rounds)
+        })
+    }
+
+    /// The patches that `divide` makes of `chosen`: in a mirrored layout, of those on the left, and of the images of those on the right.
+    fn by_halves(
+        &mut self,
+        chosen: &[usize],
+        mut divide: impl FnMut(&mut Self, &[usize]) -> Vec<Vec<usize>>,
+    ) -> Vec<Vec<usize>> {
+        let [left, right] = self.halves.of(chosen);
+        if right.is_empty() {
+            return divide(self, chosen);
+        }
+        let images = self.halves.images(&right);
+        let mut patches = if left.is_empty() { Vec::new() } else { divide(self, &left) };
+        let mirrored = if images == left { patches.clone() } else { divide(self, &images) };
+        patches.extend(mirrored.iter().map(|patch| self.halves.images(patch)));
+        sorted(patches)
+    }
+
+    fn compact_patches(&mut self, chosen: &[usize], count: usize, most_rounds: usize) -> Vec<Vec<usize>> {
         let mut links = self.distances(chosen);
         let bounded = *self.unroller.windows_left();
         links.iter_mut().for_each(|distances| distances.windows_left = bounded);
@@ -109,13 +144,16 @@ impl Grouper<'_> {
 
     /// `chosen` in patches of about `of` taxels, equal in number on each link and surface part, ordered by lowest id.
     pub(super) fn even_patches(&mut self, chosen: &[usize], of: usize) -> Vec<Vec<usize>> {
-        let mut links = self.distances(chosen);
-        let mut patches = Vec::new();
-        for distances in &mut links {
-            let of_link = even_patches(distances, of);
-            patches.extend(of_link.into_iter().map(|patch| patch.into_iter().map(|i| distances.taxels[i]).collect()));
-        }
-        sorted(patches)
+        self.by_halves(chosen, |grouper, taxels| {
+            let mut links = grouper.distances(taxels);
+            let mut patches = Vec::new();
+            for distances in &mut links {
+                let of_link = even_patches(distances, of);
+                let taxels = |patch: Vec<usize>| patch.into_iter().map(|i| distances.taxels[i]).collect();
+                patches.extend(of_link.into_iter().map(taxels));
+            }
+            sorted(patches)
+        })
     }
 
     fn note_approximate(&mut self, links: &[LinkDistances]) {

@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use super::halves::Halves;
+use super::link_names::link_names;
 use super::painted::Painted;
 use super::rule::{ChartWish, FieldRule, Wrap};
-use crate::author::placed::Progress;
+use crate::author::link_pairs::LinkPairs;
 use crate::body::{Body, FieldSpec, MemberSpec};
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::{Unroller, unions};
@@ -36,16 +38,6 @@ pub struct Grouping {
 /// A rule is inconsistent, names something that does not exist, or refuses a field that cannot have its chart. The message
 /// begins with the number of the rule, from 1.
 pub fn group(body: &Body, painted: &dyn Painted, rules: &[FieldRule]) -> Result<Grouping> {
-    group_while(body, painted, rules, &mut |_| true)
-}
-
-/// The same until `progress`, which gets the share that is done, says to stop.
-pub(in crate::author) fn group_while(
-    body: &Body,
-    painted: &dyn Painted,
-    rules: &[FieldRule],
-    progress: Progress<'_>,
-) -> Result<Grouping> {
     let mut grower = Grouper::new(body, painted);
     for (rule, number) in rules.iter().zip(1..) {
         grower.apply(rule).map_err(|e| e.at(format!("field rule {number}")))?;
@@ -53,7 +45,7 @@ pub(in crate::author) fn group_while(
     if rules.is_empty() {
         grower.apply_usual()?;
     }
-    grower.finish_while(progress).map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
+    grower.finish().map_err(|(rule, e)| e.at(format!("field rule {}", rule + 1)))
 }
 
 /// A field to which a rule is applied, and its taxels.
@@ -76,6 +68,11 @@ pub struct Grouper<'a> {
     pub(super) body: &'a Body,
     pub(super) painted: &'a dyn Painted,
     pub(super) unroller: Unroller<'a>,
+    /// What fields of links are called.
+    pub(super) link_names: Vec<String>,
+    pub(super) pairs: LinkPairs,
+    /// Taxels that are mirror images of each other.
+    pub(super) halves: Halves,
     /// Cached places of taxels on the surface.
     pub(super) taxel_places: BTreeMap<usize, Option<(usize, usize, [f64; 3])>>,
     /// A parent before its children.
@@ -97,6 +94,9 @@ impl<'a> Grouper<'a> {
             body,
             painted,
             unroller: Unroller::new(body),
+            link_names: link_names(body),
+            pairs: LinkPairs::new(body),
+            halves: Halves::default(),
             taxel_places: BTreeMap::new(),
             made: Vec::new(),
             index_of: HashMap::new(),
@@ -105,6 +105,12 @@ impl<'a> Grouper<'a> {
             applied: 0,
             memberships: 0,
         }
+    }
+
+    /// The same with taxels that are mirror images of each other, by ids, each the left one and the right one: patches are made on the
+    /// left, and mirrored.
+    pub(in crate::author) fn with_pairs(self, pairs: &[[u32; 2]]) -> Self {
+        Self { halves: Halves::new(self.body, pairs), ..self }
     }
 
     /// Makes the fields of `rule`.

@@ -11,13 +11,15 @@ mod distances;
 mod divide;
 mod even;
 mod grouper;
+mod halves;
+mod link_names;
 mod painted;
 mod patches;
 mod rule;
+mod side_names;
 mod usual;
 
 pub use charts::MAX_PLANE_DISTORTION;
-pub(super) use grouper::group_while;
 pub use grouper::{Grouper, Grouping, group};
 pub(super) use painted::FilePaint;
 pub use painted::Painted;

@@ -11,16 +11,17 @@ use crate::error::{Error, Result};
 /// [[fields]]
 /// name = "left_arm/forearm"      # makes `left_arm` too, which holds what is below it
 /// link = "l_forearm"
-/// patches = { of = 16 }          # left_arm/forearm/patch_01, …, about 16 taxels each
+/// patches = { of = 16 }          # left_arm/forearm/inner_1, …, about 16 taxels each
 ///
 /// [[fields]]
-/// within = "left_arm/*/patch_*"  # each of them gets children of its own
-/// radius = "15 mm"               # …/patch_01/disc_01, …
+/// within = "left_arm/forearm/*"  # each of them gets children of its own
+/// radius = "15 mm"               # …/inner_1/disc_01, …
 /// overlap = 0.5
 /// ```
 ///
 /// A taxel must meet all conditions that are given. A rule makes the field `name`, or with one of `each`, `patches`, `radius`,
-/// `seeds`, `rows` and `columns` children below it, called by `stem` and a number. Every level of a name is a field.
+/// `seeds`, `rows` and `columns` children below it, called by `stem` and a number, patches without it by the
+/// side of the body that they are on. Every level of a name is a field.
 /// `docs/authoring.md` describes all keys.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -58,7 +59,7 @@ pub struct FieldRule {
     pub rows: Option<Rows>,
     /// Columns of a board.
     pub columns: Option<Rows>,
-    /// What children are called, before their number.
+    /// What children are called, before their number; patches without it are called by the sides that they are on.
     pub stem: Option<String>,
     /// The weight of every member; 1 without.
     pub weight: Option<f64>,

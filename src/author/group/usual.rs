@@ -1,6 +1,5 @@
 //! The fields that a body gets without rules.
 
-use super::divide::numbered;
 use super::grouper::Grouper;
 use super::rule::{Each, FieldRule, Patches, Wrap};
 use crate::error::{Error, Result};
@@ -13,7 +12,7 @@ impl Grouper<'_> {
     ///
     /// # Errors
     /// There is no taxel.
-    pub(super) fn apply_usual(&mut self) -> Result<()> {
+    pub(in crate::author) fn apply_usual(&mut self) -> Result<()> {
         let patches = Some(Patches::Of { of: USUAL_TAXELS, even: true });
         let rule = FieldRule { patches, wrap: Some(Wrap::Split), ..FieldRule::default() };
         let chosen = self.choose(&rule, None)?;
@@ -28,7 +27,7 @@ impl Grouper<'_> {
             }
             // Its taxels are those of its patches; it need not have a chart.
             self.add(&link, &[], &FieldRule::default())?;
-            for (patch, taxels) in numbered("patch", patches) {
+            for (patch, taxels) in self.side_names(&patches).into_iter().zip(patches) {
                 self.add(&format!("{link}/{patch}"), &taxels, &rule)?;
             }
         }

@@ -32,6 +32,7 @@ struct File {
     #[serde(default)]
     hidden: HiddenSurface,
     clear: Option<Length>,
+    mirror: Option<MirrorAxis>,
     #[serde(default)]
     existing: Existing,
     #[serde(default)]
@@ -58,6 +59,13 @@ enum HiddenSurface {
     #[default]
     Drop,
     Keep,
+}
+
+/// The axis of the world that the mirror plane is perpendicular to.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum MirrorAxis {
+    Y,
 }
 
 #[derive(Deserialize)]
@@ -153,6 +161,7 @@ fn parse(recipe_text: RecipeText<'_>, folder: &Path) -> Result<Recipe> {
     recipe.is_scattered = file.even == Some(false);
     recipe.keeps_hidden = file.hidden == HiddenSurface::Keep;
     recipe.clear_m = file.clear.map(|length| length.metres);
+    recipe.is_mirrored = matches!(file.mirror, Some(MirrorAxis::Y));
     if let Some(unit) = &file.unit {
         let metres = unit_metres(unit.get_ref()).map_err(|e| text.wrong(unit.span(), e.to_string()))?;
         recipe.unit = Some((unit.get_ref().clone(), metres));

@@ -60,6 +60,8 @@ pub struct Recipe {
     pub(in crate::author) keeps_hidden: bool,
     /// How far sampled taxels are from borders of links and seams at least, m.
     pub(in crate::author) clear_m: Option<f64>,
+    /// Whether the two sides of the body, by the plane y = 0 of the world, get the same taxels.
+    pub(in crate::author) is_mirrored: bool,
 }
 
 /// Taxels of one kind on some regions.
@@ -191,6 +193,12 @@ impl Recipe {
     pub fn with_clear(self, length: &str) -> Result<Self> {
         let length: Length = length.parse().map_err(|e: Error| Error::usage(e.to_string()))?;
         Ok(Self { clear_m: Some(length.metres), ..self })
+    }
+
+    /// The same with the same taxels on both sides of the body (`true`): sampled left of the world's plane y = 0, and mirrored in it.
+    #[must_use]
+    pub fn with_mirror(self, is_mirrored: bool) -> Self {
+        Self { is_mirrored, ..self }
     }
 
     /// The same with the mesh file's numbers in `unit`: `um`, `mm`, `cm` or `m`.

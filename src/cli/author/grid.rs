@@ -19,7 +19,7 @@ pub(super) struct GridArguments {
     /// sheet is one link and one field, called as the output, and a taxel has the area of its cell. In the link's frame, x
     /// runs along the columns, z down the rows, and y is the normal.
     #[arg(long, value_name = "ROWSxCOLUMNS", requires = "pitch", help_heading = HEADING,
-        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear"])]
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror"])]
     grid: Option<Pair>,
 
     /// From one sensor to the next, such as 8.6mm; as 8.6mm,5mm from one row to the next, and from one column to the next.

@@ -96,6 +96,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "LENGTH")]
     clear: Option<String>,
 
+    /// The same layout on both sides: taxels are placed to the left of the plane that this axis of the world is perpendicular to, and
+    /// mirrored in it; y is the axis from right to left.
+    #[arg(long, value_name = "AXIS")]
+    mirror: Option<MirrorWord>,
+
     /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
@@ -132,6 +137,11 @@ enum EvenWord {
 enum HiddenWord {
     Drop,
     Keep,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MirrorWord {
+    Y,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
@@ -185,6 +195,12 @@ fn recipe(arguments: &Arguments) -> Result<Recipe> {
     }
     if let Some(clear) = &arguments.clear {
         recipe = recipe.with_clear(clear).map_err(|e| e.at("--clear"))?;
+    }
+    if let Some(MirrorWord::Y) = arguments.mirror {
+        if recipe.is_empty() {
+            return Err(Error::usage("it is for taxels to be placed; give --taxels or --recipe").at("--mirror"));
+        }
+        recipe = recipe.with_mirror(true);
     }
     if let Some(unit) = &arguments.unit {
         recipe = recipe.with_unit(unit).map_err(|e| e.at("--unit"))?;

@@ -15,23 +15,23 @@ const HEADING: &str = "Skins of others, which have their places";
 pub(super) struct SkinArguments {
     /// The iCub's position files, one for each part, as a body without a mesh: a link for each.
     #[arg(long, value_name = "FILE", num_args = 1.., help_heading = HEADING,
-        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "grid", "urdf_skin", "mjcf_skin", "csv_skin"])]
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid", "urdf_skin", "mjcf_skin", "csv_skin"])]
     icub: Vec<PathBuf>,
 
     /// A robot whose .urdf has its skin, as <sensor> with <tactile>, in an <array> or as <taxel>s; with --geometry none only
     /// the taxels are taken.
     #[arg(long, value_name = "FILE.urdf", help_heading = HEADING,
-        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "grid", "mjcf_skin", "csv_skin"])]
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid", "mjcf_skin", "csv_skin"])]
     urdf_skin: Option<PathBuf>,
 
     /// A robot for MuJoCo whose .xml has its skin, as <tactile> sensors on meshes and as touch_grid sensors.
     #[arg(long, value_name = "FILE.xml", help_heading = HEADING,
-        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "grid", "csv_skin"])]
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid", "csv_skin"])]
     mjcf_skin: Option<PathBuf>,
 
     /// A table of taxels, as `somatic convert SKIN.glb -o FILE.csv` writes it, as a body without a mesh.
     #[arg(long, value_name = "FILE.csv", help_heading = HEADING,
-        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "grid"])]
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid"])]
     csv_skin: Option<PathBuf>,
 }
 
