@@ -102,7 +102,9 @@ impl Fill<'_> {
             return Err(Error::failed("no place of the grid is on the region; make `pitch` smaller or move `origin`"));
         }
         if let Some(tear) = worst_tear(lattice, &laid, self.rest_surface, region) {
-            return Err(self.torn(lattice, &tear, laid.placed.len()));
+            let chosen = (0..region.len()).filter(|&triangle| region[triangle]);
+            let area_m2: f64 = chosen.map(|triangle| self.rest_surface.area(triangle)).sum();
+            return Err(self.torn(lattice, &tear, (area_m2 / lattice.cell_m2()).round().max(1.0) as usize));
         }
         let LaidGrid { placed, reached_share, .. } = laid;
         let name = &self.place.name;
@@ -136,7 +138,7 @@ impl Fill<'_> {
         Ok(placed.into_iter().map(|placed| Snapped { placed, id: None, moved_m: 0.0 }).collect())
     }
 
-    /// The error on a grid that does not keep its pitch, and would have `count` points.
+    /// The error on a grid that does not keep its pitch, instead of which `count` taxels are as dense.
     fn torn(&self, lattice: &Lattice, tear: &Tear, count: usize) -> Error {
         let named: Vec<String> = self.place.regions.iter().map(|name| format!("`{name}`")).collect();
         let region = match named.len() {
