@@ -380,5 +380,8 @@ def author(
     regions: Sequence[str] = ...,
     seed: int | None = None,
     unit: str | None = None,
+    even: bool | None = None,
+    hidden: Literal["drop", "keep"] | None = None,
+    clear: str | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Body: ...

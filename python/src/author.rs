@@ -17,15 +17,16 @@ use crate::threads::free;
 ///
 /// `shape` is a file (.glb, .gltf, .stl, .obj, .dae, .ply or .urdf) or a bundled body. Either `recipe`, the path of a file that
 /// docs/authoring.md describes; or `taxels`, how many, `spacing`, such as '8 mm', or both, on the nodes, meshes or links whose names match
-/// one of the globs `regions`. `unit` says what the file's numbers are: 'um', 'mm', 'cm' or 'm'. `progress` is called with the
-/// share that is done, 0 to 1.
+/// one of the globs `regions`. `unit` says what the file's numbers are: 'um', 'mm', 'cm' or 'm'. `even=False` leaves taxels where they
+/// were scattered, `hidden='keep'` places some where nothing can touch them, and `clear`, such as '5 mm', is their least distance from
+/// where a link, a mesh or the surface ends; without them the recipe's hold. `progress` is called with the share that is done, 0 to 1.
 ///
 /// >>> import somatic_touch as st
 /// >>> body = st.author("hand", taxels=60, seed=1)
 /// >>> len(body.taxels)
 /// 60
 #[pyfunction]
-#[pyo3(signature = (shape, recipe = None, *, taxels = None, spacing = None, regions = Vec::new(), seed = None, unit = None, progress = None))]
+#[pyo3(signature = (shape, recipe = None, *, taxels = None, spacing = None, regions = Vec::new(), seed = None, unit = None, even = None, hidden = None, clear = None, progress = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn author(
     py: Python<'_>,
@@ -36,6 +37,9 @@ pub(crate) fn author(
     regions: Vec<String>,
     seed: Option<u64>,
     unit: Option<&str>,
+    even: Option<bool>,
+    hidden: Option<&str>,
+    clear: Option<&str>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyBody> {
     let mut made = match &recipe {
@@ -51,6 +55,20 @@ pub(crate) fn author(
     }
     if let Some(unit) = unit {
         made = made.with_unit(unit).map_err(|e| e.at("unit")).or_raise(py)?;
+    }
+    if let Some(even) = even {
+        made = made.with_even(even);
+    }
+    if let Some(hidden) = hidden {
+        let keep = match hidden {
+            "keep" => Ok(true),
+            "drop" => Ok(false),
+            _ => Err(Error::usage(format!("hidden: there is no '{hidden}'; it is 'drop' or 'keep'"))),
+        };
+        made = made.with_hidden(keep.or_raise(py)?);
+    }
+    if let Some(clear) = clear {
+        made = made.with_clear(clear).map_err(|e| e.at("clear")).or_raise(py)?;
     }
     let mut raised = None;
     let done = free(py, || {

@@ -16,6 +16,7 @@ use super::relax::{MOST_POINTS, Weight, relax};
 use super::rest_surface::RestSurface;
 use super::scatter::most_apart;
 use super::shares::{left_out, scatter, shares};
+use super::tear::{Tear, worst_tear};
 use crate::body::{Topology, listed};
 use crate::error::{Error, Result, failed};
 use crate::field::Divided;
@@ -103,10 +104,16 @@ impl Fill<'_> {
         notes: &mut Vec<String>,
         progress: Progress<'_>,
     ) -> Result<Vec<Snapped>> {
-        let LaidGrid { placed, reached_share } = lattice.lay(self.rest_surface, region, progress)?;
-        if placed.is_empty() {
+        let laid = lattice.lay(self.rest_surface, region, progress)?;
+        if laid.placed.is_empty() {
             return Err(Error::failed("no place of the grid is on the region; make `pitch` smaller or move `origin`"));
         }
+        if let Some(tear) = worst_tear(lattice, &laid, self.rest_surface, region) {
+            let chosen = (0..region.len()).filter(|&triangle| region[triangle]);
+            let area_m2: f64 = chosen.map(|triangle| self.rest_surface.area(triangle)).sum();
+            return Err(self.torn(lattice, &tear, (area_m2 / lattice.cell_m2()).round().max(1.0) as usize));
+        }
+        let LaidGrid { placed, reached_share, .. } = laid;
         let name = &self.place.name;
         if reached_share < 0.999 {
             notes.push(format!(
@@ -150,6 +157,24 @@ impl Fill<'_> {
         let triangles: Vec<[u32; 3]> = chosen.iter().map(|&triangle| self.rest_surface.triangles[triangle]).collect();
         let topology = Topology::of_groups(positions, &triangles, &|vertex| self.rest_surface.group_of(vertex));
         Surface { positions, triangles, chosen, topology }
+    }
+
+    /// The error on a grid that does not keep its pitch, instead of which `count` taxels are as dense.
+    fn torn(&self, lattice: &Lattice, tear: &Tear, count: usize) -> Error {
+        let named: Vec<String> = self.place.regions.iter().map(|name| format!("`{name}`")).collect();
+        let region = match named.len() {
+            0 => "the whole surface".to_owned(),
+            1 => format!("region {}", named[0]),
+            _ => format!("regions {}", listed(&named)),
+        };
+        let [from, to] = tear.ends.map(|p| format!("({:.3}, {:.3}, {:.3})", p.x, p.y, p.z));
+        failed!(
+            "a {} grid with a pitch of {} tears on {region}, which does not unroll: its points at {from} and {to} m are neighbours \
+             {:.1} mm apart; write `taxels = {count}` instead of `grid` and `pitch`, for taxels that are spread evenly",
+            if lattice.hexagonal { "hexagonal" } else { "rectangular" },
+            shown(lattice.pitch_m),
+            tear.distance_m * 1e3
+        )
     }
 
     /// Taxels sampled on the triangles `chosen`.

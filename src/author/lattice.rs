@@ -1,5 +1,7 @@
 //! Taxels on a hexagonal or rectangular grid in a geodesic chart, found by straight walks over the surface from its origin.
 
+use std::collections::BTreeSet;
+
 use glam::{DVec2, DVec3};
 
 use super::grid::Grid;
@@ -28,9 +30,16 @@ pub(super) struct Lattice {
     pub(super) u: Option<DVec3>,
 }
 
+/// A place of the grid: its column and its row, from the origin.
+pub(super) type GridCell = [i64; 2];
+
 pub(super) struct LaidGrid {
     /// Row by row, each with the area of a cell of the grid.
     pub(super) placed: Vec<Placed>,
+    /// Where each of them is in the grid.
+    pub(super) cells: Vec<GridCell>,
+    /// Places in the region that got no point, as the grid comes there another way.
+    pub(super) dropped: BTreeSet<GridCell>,
     /// The share of the region's surface that is connected to the origin.
     pub(super) reached_share: f64,
 }
@@ -58,10 +67,11 @@ impl Lattice {
         let cells = self.cells(extent)?;
         report_progress(progress, 0.3)?;
         let [from, u, v, _] = map.frame();
-        let cell_area = self.pitch_m * self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 };
-        let mut found: Vec<(f64, Placed)> = Vec::new();
+        let cell_area = self.cell_m2();
+        let mut found: Vec<(f64, Placed, GridCell)> = Vec::new();
+        let mut dropped = BTreeSet::new();
         let count = cells.len();
-        for (index, cell) in cells.into_iter().enumerate() {
+        for (index, (at, cell)) in cells.into_iter().enumerate() {
             if index.is_multiple_of(512) {
                 report_progress(progress, 0.3 + 0.7 * index as f64 / count as f64)?;
             }
@@ -76,10 +86,45 @@ impl Lattice {
             if shortest >= length * (1.0 - DETOUR_TOLERANCE) {
                 let normal = area_vector(topology.corners(place.triangle)).normalize_or_zero();
                 let point = SurfacePoint { position: place.position(topology), normal, area: cell_area };
-                found.push((length, Placed { point, triangle, barycentric: place.barycentric }));
+                found.push((length, Placed { point, triangle, barycentric: place.barycentric }, at));
+            } else {
+                dropped.insert(at);
             }
         }
-        Ok(LaidGrid { placed: self.without_overlaps(found), reached_share })
+        let kept = self.without_overlaps(&found);
+        let (mut placed, mut cells) = (Vec::new(), Vec::new());
+        for ((_, one, at), is_kept) in found.into_iter().zip(kept) {
+            if is_kept {
+                placed.push(one);
+                cells.push(at);
+            } else {
+                dropped.insert(at);
+            }
+        }
+        Ok(LaidGrid { placed, cells, dropped, reached_share })
+    }
+
+    /// The area of a cell of the grid, m².
+    pub(super) fn cell_m2(&self) -> f64 {
+        self.pitch_m * self.row_m()
+    }
+
+    /// The distance between two rows, m.
+    fn row_m(&self) -> f64 {
+        self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 }
+    }
+
+    /// The places one pitch away from a place of the grid.
+    pub(super) fn around(&self, [column, row]: GridCell) -> Vec<GridCell> {
+        let mut around = vec![[column - 1, row], [column + 1, row]];
+        for next in [row - 1, row + 1] {
+            around.push([column, next]);
+            if self.hexagonal {
+                // Odd rows are half a pitch on.
+                around.push([if row % 2 == 0 { column - 1 } else { column + 1 }, next]);
+            }
+        }
+        around
     }
 
     fn start(&self, topology: &Topology, sound: &[u32]) -> Result<SurfacePlace> {
@@ -112,10 +157,11 @@ impl Lattice {
         Err(Error::failed("the region winds too far away from the grid's origin; split it"))
     }
 
-    /// The grid's points within `extent` of its origin, row by row.
-    fn cells(&self, extent: f64) -> Result<Vec<DVec2>> {
-        let row_m = self.pitch_m * if self.hexagonal { 3.0_f64.sqrt() / 2.0 } else { 1.0 };
-        let (rows, columns) = ((extent / row_m).floor(), (extent / self.pitch_m).floor() + 1.0);
+    /// The grid's places, and where they are from its origin, up to one pitch farther than `extent`, row by row.
+    fn cells(&self, extent: f64) -> Result<Vec<(GridCell, DVec2)>> {
+        let row_m = self.row_m();
+        let reach_m = extent + self.pitch_m;
+        let (rows, columns) = ((reach_m / row_m).floor(), (reach_m / self.pitch_m).floor() + 1.0);
         if 4.0 * rows * columns > MAX_GRID_POINTS {
             return Err(failed!(
                 "a grid of {} m on a region that reaches {extent:.3} m has too many places; is `pitch` in metres?",
@@ -127,18 +173,18 @@ impl Lattice {
         for row in -rows..=rows {
             let shift = if self.hexagonal && row % 2 != 0 { 0.5 } else { 0.0 };
             for column in -columns..=columns {
-                let cell = DVec2::new((column as f64 + shift) * self.pitch_m, row as f64 * row_m);
-                if cell.length() <= extent {
-                    cells.push(cell);
+                let from_origin = DVec2::new((column as f64 + shift) * self.pitch_m, row as f64 * row_m);
+                if from_origin.length() <= reach_m {
+                    cells.push(([column, row], from_origin));
                 }
             }
         }
         Ok(cells)
     }
 
-    /// Removes overlaps behind a wrapped part: of points closer than half the pitch, the one farther from the origin.
-    fn without_overlaps(&self, found: Vec<(f64, Placed)>) -> Vec<Placed> {
-        let positions: Vec<DVec3> = found.iter().map(|(_, placed)| placed.point.position).collect();
+    /// Which are left without overlaps behind a wrapped part: of points closer than half the pitch, the one farther from the origin goes.
+    fn without_overlaps(&self, found: &[(f64, Placed, GridCell)]) -> Vec<bool> {
+        let positions: Vec<DVec3> = found.iter().map(|(_, placed, _)| placed.point.position).collect();
         let grid = Grid::new(&positions, 0..positions.len() as u32, self.pitch_m / 2.0);
         let mut nearest_first: Vec<usize> = (0..found.len()).collect();
         nearest_first.sort_by(|&a, &b| found[a].0.total_cmp(&found[b].0).then(a.cmp(&b)));
@@ -152,7 +198,7 @@ impl Lattice {
             };
             kept[i] = !around.into_iter().flatten().any(meets);
         }
-        found.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|((_, placed), _)| placed).collect()
+        kept
     }
 }
 

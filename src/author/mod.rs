@@ -50,9 +50,9 @@ mod scatter;
 mod shares;
 mod sheet;
 mod skin;
-mod skin_weights;
 mod surface_search;
 mod table_body;
+mod tear;
 mod voronoi;
 
 pub use cell_spread::cell_spread;
@@ -67,5 +67,6 @@ pub use recipe::Recipe;
 pub use refresh::refresh;
 pub use sheet::{GridOrder, Sheet, SheetCell, SheetGrid, author_sheets, sheets};
 pub use skin::{Authored, PlaceReport, author, author_while};
-pub use skin_weights::{blend_skinning, heaviest_four};
 pub use table_body::author_csv_skin;
+
+pub use crate::body::{blend_skinning, heaviest_four};

@@ -6,8 +6,9 @@ use std::collections::BTreeSet;
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::placed::Placed;
-use super::skin_weights::{blend_skinning, heaviest_four};
-use crate::body::{Body, Details, Home, Modality, Paint, Skinning, Taxel, Topology, area_vector};
+use crate::body::{
+    Body, Details, Home, Modality, Paint, Skinning, Taxel, Topology, area_vector, blend_skinning, merged_skinning,
+};
 use crate::error::{Result, failed, suggestion};
 use crate::field::surface_groups;
 
@@ -68,22 +69,14 @@ impl<'a> RestSurface<'a> {
         let in_body = |link: usize, link_from_mesh: &DAffine3| self.body.links[link].body_from_link * *link_from_mesh;
         let (skinning, body_from_mesh) = match &surface.home {
             Home::Rigid { link, link_from_mesh } => (None, vec![in_body(*link, link_from_mesh)]),
-            Home::Skinned { joints, heaviest } => {
-                let skinning = merged(&self.details.parts[part].carriers, joints.len(), heaviest);
+            Home::Skinned { joints, heaviest, at_rest } => {
+                let skinning = merged_skinning(&self.details.parts[part].carriers, joints.len(), heaviest);
+                self.positions.extend_from_slice(at_rest);
                 (Some(skinning), joints.iter().map(|(link, link_from_mesh)| in_body(*link, link_from_mesh)).collect())
             }
         };
-        for (vertex, &p) in surface.positions.iter().enumerate() {
-            self.positions.push(match &skinning {
-                None => body_from_mesh[0].transform_point3(p),
-                Some(skinning) => {
-                    let rows = skinning.joints[vertex].iter().zip(&skinning.weights[vertex]);
-                    let carried = rows.filter(|(_, weight)| **weight > 0.0).map(|(&joint, &weight)| {
-                        body_from_mesh[usize::from(joint)].transform_point3(p) * f64::from(weight)
-                    });
-                    carried.sum()
-                }
-            });
+        if skinning.is_none() {
+            self.positions.extend(surface.positions.iter().map(|&p| body_from_mesh[0].transform_point3(p)));
         }
         for (index, &[a, b, c]) in surface.triangles.iter().enumerate() {
             let joint = skinning.as_ref().map(|skinning| blend_skinning(skinning, [a, b, c], [1.0 / 3.0; 3]).0[0]);
@@ -99,12 +92,6 @@ impl<'a> RestSurface<'a> {
             self.link.push(link as u32);
         }
         self.skinning.push(skinning);
-    }
-
-    /// The vertices of part `part` in the body at rest, m.
-    pub(super) fn vertices(&self, part: usize) -> &[DVec3] {
-        let from = self.first_vertex[part] as usize;
-        &self.positions[from..][..self.body.surfaces[part].positions.len()]
     }
 
     /// The group of surfaces that `vertex` is in; only those of one group are connected where they touch.
@@ -198,26 +185,4 @@ impl<'a> RestSurface<'a> {
         let taxel = Taxel { id, link, position_in_link, normal_in_link: normal, area, modality };
         MeshTaxel { part, taxel, carriers }
     }
-}
-
-/// Per vertex the four joints with the largest weights of all sets; a vertex without weights gets the joint in `heaviest`.
-fn merged(sets: &[Skinning], joints: usize, heaviest: &[usize]) -> Skinning {
-    let mut merged = Skinning::default();
-    for (vertex, &heaviest) in heaviest.iter().enumerate() {
-        let rows = sets.iter().flat_map(|set| set.joints[vertex].into_iter().zip(set.weights[vertex]));
-        let mut carriers: Vec<(u16, f64)> = Vec::new();
-        for (joint, weight) in rows.filter(|&(joint, weight)| usize::from(joint) < joints && weight.is_finite()) {
-            match carriers.iter_mut().find(|(known, _)| *known == joint) {
-                Some((_, sum)) => *sum += f64::from(weight),
-                None => carriers.push((joint, f64::from(weight))),
-            }
-        }
-        let (mut row, mut weights) = heaviest_four(carriers);
-        if weights[0] == 0.0 {
-            (row[0], weights[0]) = (heaviest as u16, 1.0);
-        }
-        merged.joints.push(row);
-        merged.weights.push(weights);
-    }
-    merged
 }

@@ -129,7 +129,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     ids.take(body.taxels.iter().map(|taxel| taxel.id), "the file", &Origin::default())?;
     let drawn = DrawnPoses::of(&body);
     let looks = !recipe.keeps_hidden && recipe.places.iter().any(|place| place.how.samples());
-    let touchable = looks.then(|| Touchable::new(&body, &drawn, |part| rest_surface.vertices(part)));
+    let touchable = looks.then(|| Touchable::new(&body, &drawn));
     let (mut reports, mut seated) = (Vec::new(), Vec::new());
     let mut pairs = Vec::new();
     // What a place over all of the surface divides it into is what the edges of its taxels are made of.

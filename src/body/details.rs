@@ -9,8 +9,8 @@ use super::document::Document;
 use super::glb::Skinning;
 use super::model::Body;
 use super::nodes::Nodes;
-use super::primitives::attribute;
 use super::read::{TaxelSource, from_document};
+use super::skin_weights::carriers;
 use crate::error::{Error, Result};
 
 /// Details of a file's surfaces, marks and taxels.
@@ -126,20 +126,6 @@ fn part(document: &Document, nodes: &Nodes<'_>, node: usize, primitive: usize, v
         carriers: if skin.is_some() { carriers(document, primitive)? } else { Vec::new() },
         paints: paints(document, primitive, vertices),
     })
-}
-
-/// All sets of joints and weights; their lengths were checked when the body was read.
-fn carriers(document: &Document, primitive: &Primitive) -> Result<Vec<Skinning>> {
-    let mut sets = Vec::new();
-    while let (Some(joints), Some(weights)) = (
-        attribute(primitive, &Semantic::Joints(sets.len() as u32)),
-        attribute(primitive, &Semantic::Weights(sets.len() as u32)),
-    ) {
-        let joints = document.integers::<4>(joints)?;
-        let joints = joints.into_iter().map(|row| row.map(|joint| u16::try_from(joint).unwrap_or(u16::MAX))).collect();
-        sets.push(Skinning { joints, weights: document.floats::<4>(weights)? });
-    }
-    Ok(sets)
 }
 
 /// Colours and custom attributes; unreadable ones are skipped.

@@ -61,6 +61,8 @@ pub enum Home {
         joints: Vec<(usize, DAffine3)>,
         /// Per vertex the joint with the largest weight.
         heaviest: Vec<usize>,
+        /// Per vertex where its four joints with the largest weights put it in the body at rest, m.
+        at_rest: Vec<DVec3>,
     },
 }
 
@@ -102,7 +104,7 @@ impl Surface {
     pub fn carrier(&self, vertex: usize) -> usize {
         match &self.home {
             Home::Rigid { link, .. } => *link,
-            Home::Skinned { joints, heaviest } => joints[heaviest[vertex]].0,
+            Home::Skinned { joints, heaviest, .. } => joints[heaviest[vertex]].0,
         }
     }
 }

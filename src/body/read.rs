@@ -14,6 +14,7 @@ use super::model::{Body, Home, Link, Modality, Surface, Taxel};
 use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
 use super::primitives::{attribute, custom, has_mode, is_taxels};
 use super::repair;
+use super::skin_weights::skinned_vertices;
 use super::stored_edges::StoredEdges;
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_BODY_BYTES, MAX_FIELD_DEPTH, MAX_TRIANGLES, MAX_VERTICES};
@@ -271,16 +272,17 @@ fn read_meshes(
             continue;
         }
         sources.surfaces.push((node, index));
+        let positions: Vec<DVec3> = positions.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect();
         let home = match &joints {
-            Some(joints) if !heaviest.is_empty() => Home::Skinned { joints: joints.clone(), heaviest },
+            Some(joints) if !heaviest.is_empty() => {
+                let ways: Vec<DAffine3> =
+                    joints.iter().map(|(link, way)| body.links[*link].body_from_link * *way).collect();
+                let at_rest = skinned_vertices(document, primitive, &positions, &heaviest, &ways).map_err(in_place)?;
+                Home::Skinned { joints: joints.clone(), heaviest, at_rest }
+            }
             _ => Home::Rigid { link: carrier, link_from_mesh: link_from_node },
         };
-        body.surfaces.push(Surface {
-            name: place.clone(),
-            positions: positions.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect(),
-            triangles,
-            home,
-        });
+        body.surfaces.push(Surface { name: place.clone(), positions, triangles, home });
     }
     Ok(())
 }

@@ -32,7 +32,7 @@ impl Body {
                     let body_from_mesh = self.links[*link].body_from_link * *link_from_mesh;
                     triangles.extend(surface.corners_through(body_from_mesh).map(|corners| (*link, corners)));
                 }
-                Home::Skinned { joints, heaviest } => {
+                Home::Skinned { joints, heaviest, .. } => {
                     let way = |&(link, way): &(usize, DAffine3)| (link, self.links[link].body_from_link * way);
                     let ways: Vec<(usize, DAffine3)> = joints.iter().map(way).collect();
                     let mirrored = ways.first().is_some_and(|(_, way)| way.matrix3.determinant() < 0.0);

@@ -38,7 +38,7 @@ impl Mesh {
             let first = mesh.positions.len() as u32;
             let (ways, of): (Vec<(usize, DAffine3)>, Option<&Vec<usize>>) = match &surface.home {
                 Home::Rigid { link, link_from_mesh } => (vec![(*link, *link_from_mesh)], None),
-                Home::Skinned { joints, heaviest } => (joints.clone(), Some(heaviest)),
+                Home::Skinned { joints, heaviest, .. } => (joints.clone(), Some(heaviest)),
             };
             for (vertex, &position) in surface.positions.iter().enumerate() {
                 let (link, link_from_mesh) = ways[of.map_or(0, |heaviest| heaviest[vertex])];

@@ -154,6 +154,10 @@ fn meshes_of_other_tools_are_covered_through_their_transforms() {
         // A tube that is bent at rest is open where the weights of its joints put it, not where its heaviest joints would.
         let is_tube = part.ends_with("03_skinned_cylinder.gltf");
         assert!(!is_tube || made.places[0].hidden_m2.is_empty(), "{:?}", made.places[0].hidden_m2);
+        // What looks for hidden taxels in a body sees the same surface as what places them.
+        let hidden = somatic::author::lint(&made.body, &[]);
+        let hidden = hidden.iter().find(|finding| finding.kind == somatic::author::FindingKind::HiddenTaxel);
+        assert!(hidden.is_none(), "{part}: {}", hidden.unwrap());
         lies_on_its_surface(&made.body);
         // Everything it needs is inside.
         assert_eq!(Body::from_bytes(part, &made.file.to_glb().unwrap()).unwrap().taxels.len(), 800);
@@ -391,6 +395,62 @@ fn a_grid_round_a_tube_meets_itself_with_room() {
     // polygon twice that.
     assert!((report.mean_spacing_m.unwrap() / 0.005 - 1.0).abs() < 0.03, "{report:?}");
     lies_on_its_surface(&laid.body);
+}
+
+/// A ball of 100 mm with a mesh called `ball`.
+fn ball() -> Original {
+    let (mut mesh, rows, sides) = (MeshData::default(), 24_u32, 48_u32);
+    for row in 0..=rows {
+        for side in 0..sides {
+            let [height, angle] = [std::f64::consts::PI / f64::from(rows), std::f64::consts::TAU / f64::from(sides)];
+            let (sin, cos) = (height * f64::from(row)).sin_cos();
+            let angle = angle * f64::from(side);
+            let normal = DVec3::new(sin * angle.cos(), sin * angle.sin(), -cos);
+            mesh.positions.push((normal * 0.1).as_vec3().to_array());
+            mesh.normals.push(normal.as_vec3().to_array());
+            if row < rows {
+                let (a, b) = (row * sides + side, row * sides + (side + 1) % sides);
+                mesh.triangles.extend([[a, b, b + sides], [a, b + sides, a + sides]]);
+            }
+        }
+    }
+    let mut glb = Glb::new();
+    let node = glb.node("ball", None, DVec3::ZERO);
+    glb.mesh(node, "ball", &mesh, None, None);
+    Original::from_bytes("ball", &glb.to_bytes().unwrap(), None).unwrap()
+}
+
+#[test]
+fn a_grid_is_refused_where_it_would_tear() {
+    let ball = ball();
+    let of = |grid: &str, region: &str| {
+        format!(
+            "[regions.cap]\n{region}\n[[place]]\nregion = \"cap\"\ngrid = \"{grid}\"\npitch = \"10 mm\"\norigin = [0, 0, 0.1]\n"
+        )
+    };
+    for grid in ["hexagonal", "rectangular"] {
+        // Up to 20° from its origin a ball narrows its circles by 2 % at most; a quarter of the way round by 36 %.
+        let cap = made(&ball, &of(grid, "box = [[-1, -1, 0.094], [1, 1, 1]]"));
+        assert!(cap.places[0].least_spacing_m.unwrap() > 0.008, "{:?}", cap.places[0]);
+        let line = why(&ball, &of(grid, "box = [[-1, -1, -1], [1, 1, 1]]"));
+        assert!(line.contains(&format!("a {grid} grid with a pitch of 10 mm tears on region `cap`")), "{line}");
+        let count: f64 = line.split("`taxels = ").nth(1).unwrap().split('`').next().unwrap().parse().unwrap();
+        assert!((count / (4.0 * std::f64::consts::PI * 0.01 / 1e-4) - 1.0).abs() < 0.2, "{line}");
+        let apart: f64 = line.split("are neighbours ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!(!(8.0..=12.5).contains(&apart), "{line}");
+    }
+    // Flat, with borders all over, and a window: whatever is in the way of its rows, it is as far as its pitch.
+    let file = drafted(1.0, &json!({}));
+    let windows =
+        "[regions.a]\nbox = [[0.04, 0.03, -1], [0.07, 0.06, 1]]\n[regions.b]\nbox = [[0.1, 0.05, -1], [0.13, 1, 1]]\n";
+    for pitch in ["3 mm", "7 mm", "20 mm"] {
+        for grid in ["hexagonal", "rectangular"] {
+            let flat = format!(
+                "{windows}[regions.all]\nexcept = [\"a\", \"b\"]\n[[place]]\nregion = \"all\"\ngrid = \"{grid}\"\npitch = \"{pitch}\"\n"
+            );
+            assert!(made(&file, &flat).body.taxels.len() > 20, "{flat}");
+        }
+    }
 }
 
 #[test]

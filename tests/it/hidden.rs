@@ -214,6 +214,66 @@ fn of_a_skinned_mesh_all_is_a_link_s_own() {
     assert_eq!(found(&body), [(FindingKind::HiddenTaxel, vec![0])]);
 }
 
+/// A closed tube along z, of two joints in its middle, the second of which is turned by 90° towards −y at rest. Its weights change within
+/// `blend_m` of the middle. Taxels are on the inside of the bend.
+fn bent_tube(blend_m: f64) -> Body {
+    let (rings, sides) = (41_u32, 24_u32);
+    let of_upper = |z: f64| ((z - 0.2 + blend_m) / (2.0 * blend_m)).clamp(0.0, 1.0) as f32;
+    let mut mesh = MeshData::default();
+    let mut skinning = Skinning::default();
+    let mut add = |p: DVec3| {
+        mesh.positions.push(p.as_vec3().to_array());
+        mesh.normals.push([0.0, 0.0, 1.0]);
+        skinning.joints.push([0, 1, 0, 0]);
+        skinning.weights.push([1.0 - of_upper(p.z), of_upper(p.z), 0.0, 0.0]);
+    };
+    for ring in 0..rings {
+        for side in 0..sides {
+            let angle = std::f64::consts::TAU * f64::from(side) / f64::from(sides);
+            add(DVec3::new(0.03 * angle.cos(), 0.03 * angle.sin(), 0.01 * f64::from(ring)));
+        }
+    }
+    add(DVec3::ZERO);
+    add(DVec3::Z * 0.4);
+    let [bottom, top, last] = [rings * sides, rings * sides + 1, (rings - 1) * sides];
+    for side in 0..sides {
+        let next = (side + 1) % sides;
+        mesh.triangles.extend([[bottom, next, side], [top, last + side, last + next]]);
+        for ring in 0..rings - 1 {
+            let [a, b] = [side, next].map(|side| ring * sides + side);
+            mesh.triangles.extend([[a, b, b + sides], [a, b + sides, a + sides]]);
+        }
+    }
+    mesh.skinning = Some(skinning);
+    let mut glb = Glb::new();
+    let root = glb.node("root", None, DVec3::ZERO);
+    let turn = glam::DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let upper = glb.placed_node("upper", Some(root), glam::DAffine3::from_rotation_translation(turn, DVec3::Z * 0.2));
+    let binds = [glam::Mat4::IDENTITY, glam::Mat4::from_translation(glam::Vec3::Z * -0.2)];
+    let skin = glb.skin("skin", &[root, upper], &binds.map(|bind| bind.to_cols_array()));
+    let shown = glb.node("skin", None, DVec3::ZERO);
+    glb.mesh(shown, "skin", &mesh, None, Some(skin));
+    let heights = [0.175, 0.185, 0.195, 0.205, 0.215, 0.225];
+    let on_inside = |(id, z): (u32, f64)| taxel(id, DVec3::new(0.0, -0.03, z), -DVec3::Y);
+    let taxels: Vec<Taxel> = (0..).zip(heights).map(on_inside).collect();
+    let carried = Skinning {
+        joints: heights.map(|z| if of_upper(z) > 0.5 { [1, 0, 0, 0] } else { [0, 1, 0, 0] }).to_vec(),
+        weights: heights
+            .map(|z| [of_upper(z).max(1.0 - of_upper(z)), of_upper(z).min(1.0 - of_upper(z)), 0.0, 0.0])
+            .to_vec(),
+    };
+    glb.taxels("taxels", Some(root), &taxels, Some((skin, &carried)));
+    Body::from_bytes("bent", &glb.to_bytes().unwrap()).unwrap()
+}
+
+#[test]
+fn a_mesh_that_is_bent_at_rest_is_seen_where_its_weights_put_it() {
+    // Where the weights of both joints round the bend, nothing is in the way; by the heaviest joint alone, each half would run into the
+    // other, as it does where the weights change at once.
+    assert_eq!(found(&bent_tube(0.1)), []);
+    assert_eq!(found(&bent_tube(1e-4)), [(FindingKind::HiddenTaxel, (0..6).collect::<Vec<u32>>())]);
+}
+
 #[test]
 fn faces_that_point_inwards_are_told_apart() {
     let taxels = on_cube(0, DVec3::ZERO, 0.1).into_iter();

@@ -173,6 +173,58 @@ fn each_defect_is_found_where_it_is_and_nothing_else() {
     assert!(near(worst, 0.06 * 2.0_f64.sqrt()));
 }
 
+/// A link of each spacing, with 20 × 20 taxels, the first at the origin; and one more taxel at each of `more`.
+fn links(spacings_m: &[f64], more: &[(usize, DVec3)]) -> Body {
+    let mut glb = Glb::new();
+    let mut id = 0;
+    for (index, &spacing_m) in spacings_m.iter().enumerate() {
+        let link = glb.node(&format!("l{index}"), None, DVec3::X * index as f64);
+        let grid = (0..400).map(|k| DVec3::new(f64::from(k % 20), f64::from(k / 20), 0.0) * spacing_m);
+        let more = more.iter().filter(|(own, _)| *own == index).map(|(_, at)| *at);
+        let model = Plate::flat().taxels[0].clone();
+        let taxel = |(id, position_in_link): (u32, DVec3)| Taxel { id, position_in_link, ..model.clone() };
+        let taxels: Vec<Taxel> = (id..).zip(grid.chain(more)).map(taxel).collect();
+        id += taxels.len() as u32;
+        glb.taxels(&format!("taxels {index}"), Some(link), &taxels, None);
+    }
+    Body::from_bytes("links", &glb.to_bytes().unwrap()).unwrap()
+}
+
+#[test]
+fn spacing_is_compared_with_what_is_usual_around() {
+    // A body whose hand is ten times as fine as its torso.
+    assert_eq!(lint_of_spacing(&links(&[0.03, 0.003], &[])), []);
+    let found = lint_of_spacing(&links(&[0.03, 0.003], &[(0, DVec3::new(0.216, 0.21, 0.0))]));
+    assert_eq!(found, [(FindingKind::CrowdedTaxels, vec![147, 400])]);
+    // What is near in the torso is far in the hand.
+    let crowded = DVec3::new(0.0216, 0.021, 0.0);
+    let found = lint_of_spacing(&links(&[0.03, 0.003], &[(1, crowded), (1, DVec3::new(-0.02, 0.0, 0.0))]));
+    assert_eq!(found, [(FindingKind::CrowdedTaxels, vec![547, 800]), (FindingKind::IsolatedTaxel, vec![801])]);
+    assert_eq!(lint_of_spacing(&links(&[0.03, 0.003], &[(0, DVec3::new(-0.03, 0.0, 0.0))])), []);
+    // The two at a fifth are found, at a fourth they are not.
+    let at = |share: f64| links(&[0.01], &[(0, DVec3::new(0.05 + 0.01 * share, 0.05, 0.0))]);
+    assert_eq!(lint_of_spacing(&at(0.2)), [(FindingKind::CrowdedTaxels, vec![105, 400])]);
+    assert_eq!(lint_of_spacing(&at(0.25)), []);
+    // A link that is coarse on one side of a line, and fine on the other.
+    let mut plate = Plate::flat();
+    plate.taxels.retain(|taxel| taxel.position_in_link.x < 0.0);
+    let model = plate.taxels[0].clone();
+    for (id, k) in (100..).zip(0..1500) {
+        let position_in_link = DVec3::new(0.0075 + 0.0015 * f64::from(k % 25), 0.0015 * f64::from(k / 25) - 0.045, 0.0);
+        plate.taxels.push(Taxel { id, position_in_link, ..model.clone() });
+    }
+    plate.fields[0].members = plate.taxels.iter().map(|taxel| (taxel.id, MemberSpec::default())).collect();
+    assert_eq!(lint_of_spacing(&plate.body()), []);
+}
+
+/// What is found of spacing in `body`, with the ids.
+fn lint_of_spacing(body: &Body) -> Vec<(FindingKind, Vec<u32>)> {
+    use FindingKind::{CoincidentTaxels, CrowdedTaxels, IsolatedTaxel};
+    let mut findings = lint(body, &[]);
+    findings.retain(|finding| matches!(finding.kind, CoincidentTaxels | CrowdedTaxels | IsolatedTaxel));
+    findings.into_iter().map(|finding| (finding.kind, finding.taxels)).collect()
+}
+
 #[test]
 fn what_editors_round_is_current() {
     let mut plate = Plate::flat();

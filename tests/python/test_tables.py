@@ -203,6 +203,16 @@ def test_bodies(somatic, tmp_path: pathlib.Path) -> None:
     shares: list[float] = []
     st.author("hand", spacing="6 mm", progress=shares.append)
     assert shares and 0 <= min(shares) <= max(shares) <= 1
+    scattered = st.author("hand", taxels=60, even=False, hidden="keep", clear="1 mm")
+    flags = ("--even", "off", "--hidden", "keep", "--clear", "1mm")
+    somatic("author", "hand", "--taxels", 60, *flags, "-o", tmp_path / "scattered.glb")
+    scattered.save(tmp_path / "mine.glb", force=True)
+    assert (tmp_path / "mine.glb").read_bytes() == (tmp_path / "scattered.glb").read_bytes()
+    assert not np.array_equal(scattered.taxels, st.author("hand", taxels=60).taxels)
+    with pytest.raises(st.UsageError, match="'drop' or 'keep'"):
+        st.author("hand", taxels=60, hidden="yes")  # type: ignore[arg-type]
+    with pytest.raises(st.UsageError, match="clear"):
+        st.author("hand", taxels=60, clear="wide")
     with pytest.raises(st.UsageError, match="leave taxels"):
         st.author("hand", "a.toml", taxels=3)
     with pytest.raises(st.UsageError, match="did you mean `hand`"):

@@ -1,23 +1,18 @@
 //! The checks of a layout, one per function.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
-use super::super::placed::COINCIDENT_M;
 use super::super::surface_search::SurfaceSearch;
 use super::drawn_poses::DrawnPoses;
 use super::finding::{Finding, FindingKind};
 use super::hidden_findings;
 use super::large::large;
-use crate::body::{Body, ChartKind, FieldSpec, Taxel, listed, point_tree};
+use super::spacing;
+use crate::body::{Body, ChartKind, FieldSpec, Taxel, listed};
 use crate::field::{Field, Unroller};
 
 /// Minimum number of taxels of a field for orientation and axis.
 const MIN_FIELD_TAXELS: usize = 3;
-
-/// A taxel is isolated if its nearest neighbour is over this many times the median distance away.
-const ISOLATED_RATIO: f64 = 5.0;
 
 /// Maximum angle of a current normal from the surface's, rad.
 const NORMAL_TOLERANCE_RAD: f64 = 1e-5;
@@ -59,7 +54,7 @@ pub fn lint_with_progress(
     findings.extend(empty(body));
     findings.extend(small(fields));
     findings.extend(unused(body, fields));
-    findings.extend(crowding(body));
+    findings.extend(spacing::findings(body));
     findings.extend(against_surface(body));
     progress(SURFACE_DONE);
     let mut of_charts = |share: f64| progress(SURFACE_DONE + (CHARTS_DONE - SURFACE_DONE) * share);
@@ -71,11 +66,11 @@ pub fn lint_with_progress(
 }
 
 /// A taxel's place for people.
-fn place(body: &Body, taxel: &Taxel) -> String {
+pub(super) fn place(body: &Body, taxel: &Taxel) -> String {
     format!("taxel {} on link `{}`", taxel.id, body.links[taxel.link].name)
 }
 
-fn count(count: usize, thing: &str) -> String {
+pub(super) fn count(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
@@ -116,59 +111,6 @@ fn unused(body: &Body, fields: &[Field]) -> Option<Finding> {
     let taxels = count(loose.len(), "taxel");
     let what = format!("{taxels} in no field, so touches there are not reported: {}", listed(&loose));
     Some(Finding::of_taxels(FindingKind::UnusedTaxel, loose, what))
-}
-
-/// Taxels at one place, and taxels far from all others.
-fn crowding(body: &Body) -> Vec<Finding> {
-    let places: Vec<DVec3> = body
-        .taxels
-        .iter()
-        .map(|taxel| body.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link))
-        .collect();
-    let tree = point_tree(places.iter().copied());
-    let mut coincident: BTreeMap<u32, u32> = BTreeMap::new();
-    let mut gaps: Vec<(f64, usize)> = Vec::new();
-    for (index, place) in places.iter().enumerate() {
-        let others =
-            tree.nearest_neighbor_iter_with_distance_2(place.to_array()).filter(|(other, _)| other.data != index);
-        // Enough neighbours to skip a few coincident ones.
-        for (other, squared) in others.take(16) {
-            if squared > COINCIDENT_M * COINCIDENT_M {
-                gaps.push((squared.sqrt(), index));
-                break;
-            }
-            // Taxels of different modalities may share a place.
-            let (one, other) = (&body.taxels[index], &body.taxels[other.data]);
-            if one.modality == other.modality {
-                coincident.entry(one.id).or_insert(other.id);
-            }
-        }
-    }
-    let mut findings = Vec::new();
-    if !coincident.is_empty() {
-        let ids: Vec<u32> = coincident.keys().copied().collect();
-        let what = format!("{} at the place of another: {}", count(ids.len(), "taxel"), listed(&ids));
-        let first = body.taxel_index(ids[0]).map(|index| place(body, &body.taxels[index]));
-        findings.push(Finding { place: first, ..Finding::of_taxels(FindingKind::CoincidentTaxels, ids, what) });
-    }
-    gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let Some(&(usual, _)) = gaps.get(gaps.len() / 2) else { return findings };
-    let far = &gaps[gaps.partition_point(|&(gap, _)| gap <= ISOLATED_RATIO * usual)..];
-    if let Some(&(gap, index)) = far.last() {
-        let mut ids: Vec<u32> = far.iter().map(|&(_, index)| body.taxels[index].id).collect();
-        ids.sort_unstable();
-        let what = format!(
-            "{} over {ISOLATED_RATIO} times as far from any other as is usual, {:.1} mm: {}; farthest {}, {:.1} mm",
-            count(ids.len(), "taxel"),
-            usual * 1e3,
-            listed(&ids),
-            place(body, &body.taxels[index]),
-            gap * 1e3
-        );
-        let (worst, place) = (Some(gap), Some(place(body, &body.taxels[index])));
-        findings.push(Finding { worst, place, ..Finding::of_taxels(FindingKind::IsolatedTaxel, ids, what) });
-    }
-    findings
 }
 
 /// Distance and angle of a taxel to the surface below it.

@@ -25,8 +25,10 @@ pub enum FindingKind {
     InwardNormal,
     /// A normal is not the surface's.
     StaleNormal,
-    /// A taxel is far from all others.
+    /// A taxel is far from all others, for what is usual around it.
     IsolatedTaxel,
+    /// Taxels are close to each other, for what is usual around them.
+    CrowdedTaxels,
     /// (u, v) of a geodesic chart are not what the surface gives.
     StaleChart,
     /// A link is so large that its numbers are probably millimetres.
@@ -46,7 +48,9 @@ impl FindingKind {
     #[must_use]
     pub fn unit(self) -> Option<&'static str> {
         match self {
-            Self::OffSurface | Self::IsolatedTaxel | Self::StaleChart | Self::LargeLink => Some("m"),
+            Self::OffSurface | Self::IsolatedTaxel | Self::CrowdedTaxels | Self::StaleChart | Self::LargeLink => {
+                Some("m")
+            }
             Self::InwardNormal | Self::StaleNormal => Some("rad"),
             Self::HiddenTaxel | Self::CoveredAtRest | Self::InwardFaces => Some("1"),
             _ => None,
@@ -91,7 +95,7 @@ impl Finding {
             FindingKind::NoTaxels | FindingKind::NoFields => "add some with `somatic author`",
             FindingKind::SmallField => "give it more taxels, or do not request its orientation",
             FindingKind::UnusedTaxel => "put it into a field",
-            FindingKind::CoincidentTaxels => "move or remove one",
+            FindingKind::CoincidentTaxels | FindingKind::CrowdedTaxels => "move or remove one",
             FindingKind::OffSurface => "move it to the surface",
             FindingKind::InwardNormal => "flip it, or the triangles below it",
             FindingKind::StaleNormal | FindingKind::StaleChart => "recompute it with `somatic author BODY -o OUT`",

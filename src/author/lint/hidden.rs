@@ -10,9 +10,11 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::drawn_poses::DrawnPoses;
-use super::posed_surface::{DIRECTIONS, PosedSurface, START_M, directions};
+use super::posed_surface::{DIRECTIONS, PosedSurface, directions};
 use super::shells::ShellsOfLinks;
-use crate::body::{Body, Taxel};
+use super::taxels_at_rest::taxels_at_rest;
+use super::touchable::BodyPoint;
+use crate::body::Body;
 use crate::parallel;
 
 /// Taxels that are looked at; of more, as many evenly spread ones.
@@ -82,12 +84,13 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn F
             &rest
         }
     };
-    let surface = PosedSurface::new(body, drawn, |_| None);
+    let surface = PosedSurface::new(body, drawn);
     if surface.is_empty() || body.taxels.is_empty() {
         return Hidden::default();
     }
     let count = body.taxels.len().min(MAX_CHECKED);
     let checked: Vec<usize> = (0..count).map(|index| index * body.taxels.len() / count).collect();
+    let points = taxels_at_rest(body);
     let search = Search { body, surface: &surface, directions: directions(), has_joints: poses.is_some() };
     let mut seen: Vec<Option<Seen>> = (0..count).map(|_| None).collect();
     let at_once = PER_TASK * TASKS_PER_THREAD * parallel::threads();
@@ -96,7 +99,7 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn F
         let tasks = seen.chunks_mut(PER_TASK).zip(taxels.chunks(PER_TASK));
         parallel::for_each(parallel::threads(), tasks, |(seen, taxels): (&mut [Option<Seen>], &[usize])| {
             for (seen, &taxel) in seen.iter_mut().zip(taxels) {
-                *seen = Some(search.look(&body.taxels[taxel]));
+                *seen = Some(search.look(&points[taxel]));
             }
         });
     }
@@ -107,8 +110,7 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn F
         let Some(mut seen) = seen else { continue };
         let taxel = &body.taxels[index];
         if seen.reach == Reach::CoveredAtRest {
-            let at = surface.body_from_link(0, taxel.link).transform_point3(taxel.position_in_link);
-            if !shells.of(taxel.link).is_open_at(at, &surface, &search.directions) {
+            if !shells.of(taxel.link).is_open_at(points[index].position, &surface, &search.directions) {
                 seen.reach = Reach::Hidden;
             }
         }
@@ -137,7 +139,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn look(&self, taxel: &Taxel) -> Seen {
+    fn look(&self, taxel: &BodyPoint) -> Seen {
         let open = Seen { reach: Reach::Open, is_inward: false, inside: Vec::new() };
         let mut last = (0..self.surface.parts()).find(|&part| self.surface.is_of(part, taxel.link)).unwrap_or(0);
         if self.escapes(0, taxel, &mut last) {
@@ -156,14 +158,12 @@ impl Search<'_> {
     }
 
     /// Where rays start from `taxel`, and its normal, in the body.
-    fn start(&self, pose: usize, taxel: &Taxel) -> (DVec3, DVec3) {
-        let way = self.surface.body_from_link(pose, taxel.link);
-        let normal = way.transform_vector3(taxel.normal_in_link);
-        (way.transform_point3(taxel.position_in_link) + normal * START_M, normal)
+    fn start(&self, pose: usize, taxel: &BodyPoint) -> (DVec3, DVec3) {
+        self.surface.start(pose, self.body, taxel)
     }
 
     /// Whether any ray escapes; those along the normal first, as they mostly do.
-    fn escapes(&self, pose: usize, taxel: &Taxel, last: &mut usize) -> bool {
+    fn escapes(&self, pose: usize, taxel: &BodyPoint, last: &mut usize) -> bool {
         let (start, normal) = self.start(pose, taxel);
         let mut tried = [false; DIRECTIONS];
         for least in [0.8, 0.3, 0.0, -1.1] {
@@ -199,7 +199,7 @@ impl Search<'_> {
     }
 
     /// The links, neither the taxel's nor next to it, that the start is inside at rest and, with joints, outside in a pose.
-    fn inside(&self, taxel: &Taxel, start: DVec3) -> Vec<usize> {
+    fn inside(&self, taxel: &BodyPoint, start: DVec3) -> Vec<usize> {
         let is_inside = |pose: usize, part: usize| {
             let start = if pose == 0 { start } else { self.start(pose, taxel).0 };
             self.winding(pose, &[part], start, COARSE) > INSIDE

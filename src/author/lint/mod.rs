@@ -8,6 +8,8 @@ mod hidden_findings;
 mod large;
 mod posed_surface;
 mod shells;
+mod spacing;
+mod taxels_at_rest;
 mod touchable;
 
 pub(super) use checks::{SurfaceFit, drift};

@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::drawn_poses::DrawnPoses;
+use super::touchable::BodyPoint;
 use crate::body::{Body, Home, Ray, RayTree, Surface};
 
 /// Directions from each taxel.
@@ -39,19 +40,18 @@ pub(super) struct PosedSurface<'a> {
 }
 
 impl<'a> PosedSurface<'a> {
-    /// Of `body` in `poses`, the first of which is rest. `at_rest` has the vertices of a surface in the body at rest, m, by the weights of
-    /// all their joints; where it has none, each follows its heaviest joint.
-    pub(super) fn new<'v>(body: &Body, poses: &'a DrawnPoses, at_rest: impl Fn(usize) -> Option<&'v [DVec3]>) -> Self {
+    /// Of `body` in `poses`, the first of which is rest. A vertex of a skinned mesh is at rest where the weights of its joints put it, and
+    /// moves with the heaviest of them.
+    pub(super) fn new(body: &Body, poses: &'a DrawnPoses) -> Self {
         let poses = &poses.body_from_link[..];
         let mut rigid: Vec<Vec<[DVec3; 3]>> = vec![Vec::new(); body.links.len()];
         let mut parts = Vec::new();
-        for (index, surface) in body.surfaces.iter().enumerate() {
+        for surface in &body.surfaces {
             match &surface.home {
                 Home::Rigid { link, link_from_mesh } => rigid[*link].extend(surface.corners_through(*link_from_mesh)),
                 Home::Skinned { joints, .. } => {
                     let links = joints.iter().map(|(link, _)| *link).collect();
-                    let rest = at_rest(index).map(|vertices| (&poses[0][..], vertices));
-                    let in_body = poses.iter().map(|pose| RayTree::new(skinned(surface, pose, rest))).collect();
+                    let in_body = poses.iter().map(|pose| RayTree::new(skinned(surface, &poses[0], pose))).collect();
                     parts.push(Part::Skinned { links, in_body });
                 }
             }
@@ -77,6 +77,14 @@ impl<'a> PosedSurface<'a> {
 
     pub(super) fn body_from_link(&self, pose: usize, link: usize) -> DAffine3 {
         self.poses[pose][link]
+    }
+
+    /// Where rays start from `point`, and its normal, in the body.
+    pub(super) fn start(&self, pose: usize, body: &Body, point: &BodyPoint) -> (DVec3, DVec3) {
+        let link_from_rest = body.links[point.link].body_from_link.inverse();
+        let way = self.body_from_link(pose, point.link) * link_from_rest;
+        let normal = way.transform_vector3(point.normal);
+        (way.transform_point3(point.position) + normal * START_M, normal)
     }
 
     /// Whether part `part` belongs to `link`: its own triangles, or a mesh that it is a joint of.
@@ -136,37 +144,27 @@ impl<'a> PosedSurface<'a> {
     }
 }
 
-/// The triangles of a skinned mesh in the body; each corner follows its heaviest joint, from where it is at rest if `rest` says that: the
-/// pose at rest and the vertices in it.
-fn skinned<'a>(
+/// The triangles of a skinned mesh in the body in `pose`. Each corner follows its heaviest joint, from where it is in `rest`.
+pub(super) fn skinned<'a>(
     surface: &'a Surface,
+    rest: &[DAffine3],
     pose: &[DAffine3],
-    rest: Option<(&[DAffine3], &[DVec3])>,
 ) -> impl Iterator<Item = [DVec3; 3]> + use<'a> {
-    let mut points = surface.positions.clone();
-    let mut is_mirrored = false;
-    if let Home::Skinned { joints, heaviest } = &surface.home {
-        let ways: Vec<DAffine3> = joints.iter().map(|(link, way)| pose[*link] * *way).collect();
-        is_mirrored = ways.first().is_some_and(|way| way.matrix3.determinant() < 0.0);
-        match rest {
-            None => {
-                for (point, joint) in points.iter_mut().zip(heaviest) {
-                    *point = ways[*joint].transform_point3(*point);
-                }
-            }
-            Some((at_rest, vertices)) => {
-                let moved: Vec<DAffine3> =
-                    joints.iter().map(|(link, _)| pose[*link] * at_rest[*link].inverse()).collect();
-                for ((point, vertex), joint) in points.iter_mut().zip(vertices).zip(heaviest) {
-                    *point = moved[*joint].transform_point3(*vertex);
-                }
-            }
-        }
+    let (mut points, mut is_mirrored) = (Vec::new(), false);
+    if let Home::Skinned { joints, heaviest, at_rest } = &surface.home {
+        let moved: Vec<DAffine3> = joints.iter().map(|(link, _)| pose[*link] * rest[*link].inverse()).collect();
+        points.extend(at_rest.iter().zip(heaviest).map(|(&vertex, &joint)| moved[joint].transform_point3(vertex)));
+        is_mirrored = is_skin_mirrored(joints, rest);
     }
     surface.triangles.iter().map(move |&[a, b, c]| {
         let [a, b, c] = if is_mirrored { [a, c, b] } else { [a, b, c] };
         [a, b, c].map(|v| points[v as usize])
     })
+}
+
+/// Whether `joints` turn a skinned mesh inside out in the body at `rest`.
+pub(super) fn is_skin_mirrored(joints: &[(usize, DAffine3)], rest: &[DAffine3]) -> bool {
+    joints.first().is_some_and(|&(link, way)| (rest[link] * way).matrix3.determinant() < 0.0)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::{DAffine3, DVec3};
 
-use super::posed_surface::{PosedSurface, START_M};
+use super::posed_surface::{PosedSurface, START_M, skinned};
 use crate::body::{Body, Home, SurfaceIndex, Topology, area_vector};
 
 /// Samples of a shell: least and greatest number, and the area that adds one, m².
@@ -48,13 +48,9 @@ impl Shells {
                     let way = body.links[link].body_from_link * *link_from_mesh;
                     corners.extend(surface.corners_through(way).flatten());
                 }
-                Home::Skinned { joints, heaviest } if joints.iter().any(|(joint, _)| *joint == link) => {
-                    let ways: Vec<DAffine3> =
-                        joints.iter().map(|(joint, way)| body.links[*joint].body_from_link * *way).collect();
-                    let at = |v: u32| ways[heaviest[v as usize]].transform_point3(surface.positions[v as usize]);
-                    let mirrored = ways.first().is_some_and(|way| way.matrix3.determinant() < 0.0);
-                    let order = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
-                    corners.extend(surface.triangles.iter().map(order).flat_map(|triangle| triangle.map(at)));
+                Home::Skinned { joints, .. } if joints.iter().any(|(joint, _)| *joint == link) => {
+                    let rest: Vec<DAffine3> = body.links.iter().map(|link| link.body_from_link).collect();
+                    corners.extend(skinned(surface, &rest, &rest).flatten());
                 }
                 _ => {}
             }

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::drawn_poses::DrawnPoses;
-use super::posed_surface::{DIRECTIONS, PosedSurface, START_M, directions};
+use super::posed_surface::{DIRECTIONS, PosedSurface, directions};
 use crate::body::Body;
 use crate::parallel;
 
@@ -36,14 +36,9 @@ pub(in crate::author) struct Touchable<'a> {
 }
 
 impl<'a> Touchable<'a> {
-    /// For `body` in `poses`, the first of which is rest; `at_rest` has the vertices of each of its surfaces in the body at rest, m.
-    pub(in crate::author) fn new<'v>(
-        body: &'a Body,
-        poses: &'a DrawnPoses,
-        at_rest: impl Fn(usize) -> &'v [DVec3],
-    ) -> Self {
-        let surface = PosedSurface::new(body, poses, |index| Some(at_rest(index)));
-        Self { body, surface, directions: directions() }
+    /// For `body` in `poses`, the first of which is rest.
+    pub(in crate::author) fn new(body: &'a Body, poses: &'a DrawnPoses) -> Self {
+        Self { body, surface: PosedSurface::new(body, poses), directions: directions() }
     }
 
     /// Per point whether it is open. `progress` gets the share that is done, and says whether to go on; `None` if it does not.
@@ -74,10 +69,7 @@ impl<'a> Touchable<'a> {
     }
 
     fn is_open_in(&self, pose: usize, point: &BodyPoint, last: &mut usize) -> bool {
-        let link_from_rest = self.body.links[point.link].body_from_link.inverse();
-        let way = self.surface.body_from_link(pose, point.link) * link_from_rest;
-        let normal = way.transform_vector3(point.normal);
-        let start = way.transform_point3(point.position) + normal * START_M;
+        let (start, normal) = self.surface.start(pose, self.body, point);
         // Those along the normal first, as they mostly escape.
         let (mut escaped, mut tried) = (0, [false; DIRECTIONS]);
         for least in [0.8, 0.3, 0.0, -1.1] {
