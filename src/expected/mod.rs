@@ -150,7 +150,7 @@ pub fn ideal_errors(body: &Body, touches: &TestTouches) -> Result<LayoutErrors> 
     hexagons::errors(Trial::new(body)?.spacing_m, touches)
 }
 
-/// [`expected_errors`] and [`ideal_errors`] of one body, whose skin is made once.
+/// [`expected_errors`] and [`ideal_errors`] of `body`, which cost less together.
 ///
 /// # Errors
 /// As [`expected_errors`].

@@ -45,12 +45,12 @@ impl<'a> Trial<'a> {
     /// The layout of `body`.
     pub(super) fn new(body: &'a Body) -> Result<Self> {
         if body.surfaces.iter().all(|surface| surface.triangles.is_empty()) {
-            return Err(untouchable(body, "it has no surface"));
+            return Err(untouchable(body, "it has no surface; author its taxels on a mesh"));
         }
         let pressure = || body.taxels.iter().filter(|taxel| taxel.modality == Modality::Pressure);
         let ids: Vec<u32> = pressure().map(|taxel| taxel.id).collect();
         if ids.is_empty() {
-            return Err(untouchable(body, "it has no pressure taxels"));
+            return Err(untouchable(body, "it has no pressure taxels; give it some with `somatic author`"));
         }
         // Touches are found on the whole skin; the layout's own fields, and their charts, take time and have no part in it.
         let chart = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
@@ -69,7 +69,7 @@ impl<'a> Trial<'a> {
         let sides_m: Vec<(usize, f64)> = cells.collect();
         let mean_m2 = sides_m.iter().map(|(_, side)| side * side).sum::<f64>() / sides_m.len() as f64;
         if !(mean_m2.is_finite() && mean_m2 > 0.0) {
-            return Err(untouchable(body, "no taxel lies on its surface"));
+            return Err(untouchable(body, "no taxel lies on its surface; look at it with `somatic inspect`"));
         }
         Ok(Self { body, engine, sides_m, spacing_m: mean_m2.sqrt(), frames: 0 })
     }
@@ -95,7 +95,7 @@ impl<'a> Trial<'a> {
         spacing_m: f64,
     ) -> Result<LayoutErrors> {
         if presses.is_empty() {
-            return Err(untouchable(self.body, "no taxel is near its surface"));
+            return Err(untouchable(self.body, "no taxel is near its surface; look at it with `somatic inspect`"));
         }
         let mut touches = Vec::with_capacity(presses.len());
         for (call, presses) in presses.chunks(BATCH).enumerate() {

@@ -13,6 +13,7 @@ mod browser;
 mod calibrate;
 mod devices;
 mod doubts;
+mod expected;
 mod exports;
 mod fields;
 mod inspect;
