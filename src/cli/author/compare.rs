@@ -33,10 +33,11 @@ pub(super) struct CompareArguments {
 
 impl CompareArguments {
     /// The two bodies that are compared, if that is asked for.
-    pub(super) fn bodies(&self) -> Option<[&str; 2]> {
+    pub(super) fn bodies(&self) -> Result<Option<[&str; 2]>> {
         match &self.compare[..] {
-            [first, second] => Some([first, second]),
-            _ => None,
+            [] => Ok(None),
+            [first, second] => Ok(Some([first, second])),
+            _ => Err(Error::usage("--compare takes two bodies; give it once")),
         }
     }
 }

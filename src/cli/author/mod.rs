@@ -147,7 +147,7 @@ enum HiddenWord {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    if let Some(bodies) = arguments.compared.bodies() {
+    if let Some(bodies) = arguments.compared.bodies()? {
         return compare::run(bodies, arguments.output.as_deref(), arguments.force, arguments.json);
     }
     let path = body_output(arguments.output.as_ref())?;
