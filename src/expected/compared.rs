@@ -2,14 +2,17 @@
 
 use std::time::Instant;
 
-use super::trial::Trial;
-use super::{LayoutErrors, TestTouches, hexagons, presses};
+use super::hexagons;
+use super::layout_errors::{LayoutErrors, TestTouches};
+use super::presses::presses;
+use super::trial::{FRAME_S, Trial};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::signal::Frame;
+use crate::source::GivenPress;
 use crate::touch;
 
 /// Passes over the touches by which the time of a frame is measured.
@@ -65,7 +68,7 @@ pub fn compare_layouts(bodies: [&Body; 2], touches: &TestTouches) -> Result<Comp
     };
     let layouts = [first.errors(&skins[0], &of_first, spacing_m)?, second.errors(&skins[1], &of_second, spacing_m)?];
     let ideal = [hexagons::errors(first.spacing_m, &touches)?, hexagons::errors(second.spacing_m, &touches)?];
-    let timed = |presses: &[super::GivenPress]| presses.len().min(TIMED);
+    let timed = |presses: &[GivenPress]| presses.len().min(TIMED);
     let frames = [
         first.frames_of(&skins[0], &of_first[..timed(&of_first)]),
         second.frames_of(&skins[1], &of_second[..timed(&of_second)]),
@@ -87,7 +90,7 @@ fn time_of_frame(body: &Body, trial: &Trial<'_>, frames: &[Frame]) -> Result<f64
         let began = Instant::now();
         engine.process_one(&frame)?;
         times_s.push(began.elapsed().as_secs_f64());
-        t_s += super::trial::FRAME_S;
+        t_s += FRAME_S;
     }
     times_s.sort_by(f64::total_cmp);
     Ok(times_s.get(times_s.len() / 2).copied().unwrap_or(0.0))

@@ -2,8 +2,9 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::layout_errors::{LayoutErrors, TestTouches};
+use super::presses::presses;
 use super::trial::Trial;
-use super::{LayoutErrors, TestTouches, presses};
 use crate::body::{Body, Home, Link, Modality, Surface, Taxel};
 use crate::error::Result;
 

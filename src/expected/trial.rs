@@ -2,11 +2,12 @@
 
 use glam::DVec3;
 
-use super::{LayoutErrors, SIGMA_SPACINGS, TestTouches, TouchError, between, presses, turned, untouchable};
+use super::layout_errors::{LayoutErrors, TestTouches, TouchError};
+use super::presses::{SIGMA_SPACINGS, presses};
 use crate::backend::BackendKind;
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Modality};
 use crate::engine::{Engine, Options};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::parallel;
 use crate::percept::{Outputs, Touch, TouchFlags, TouchOutputs};
 use crate::scene::Scene;
@@ -187,4 +188,35 @@ struct Pressed {
     values: Vec<RawValue>,
     truth: Option<GivenTruth>,
     newton_at_step: f64,
+}
+
+/// The angle between two lines, rad.
+fn between(a: DVec3, b: DVec3) -> f64 {
+    libm::atan2(a.cross(b).length(), a.dot(b).abs())
+}
+
+/// `vector`, turned as the plane across `from` is turned to that across `to`, on the shortest way.
+fn turned(vector: DVec3, from: DVec3, to: DVec3) -> DVec3 {
+    let (axis, cos) = (from.cross(to), from.dot(to));
+    vector * cos + axis.cross(vector) + axis * (axis.dot(vector) / (1.0 + cos))
+}
+
+/// That nothing on `body` could be touched.
+fn untouchable(body: &Body, why: &str) -> Error {
+    Error::failed(format!("errors of touches cannot be simulated: {why}")).at(&body.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+
+    #[test]
+    fn a_direction_is_turned_with_its_plane() {
+        let tilted = DVec3::new(0.0, 0.6, 0.8);
+        assert!(turned(DVec3::X, DVec3::Z, tilted).distance(DVec3::X) < 1e-12);
+        assert!(turned(DVec3::Y, DVec3::Z, tilted).distance(DVec3::new(0.0, 0.8, -0.6)) < 1e-12);
+        assert!((between(DVec3::X, -DVec3::Y) - FRAC_PI_2).abs() < 1e-12 && between(DVec3::X, -DVec3::X) < 1e-12);
+    }
 }
