@@ -317,7 +317,7 @@ fn stroke(colour: Colour, width: f64) -> ShapeStyle {
 
 /// `value` with no more decimals than it needs.
 fn tick(value: f64) -> String {
-    let text = format!("{value:.1}");
+    let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
@@ -327,6 +327,6 @@ mod tests {
 
     #[test]
     fn ticks_are_short() {
-        assert_eq!([0.0, -45.0, 0.5, 1000.0, -12.5].map(tick), ["0", "−45", "0.5", "1000", "−12.5"]);
+        assert_eq!([0.0, -45.0, 0.05, 1000.0, -12.5].map(tick), ["0", "−45", "0.05", "1000", "−12.5"]);
     }
 }

@@ -72,6 +72,7 @@ mod colours;
 mod dds;
 mod engine;
 pub mod error;
+pub mod expected;
 pub mod field;
 #[cfg(feature = "cli")]
 pub mod figure;

@@ -18,12 +18,14 @@ use self::graph::SkinGraph;
 use self::inspection::Inspection;
 use super::bar::Bar;
 use super::bodies::load_body;
+use super::expected;
 use super::stdio::{DONE, FAILED, print};
 
 const EXAMPLES: &str = "\
 Examples:
   somatic inspect robot.glb
   somatic inspect humanoid --json | jq '.fields[].name'
+  somatic inspect humanoid --errors
   somatic inspect arm.glb --joints arm.urdf
   somatic inspect robot.glb --strict > /dev/null || echo 'look at the findings'";
 
@@ -37,6 +39,10 @@ pub(super) struct Arguments {
     /// Print JSON: positions in metres in the frame of each taxel's link, charts in the frame of each field's anchor.
     #[arg(long)]
     json: bool,
+
+    /// Simulate touches on the layout: how far place, axis and force will be off, with the same on an ideal skin.
+    #[arg(long)]
+    errors: bool,
 
     /// Exit with 1 if anything is odd.
     #[arg(long)]
@@ -89,7 +95,8 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     let coverage = coverage(&body);
     let overlaps = rest_overlaps(&body, &ContactTolerance::new(&body, arguments.contact_tolerance));
     let graph = SkinGraph::new(graph, &body);
-    let seen = Inspection { body, fields, graph, coverage, overlaps, findings, odd };
+    let errors = if arguments.errors { Some(expected::of_body(&body)?) } else { None };
+    let seen = Inspection { body, fields, graph, coverage, overlaps, errors, findings, odd };
     print(&match arguments.json {
         true => json::text(&seen),
         false => report::text(&seen),

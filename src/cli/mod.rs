@@ -16,6 +16,7 @@ mod convert;
 mod describe;
 mod devices;
 mod doubts;
+mod expected;
 #[cfg(feature = "page")]
 mod explanation;
 mod exports;

@@ -45,6 +45,7 @@ pub use ports::{PortSummary, serial_ports};
 pub use replay::{Cut, Replay};
 #[cfg(feature = "serial")]
 pub use serial::{SerialOptions, SerialSource};
+pub(crate) use simulated::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 pub use simulated::{SimulatedSource, Truth, write_recording, write_recording_with_progress};
 pub use spec::SourceSpec;
 pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};

@@ -14,6 +14,7 @@ mod calibrate;
 mod devices;
 mod doubts;
 mod escape;
+mod expected;
 mod exports;
 mod fields;
 mod inspect;

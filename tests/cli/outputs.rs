@@ -88,6 +88,12 @@ const WRITTEN: &[Written] = &[
     },
     Written {
         flag: "--output",
+        command: "author --compare hand.glb hand.glb --output OUT",
+        ending: ".svg",
+        reads: &["hand.glb"],
+    },
+    Written {
+        flag: "--output",
         command: "plot csv:touch.csv --body hand.glb --calibration cal.toml --output OUT",
         ending: ".svg",
         reads: &["touch.csv", "hand.glb", "cal.toml"],
@@ -471,6 +477,7 @@ const READ: &[&str] = &[
     "[MESH]",
     "[SOURCE]...",
     "--cells",
+    "--compare",
     "--icub",
     "--package",
     "--urdf-skin",

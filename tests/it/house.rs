@@ -31,6 +31,10 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("backend", [&below_backend[..], &["parallel"]].concat()),
         ("engine", [&below_backend[..], &["backend", "parallel", "touch"]].concat()),
         ("gains", [&below_backend[..], &["backend", "engine", "touch"]].concat()),
+        (
+            "expected",
+            [&below_backend[..], &["backend", "engine", "touch", "source", "author", "parallel", "setters"]].concat(),
+        ),
         ("wire", vec!["error"]),
         ("limb", vec!["error", "signal", "wire"]),
         ("recording", vec!["error", "output", "signal", "body"]),

@@ -14,6 +14,7 @@ mod draft;
 mod edited;
 mod endurance;
 mod even;
+mod expected;
 mod extremes;
 mod filter;
 mod firmware;

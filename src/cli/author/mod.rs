@@ -1,5 +1,7 @@
 //! `somatic author`: a mesh in, a body with a skin out.
 
+mod compare;
+mod compare_figure;
 mod convert;
 mod grid;
 mod report;
@@ -13,11 +15,13 @@ use somatic::body::Original;
 use somatic::error::nearest;
 use somatic::{Error, Result, bundled};
 
+use self::compare::{CompareArguments, body_output};
 use self::convert::{MeshArguments, MeshFile};
 use self::grid::GridArguments;
 use self::report::{summary, text};
 use self::skin::SkinArguments;
 use super::bar::Bar;
+use super::expected;
 use super::files::FilesRead;
 use super::stdio::{DONE, print};
 
@@ -33,6 +37,7 @@ Examples:
   somatic author --mjcf-skin hand.xml -o hand.glb
   somatic author robot.urdf --package my_robot=. --taxels 800 -o robot.glb   its links become links
   somatic inspect skin.glb
+  somatic author --compare a.glb b.glb -o errors.svg            two layouts, side by side
   somatic run --body skin.glb --source touch.csv
 
 A recipe says it region by region:
@@ -58,7 +63,7 @@ is brought up to date, as after editing it in Blender:
 pub(super) struct Arguments {
     /// The mesh: a .glb, .gltf, .stl, .obj, .dae or .ply file, a robot as .urdf, or one of the bundled bodies hand, mat and
     /// humanoid.
-    #[arg(value_name = "MESH", required_unless_present_any = ["grid", "icub", "urdf_skin", "mjcf_skin", "csv_skin"],
+    #[arg(value_name = "MESH", required_unless_present_any = ["grid", "icub", "urdf_skin", "mjcf_skin", "csv_skin", "compare"],
         conflicts_with_all = ["grid", "icub", "urdf_skin", "mjcf_skin", "csv_skin"])]
     mesh: Option<String>,
 
@@ -114,9 +119,16 @@ pub(super) struct Arguments {
     #[command(flatten)]
     skin: SkinArguments,
 
-    /// The body to write, .glb or .gltf.
+    #[command(flatten)]
+    compared: CompareArguments,
+
+    /// Simulate touches on the result: how far place, axis and force will be off, with the same on an ideal skin.
+    #[arg(long, conflicts_with = "compare")]
+    errors: bool,
+
+    /// The body to write, .glb or .gltf; with --compare the picture, .svg or .png.
     #[arg(short, long, value_name = "BODY.glb")]
-    output: PathBuf,
+    output: Option<PathBuf>,
 
     /// Replace the output if it is there. The mesh itself is never replaced.
     #[arg(long)]
@@ -145,7 +157,11 @@ enum MirrorWord {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
-    check_ending(&arguments.output)?;
+    if let Some(bodies) = arguments.compared.bodies()? {
+        return compare::run(bodies, arguments.output.as_deref(), arguments.force, arguments.json);
+    }
+    let path = body_output(arguments.output.as_ref())?;
+    check_ending(path)?;
     let has_places = arguments.sheet.is_asked() || arguments.skin.is_asked();
     let mut recipe = if has_places { None } else { Some(recipe(arguments)?) };
     let foreign = match arguments.skin.is_asked() {
@@ -155,7 +171,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let read = FilesRead::default().bodies(&arguments.mesh).files(&arguments.recipe).files(arguments.sheet.files());
     let read = read.files(recipe.iter().flat_map(Recipe::files)).files(foreign.iter().flat_map(MeshFile::files));
     let read = read.files(arguments.skin.files(&arguments.mesh_file)?);
-    let output = read.outputs(arguments.force).add(&arguments.output)?;
+    let output = read.outputs(arguments.force).add(path)?;
     let authored = match (&recipe, &arguments.mesh) {
         (Some(recipe), Some(mesh)) => {
             let file = foreign.as_ref().map_or_else(|| open(mesh), MeshFile::open)?;
@@ -166,12 +182,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
             author(file, recipe, |share| bar.show(share))?
         }
         _ if arguments.skin.is_asked() => arguments.skin.author(&arguments.mesh_file)?,
-        _ => arguments.sheet.author(&name_of(&arguments.output))?,
+        _ => arguments.sheet.author(&name_of(path))?,
     };
     authored.file.save(output)?;
+    let errors = if arguments.errors { Some(expected::of_body(&authored.body)?) } else { None };
     print(&match arguments.json {
-        true => format!("{}\n", summary(&arguments.output, &authored)),
-        false => text(&arguments.output, &authored, foreign.as_ref().is_some_and(MeshFile::is_visual_robot)),
+        true => format!("{}\n", summary(path, &authored, errors.as_ref())),
+        false => text(path, &authored, errors.as_ref(), foreign.as_ref().is_some_and(MeshFile::is_visual_robot)),
     })?;
     Ok(DONE)
 }

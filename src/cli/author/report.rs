@@ -6,8 +6,10 @@ use comfy_table::Cell;
 use serde_json::{Value, json};
 use somatic::author::{Authored, PlaceReport};
 use somatic::body::Body;
+use somatic::expected::LayoutErrors;
 use somatic::field::FieldSet;
 
+use crate::cli::expected;
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, count, millimetres, spread, title};
 
@@ -36,7 +38,7 @@ fn triangles(authored: &Authored) -> usize {
 }
 
 /// The report for a person; `robot` says whether the mesh is a URDF with its visual geometry.
-pub(super) fn text(output: &Path, authored: &Authored, robot: bool) -> String {
+pub(super) fn text(output: &Path, authored: &Authored, errors: Option<&[LayoutErrors; 2]>, robot: bool) -> String {
     let body = &authored.body;
     let taxels = count(body.taxels.len() as u64, "taxel");
     let fields = count(body.fields.len() as u64, "field");
@@ -54,6 +56,9 @@ pub(super) fn text(output: &Path, authored: &Authored, robot: bool) -> String {
         text += &format!("\n{}", table(&authored.places));
     }
     text += &centroids(authored);
+    for (what, errors) in errors.into_iter().flat_map(expected::lines) {
+        text += &format!(" {what}: {errors}\n");
+    }
     for place in &authored.places {
         text += &moves(place);
     }
@@ -133,7 +138,7 @@ fn moves(place: &PlaceReport) -> String {
     ))
 }
 
-pub(super) fn summary(output: &Path, authored: &Authored) -> Value {
+pub(super) fn summary(output: &Path, authored: &Authored, errors: Option<&[LayoutErrors; 2]>) -> Value {
     let place = |place: &PlaceReport| {
         let moved: Vec<Value> = place.moved_m.iter().map(|(id, moved)| json!({"id": id, "moved": moved})).collect();
         let mut object = json!({
@@ -156,7 +161,7 @@ pub(super) fn summary(output: &Path, authored: &Authored) -> Value {
         }
         object
     };
-    json!({
+    let mut summary = json!({
         "output": output.display().to_string(),
         "taxels": authored.body.taxels.len(),
         "triangles": triangles(authored),
@@ -164,5 +169,9 @@ pub(super) fn summary(output: &Path, authored: &Authored) -> Value {
         "places": authored.places.iter().map(place).collect::<Vec<_>>(),
         "with_centroids": with_centroids(authored),
         "notes": authored.notes,
-    })
+    });
+    if let Some(errors) = errors {
+        summary["errors"] = expected::json_beside_ideal(errors);
+    }
+    summary
 }

@@ -2,6 +2,7 @@
 
 use somatic::author::{Coverage, Finding};
 use somatic::body::Body;
+use somatic::expected::LayoutErrors;
 use somatic::field::{Field, RestOverlap};
 
 use super::graph::SkinGraph;
@@ -14,6 +15,8 @@ pub(super) struct Inspection {
     pub(super) coverage: Coverage,
     /// Links with taxels that are within the tolerance of self-contacts at rest.
     pub(super) overlaps: Vec<RestOverlap>,
+    /// Errors to be expected on it and on an ideal skin, if they are asked for.
+    pub(super) errors: Option<[LayoutErrors; 2]>,
     /// A line each; those of reading first.
     pub(super) findings: Vec<String>,
     /// Findings of the lint.

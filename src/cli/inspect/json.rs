@@ -6,6 +6,7 @@ use somatic::body::Body;
 use somatic::field::{Field, WORLD};
 
 use super::inspection::Inspection;
+use crate::cli::expected;
 
 /// One object and a newline.
 pub(super) fn text(seen: &Inspection) -> String {
@@ -52,6 +53,9 @@ pub(super) fn text(seen: &Inspection) -> String {
     });
     if let Some([low, high]) = cell_spread(body.taxels.iter().map(|taxel| taxel.area)) {
         whole["cells"] = json!({"p5": low, "p95": high});
+    }
+    if let Some(errors) = &seen.errors {
+        whole["errors"] = expected::json_beside_ideal(errors);
     }
     for (name, value) in seen.graph.json(body) {
         whole[name] = value;

@@ -8,6 +8,7 @@ use somatic::body::{Body, ChartKind};
 use somatic::field::{Field, RestOverlap, WORLD};
 
 use super::inspection::Inspection;
+use crate::cli::expected;
 use crate::cli::table::{TextTable, plain, shown};
 use crate::cli::words::{bullet, count, millimetres, one_line, spread, title};
 
@@ -23,6 +24,9 @@ pub(super) fn text(seen: &Inspection) -> String {
     line("taxels", taxels(body));
     if let Some(cells) = cell_spread(body.taxels.iter().map(|taxel| taxel.area)) {
         line("cells", format!("{} of the median area, 5th to 95th percentile", spread(cells)));
+    }
+    for (what, value) in seen.errors.iter().flat_map(expected::lines) {
+        line(what, value);
     }
     for (what, value) in coverage(body, &seen.coverage) {
         line(what, value);

@@ -27,6 +27,7 @@ use glam::DVec3;
 
 pub use record::{write_recording, write_recording_with_progress};
 pub use truth::Truth;
+pub(crate) use whole::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 
 use self::contact::{Footprint, Layer};
 use self::file::File;

@@ -76,6 +76,11 @@ impl Cells {
         self.carriers[mesh as usize].contains(&self.sensors[taxel].link)
     }
 
+    /// The taxel nearest to `p`.
+    pub(super) fn nearest(&self, p: DVec3) -> Option<&Sensor> {
+        self.tree.nearest_neighbor(p.to_array()).map(|nearest| &self.sensors[nearest.data])
+    }
+
     /// The taxel in whose cell the point `p` of `mesh` lies, where the normal is `normal`.
     pub(super) fn of(&self, p: DVec3, normal: DVec3, mesh: u32) -> Option<u32> {
         let (mut best, mut least_m) = (None, f64::INFINITY);

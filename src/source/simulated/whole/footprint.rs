@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 
 use super::chart::{principal, unrolled};
-use super::press::{Felt, Pressure};
+use super::press::Felt;
 use super::surface::{Spot, WholeSurface};
 use crate::body::SurfaceIndex;
 
@@ -29,9 +29,8 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Of `pressure` on `surface`; `None` if there is none.
-    pub(super) fn new(surface: &WholeSurface, pressure: &Pressure) -> Option<Self> {
-        let felt = &pressure.felt;
+    /// Of what the pieces of `surface` feel; `None` if they feel nothing.
+    pub(super) fn new(surface: &WholeSurface, felt: &[Felt]) -> Option<Self> {
         let force: f64 = felt.iter().map(|felt| felt.force_newton).sum();
         if force <= 0.0 {
             return None;

@@ -7,7 +7,7 @@ use super::pieces::between;
 use super::surface::{Spot, WholeSurface, faces};
 
 /// Distance of the points of a strap's middle line, m.
-const STEP_M: f64 = 1e-3;
+pub(super) const STEP_M: f64 = 1e-3;
 /// A step that advances by less than this share has met the end of the surface.
 const LEAST_ADVANCE: f64 = 0.5;
 /// A strap's pressure has the same shape at any depth; it is pressed no deeper than this, m.
@@ -91,15 +91,7 @@ impl Shape {
 impl Placed {
     pub(super) fn new(surface: &WholeSurface, shape: Shape, pose: Pose) -> Self {
         let line = match shape {
-            Shape::Strap { length_m, .. } => {
-                let half = length_m / 2.0;
-                let mut line = walk(surface, &pose.spot, -pose.along, half).0;
-                line.iter_mut().for_each(|(_, along)| *along = -*along);
-                line.reverse();
-                line.push((pose.spot, pose.along));
-                line.extend(walk(surface, &pose.spot, pose.along, half).0);
-                line
-            }
+            Shape::Strap { length_m, .. } => middle_line(surface, &pose, length_m),
             _ => Vec::new(),
         };
         Self { shape, pose, line }
@@ -221,6 +213,18 @@ impl Placed {
         });
         away.reduce(f64::min)
     }
+}
+
+/// The points and directions, a millimetre apart, of a line of `length_m` along the surface through the place of `pose`; shorter where
+/// the surface ends.
+pub(super) fn middle_line(surface: &WholeSurface, pose: &Pose, length_m: f64) -> Vec<(Spot, DVec3)> {
+    let half = length_m / 2.0;
+    let mut line = walk(surface, &pose.spot, -pose.along, half).0;
+    line.iter_mut().for_each(|(_, along)| *along = -*along);
+    line.reverse();
+    line.push((pose.spot, pose.along));
+    line.extend(walk(surface, &pose.spot, pose.along, half).0);
+    line
 }
 
 /// The points and directions at steps of a millimetre on the way from `from` in direction `along`, for `length_m` or as far

@@ -5,6 +5,7 @@
 mod cells;
 mod chart;
 mod footprint;
+mod given;
 mod indenter;
 mod layer;
 mod path;
@@ -15,6 +16,7 @@ mod surface;
 mod tests;
 mod touch;
 
+pub(crate) use self::given::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 pub(super) use self::indenter::Shape;
 pub(super) use self::path::{BodyPath, Waypoint};
 pub(super) use self::touch::{BodySkin, BodyTouch, Contact, Covers, Tool};

@@ -72,7 +72,8 @@ impl Skin<'_> {
     pub(super) fn press(&self, placed: &Placed, force_newton: f64) -> Pressure {
         let (depth_m, pressed) = self.contact(placed, force_newton);
         let cubes = self.cubes(&pressed);
-        let (parts, tiles) = self.reached(&pressed, &cubes);
+        let facets = pressed.iter().map(|(piece, _)| piece.facet);
+        let (parts, tiles) = reached(self.surface, facets, &cubes, self.layer.reach_m());
         let mut loads = self.loads(&pressed, &parts);
         let felt = self.spread(&mut loads, &tiles, &parts);
         Pressure { depth_m, loads, felt, parts }
@@ -218,42 +219,6 @@ impl Skin<'_> {
         }
     }
 
-    /// Per facet that pressure may reach its connected part, and the tiles of those facets that it may reach. A part is what
-    /// hangs together within reach of the forces.
-    fn reached<'s>(
-        &'s self,
-        pressed: &[(Pressed, f64)],
-        near: &[DVec3],
-    ) -> (BTreeMap<usize, u32>, Vec<(usize, &'s Tile)>) {
-        let reach_m = self.layer.reach_m();
-        let ends = near.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
-        let is_reached = |tile: &&Tile| {
-            let within = reach_m + tile.radius_m;
-            tile.middle.distance_squared(tile.middle.clamp(ends.0, ends.1)) <= within * within
-                && near.iter().any(|p| p.distance_squared(tile.middle) <= within * within)
-        };
-        let (mut parts, mut tiles, mut next) = (BTreeMap::new(), Vec::new(), 0);
-        for (piece, _) in pressed {
-            let mut open = vec![piece.facet];
-            let known = parts.len();
-            while let Some(facet) = open.pop() {
-                if parts.contains_key(&facet) {
-                    continue;
-                }
-                let of_facet = self.surface.tiles(facet).iter().filter(is_reached).map(|tile| (facet, tile));
-                let before = tiles.len();
-                tiles.extend(of_facet);
-                if tiles.len() > before {
-                    parts.insert(facet, next);
-                    open.extend(self.surface.beside(facet));
-                }
-            }
-            next += u32::from(parts.len() > known);
-        }
-        tiles.sort_by_key(|(facet, _)| *facet);
-        (parts, tiles)
-    }
-
     /// The forces of `pressed`, those in a cube and part put together.
     fn loads(&self, pressed: &[(Pressed, f64)], parts: &BTreeMap<usize, u32>) -> Vec<Load> {
         let mut cube_m = self.layer.cube_m();
@@ -328,6 +293,42 @@ impl Skin<'_> {
         }
         self.layer.share_at(chart::distance(offset, load.normal, normal))
     }
+}
+
+/// Per facet that pressure may reach its connected part, and the tiles of those facets that it may reach: within `reach_m` of
+/// points of `near`, and connected to one of `pressed`. A part is what hangs together there.
+pub(super) fn reached<'s>(
+    surface: &'s WholeSurface,
+    pressed: impl IntoIterator<Item = usize>,
+    near: &[DVec3],
+    reach_m: f64,
+) -> (BTreeMap<usize, u32>, Vec<(usize, &'s Tile)>) {
+    let ends = near.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
+    let is_reached = |tile: &&Tile| {
+        let within = reach_m + tile.radius_m;
+        tile.middle.distance_squared(tile.middle.clamp(ends.0, ends.1)) <= within * within
+            && near.iter().any(|p| p.distance_squared(tile.middle) <= within * within)
+    };
+    let (mut parts, mut tiles, mut next) = (BTreeMap::new(), Vec::new(), 0);
+    for facet in pressed {
+        let mut open = vec![facet];
+        let known = parts.len();
+        while let Some(facet) = open.pop() {
+            if parts.contains_key(&facet) {
+                continue;
+            }
+            let of_facet = surface.tiles(facet).iter().filter(is_reached).map(|tile| (facet, tile));
+            let before = tiles.len();
+            tiles.extend(of_facet);
+            if tiles.len() > before {
+                parts.insert(facet, next);
+                open.extend(surface.beside(facet));
+            }
+        }
+        next += u32::from(parts.len() > known);
+    }
+    tiles.sort_by_key(|(facet, _)| *facet);
+    (parts, tiles)
 }
 
 /// The cube of this size in which `p` lies.

@@ -109,6 +109,10 @@ impl WholeSurface {
         &self.facets[facet]
     }
 
+    pub(super) fn facets(&self) -> impl Iterator<Item = &Facet> {
+        self.facets.iter()
+    }
+
     /// The facets across the edges of `facet` on the same layer.
     pub(super) fn beside(&self, facet: usize) -> impl Iterator<Item = usize> + '_ {
         self.across[facet].iter().filter(|&&other| other != NONE).map(|&other| other as usize)

@@ -48,7 +48,7 @@ fn grid(columns: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> Body {
 }
 
 /// 160 mm square, through the origin, facing +z.
-fn plane() -> Body {
+pub(super) fn plane() -> Body {
     grid(32, 32, |x, y| DVec3::new(x - 0.5, y - 0.5, 0.0) * 0.16)
 }
 
@@ -72,7 +72,7 @@ fn press(body: &Body, shape: Shape, along: DVec3, force_newton: f64) -> (WholeSu
     let spot = surface.nearest(DVec3::Z, DVec3::Z).unwrap();
     let placed = Placed::new(&surface, shape, Pose { spot, normal: DVec3::Z, along });
     let pressure = Skin { surface: &surface, cells: &cells, layer: &layer }.press(&placed, force_newton);
-    let footprint = Footprint::new(&surface, &pressure).unwrap();
+    let footprint = Footprint::new(&surface, &pressure.felt).unwrap();
     let felt: f64 = pressure.felt.iter().map(|felt| felt.force_newton).sum();
     assert!((felt / force_newton - 1.0).abs() < 1e-9, "{shape:?}: {felt} of {force_newton} N");
     (surface, pressure, footprint)

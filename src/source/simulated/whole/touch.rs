@@ -190,7 +190,7 @@ impl BodyTouch {
             let placed = Placed::new(&skin.surface, shape, pose);
             let pressure = skin.skin().press(&placed, each_newton);
             skin.feel(&pressure, forces_newton);
-            let Footprint { spot, normal, link, principal_axis } = Footprint::new(&skin.surface, &pressure)?;
+            let Footprint { spot, normal, link, principal_axis } = Footprint::new(&skin.surface, &pressure.felt)?;
             let flat = pose.along - normal * pose.along.dot(normal);
             contacts.push(Contact {
                 force_newton: each_newton,
