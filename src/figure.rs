@@ -1,5 +1,6 @@
 //! Figures of panels with axes and a legend, as SVG and PNG.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use plotters::coord::Shift;
@@ -45,7 +46,7 @@ pub struct Layer {
     /// Its colour.
     pub colour: Colour,
     /// Its name in the legend, if it is listed there.
-    pub name: Option<&'static str>,
+    pub name: Option<Cow<'static, str>>,
 }
 
 /// An axis with ticks at chosen places.
@@ -189,7 +190,7 @@ impl Figure {
     fn draw_legend<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
         let mut named: Vec<(&str, &Layer)> = Vec::new();
         for layer in self.key.iter().chain(self.panels.iter().flat_map(|panel| &panel.layers)) {
-            if let Some(name) = layer.name.filter(|name| named.iter().all(|(known, _)| known != name)) {
+            if let Some(name) = layer.name.as_deref().filter(|name| named.iter().all(|(known, _)| known != name)) {
                 named.push((name, layer));
             }
         }

@@ -4,8 +4,6 @@ use serde_json::{Value, json};
 use somatic::expected::{LayoutErrors, Percentiles, TestTouches, expected_and_ideal_errors};
 use somatic::{Body, Result};
 
-use super::words::millimetres;
-
 /// The errors of usual touches on `body`, and on an ideal skin that is as dense.
 pub(super) fn of_body(body: &Body) -> Result<[LayoutErrors; 2]> {
     expected_and_ideal_errors(body, &TestTouches::default())
@@ -18,10 +16,9 @@ pub(super) fn lines([layout, ideal]: &[LayoutErrors; 2]) -> [(&'static str, Stri
         0 => format!("{all} touches"),
         few => format!("{} of {all} touches, as fewer than 3 taxels feel the others", all - few),
     };
-    let spacing = millimetres(layout.spacing_m);
     [
         ("errors", format!("{}: median and 95th percentile of {counted}", words(layout))),
-        ("ideal", format!("{}: the same on a flat sheet of hexagons as dense, {spacing} mm apart", words(ideal))),
+        ("ideal", format!("{}: the same on a flat sheet of regular hexagons as dense", words(ideal))),
     ]
 }
 
@@ -107,7 +104,7 @@ mod tests {
             line.1,
             "place 0.52, 12.5 mm, axis 2.86, 2.86°, force 25.0, 25.0 %: median and 95th percentile of 2 of 3 touches, as fewer than 3 taxels feel the others"
         );
-        assert_eq!(ideal.1, "place –, axis –, force –: the same on a flat sheet of hexagons as dense, 16.2 mm apart");
+        assert_eq!(ideal.1, "place –, axis –, force –: the same on a flat sheet of regular hexagons as dense");
         assert_eq!(json(&errors(vec![None]))["place"], Value::Null);
         assert_eq!([0.0, 9.996, 123.4].map(short), ["0.00", "10.0", "123"]);
     }

@@ -52,7 +52,7 @@ pub(super) fn figures(body: &Body) -> Result<[NamedFigure; 3]> {
 }
 
 fn lines(points: Vec<Point>, colour: Colour, width: f64, name: Option<&'static str>) -> Layer {
-    Layer { mark: Mark::Lines { runs: vec![points], width }, colour, name }
+    Layer { mark: Mark::Lines { runs: vec![points], width }, colour, name: name.map(Into::into) }
 }
 
 /// An axis over `range` with a tick every `step`.
@@ -126,7 +126,7 @@ fn rod_figure(rod: &Trial, body: &Body) -> Result<Figure> {
 /// A sensor in its colour: black at 0, bright red at full signal.
 fn sensor(centre: Point, signal: f64, name: Option<&'static str>) -> Layer {
     let colour = [(255.0 * signal).round() as u8, 0, 0];
-    Layer { mark: Mark::Disc { centre, radius: SENSOR_RADIUS_MM }, colour, name }
+    Layer { mark: Mark::Disc { centre, radius: SENSOR_RADIUS_MM }, colour, name: name.map(Into::into) }
 }
 
 fn instant(moment: &Moment, places: &[(usize, Point)]) -> Panel {
@@ -146,10 +146,18 @@ fn instant(moment: &Moment, places: &[(usize, Point)]) -> Panel {
         }
     }
     if let Some(at) = centroids[0] {
-        layers.push(Layer { mark: Mark::Plus { at, size: 7.0 }, colour: RED, name: Some("centroid, logarithmic raw") });
+        layers.push(Layer {
+            mark: Mark::Plus { at, size: 7.0 },
+            colour: RED,
+            name: Some("centroid, logarithmic raw".into()),
+        });
     }
     if let Some(at) = centroids[1] {
-        layers.push(Layer { mark: Mark::Asterisk { at, size: 6.0 }, colour: CYAN, name: Some("centroid, linearised") });
+        layers.push(Layer {
+            mark: Mark::Asterisk { at, size: 6.0 },
+            colour: CYAN,
+            name: Some("centroid, linearised".into()),
+        });
     }
     let axis = |label| Axis { label, range: [-PANEL_HALF_MM, PANEL_HALF_MM], ticks: vec![-12.0, 0.0, 12.0] };
     Panel { title: format!("{:.1} s", moment.t_s), x: axis("u (mm)"), y: axis("v (mm)"), layers }
@@ -183,7 +191,7 @@ fn time_figure(rod: &Trial) -> Figure {
             rod.moments.iter().filter_map(|moment| Some((moment.t_s, moment.percepts[signal].direction?.to_degrees())));
         let mark = Mark::Dots { points: frame_by_frame.collect(), radius: 1.2 };
         let names = ["raw, frame by frame", "linearised, frame by frame"];
-        direction.push(Layer { mark, colour: faint, name: Some(names[signal]) });
+        direction.push(Layer { mark, colour: faint, name: Some(names[signal].into()) });
     }
     for signal in 0..2 {
         let filtered = |moment: &Moment| moment.percepts[signal].filtered_direction;
@@ -199,7 +207,7 @@ fn time_figure(rod: &Trial) -> Figure {
         let grid = axis(label, range, 45.0).ticks.into_iter().map(|y| Layer {
             mark: Mark::Dashed { from: (0.0, y), to: (4.0, y) },
             colour: DOTTED,
-            name: Some("each 45°"),
+            name: Some("each 45°".into()),
         });
         let layers = grid.chain(layers).collect();
         let (x, y) = (axis("time (s)", [0.0, 4.0], 0.5), axis(label, range, step));
@@ -247,7 +255,7 @@ fn broken_line(
         }
         before = angle;
     }
-    Layer { mark: Mark::Lines { runs, width }, colour, name: Some(name) }
+    Layer { mark: Mark::Lines { runs, width }, colour, name: Some(name.into()) }
 }
 
 #[cfg(test)]

@@ -44,7 +44,7 @@ impl Findings {
             radius: 2.2,
         };
         let width = (600.0 / self.sensors.len().max(1) as f64).clamp(0.6, 6.0);
-        let layer = |mark: Mark, colour: Colour, name: &'static str| Layer { mark, colour, name: Some(name) };
+        let layer = |mark: Mark, colour: Colour, name: &'static str| Layer { mark, colour, name: Some(name.into()) };
         let layers = vec![
             layer(Mark::Lines { runs: travels, width }, TRAVEL, "pressed"),
             layer(Mark::Lines { runs: bands, width: 1.4 * width }, DEAD, "dead band"),

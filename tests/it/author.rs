@@ -433,7 +433,7 @@ fn a_grid_is_refused_where_it_would_tear() {
         let cap = made(&ball, &of(grid, "box = [[-1, -1, 0.094], [1, 1, 1]]"));
         assert!(cap.places[0].least_spacing_m.unwrap() > 0.008, "{:?}", cap.places[0]);
         let line = why(&ball, &of(grid, "box = [[-1, -1, -1], [1, 1, 1]]"));
-        assert!(line.contains(&format!("a {grid} grid with a pitch of 10 mm tears on region `cap`")), "{line}");
+        assert!(line.contains(&format!("a {grid} grid with a pitch of 10.0 mm tears on region `cap`")), "{line}");
         let count: f64 = line.split("`taxels = ").nth(1).unwrap().split('`').next().unwrap().parse().unwrap();
         assert!((count / (4.0 * std::f64::consts::PI * 0.01 / 1e-4) - 1.0).abs() < 0.2, "{line}");
         let apart: f64 = line.split("are neighbours ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();

@@ -40,10 +40,11 @@ fn even_taxels_are_truer_than_scattered_ones_and_nearly_ideal() {
     let layouts = [even, scattered, ideal];
     let places = layouts.map(|of| of.place_m().unwrap());
     let axes = layouts.map(|of| of.axis_rad().unwrap());
-    for (what, of) in [("place", places), ("axis", axes)] {
+    // At the sheet's borders, which the ideal skin has not, lines are cut off.
+    for (what, of, of_ideal) in [("place", places, 1.5), ("axis", axes, 2.0)] {
         assert!(of.iter().all(|errors| errors.count > 150), "{what}: {of:?}");
         assert!(of[0].median < 0.85 * of[1].median && of[0].p95 < 0.9 * of[1].p95, "{what}: {of:?}");
-        assert!(of[0].median < 1.5 * of[2].median && of[2].median < 1.1 * of[0].median, "{what}: {of:?}");
+        assert!(of[0].median < of_ideal * of[2].median && of[2].median < 1.1 * of[0].median, "{what}: {of:?}");
     }
     let nearer = compared.second_is_nearer().unwrap();
     assert!((0.55..0.95).contains(&nearer), "{nearer}");

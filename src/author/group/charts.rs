@@ -1,6 +1,6 @@
 //! Charts of the fields that rules made: computed, checked, and if there is none split or reported.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3};
 
@@ -38,6 +38,10 @@ const WINDOWS_OF_FIELD: usize = 150_000;
 
 type Fitted = std::result::Result<FieldSpec, NoChart>;
 
+/// By the taxels of a field on the left half of a mirrored layout, those of the parts into which it or its image is split; none where
+/// it is whole.
+type PartsOnLeft = BTreeMap<Vec<usize>, Vec<Vec<usize>>>;
+
 impl Grouper<'_> {
     /// Computes all charts.
     ///
@@ -67,6 +71,7 @@ impl Grouper<'_> {
         let made = std::mem::take(&mut self.made);
         let count = made.len();
         let (mut pool, mut bounded) = (MAX_WINDOWS - 1, 0);
+        let mut parts_on_left = PartsOnLeft::new();
         for (index, ((made, plane), ids)) in made.into_iter().zip(planes).zip(members).enumerate() {
             report_progress(progress, index as f64 / count as f64).map_err(|e| (made.rule, e))?;
             let name = made.spec.name.clone();
@@ -78,8 +83,22 @@ impl Grouper<'_> {
             pool = (pool + WINDOWS_OF_FIELD).min(MAX_WINDOWS - 1);
             *self.unroller.windows_left() = (made.chart != ChartWish::Geodesic).then_some(pool);
             let whole = made.spec.clone().with_members(ids);
+            let none = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
+            // A field that could have a plane chart by default must state that it has none.
+            let uncharted = FieldSpec { chart: plane.is_ok().then_some(none), ..made.spec.clone() };
+            let on_left = self.on_left(&whole);
+            let image_parts = on_left.as_ref().and_then(|taxels| parts_on_left.get(taxels));
+            if let Some(parts) = image_parts.filter(|parts| !parts.is_empty()) {
+                let parts = self.parts_like(&made, &whole, &mut bare, parts);
+                notes.split.push((name, parts.len(), "its mirror image is".to_owned()));
+                fields.push(uncharted);
+                fields.extend(parts);
+                continue;
+            }
+            let image_is_whole = image_parts.is_some();
             let why = match self.fit(&made, &whole, plane.clone()) {
                 Ok(spec) => {
+                    parts_on_left.extend(on_left.map(|taxels| (taxels, Vec::new())));
                     // With a plane chart, a parent needs no members of its own.
                     let unrolled = spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
                     fields.push(if unrolled { spec } else { FieldSpec { chart: spec.chart, ..made.spec } });
@@ -87,9 +106,6 @@ impl Grouper<'_> {
                 }
                 Err(why) => why,
             };
-            // A field that could have a plane chart by default must state that it has none.
-            let none = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
-            let uncharted = FieldSpec { chart: plane.is_ok().then_some(none), ..made.spec.clone() };
             let parent = has_children(&name);
             match made.wrap {
                 Wrap::Refuse => {
@@ -99,11 +115,13 @@ impl Grouper<'_> {
                     let what = format!("field `{name}` cannot have the chart it asks for: {why}{advice}");
                     return Err((made.rule, Error::failed(what)));
                 }
-                Wrap::Split if !parent => {
+                Wrap::Split if !parent && !image_is_whole => {
                     fields.push(uncharted);
                     match self.split(&made, &whole, &mut bare, MAX_PARTS) {
                         Some(parts) => {
                             let why = chart_notes::plain(&why);
+                            let of_left = parts.iter().filter_map(|part| self.on_left(part)).collect();
+                            parts_on_left.extend(on_left.map(|taxels| (taxels, of_left)));
                             notes.split.push((name, parts.len(), why));
                             fields.extend(parts);
                         }
@@ -182,19 +200,54 @@ impl Grouper<'_> {
         Distortion::of(&members, &places).largest
     }
 
+    /// The taxels of a field that is on one half of a mirrored layout, or their images, whichever are on the left; ascending.
+    fn on_left(&self, field: &FieldSpec) -> Option<Vec<usize>> {
+        let taxels = self.taxels_of(field);
+        let is_right = self.halves.is_right(&taxels)?;
+        Some(if is_right { self.halves.images(&taxels) } else { taxels })
+    }
+
+    /// The body's taxels that are own members of `field`, ascending.
+    fn taxels_of(&self, field: &FieldSpec) -> Vec<usize> {
+        let mut taxels: Vec<usize> = field.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
+        taxels.sort_unstable();
+        taxels
+    }
+
+    /// `whole` in parts that are the mirror images of others, of which `on_left` has the taxels on the left: without a chart where
+    /// this side has none.
+    fn parts_like(
+        &mut self,
+        made: &FieldDraft,
+        whole: &FieldSpec,
+        bare: &mut Body,
+        on_left: &[Vec<usize>],
+    ) -> Vec<FieldSpec> {
+        let is_right = self.halves.is_right(&self.taxels_of(whole)) == Some(true);
+        let part = |part: &Vec<usize>| if is_right { self.halves.images(part) } else { part.clone() };
+        let taxels: Vec<Vec<usize>> = on_left.iter().map(part).collect();
+        let parts = taxels.iter().map(|taxels| self.part(made, whole, bare, taxels).unwrap_or_else(|why| why));
+        let parts = parts.collect();
+        self.with_side_names(whole, parts)
+    }
+
     /// At most `most` parts of `whole` that each have the chart that `made` requests: the fewest sectors around a limb, else
     /// two halves, which are split again if they have no chart.
     fn split(&mut self, made: &FieldDraft, whole: &FieldSpec, bare: &mut Body, most: usize) -> Option<Vec<FieldSpec>> {
         let taxels: Vec<usize> = whole.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
-        let parts = self.parts(made, whole, bare, &taxels, most);
-        let mut parts = parts?;
+        let parts = self.parts(made, whole, bare, &taxels, most)?;
+        Some(self.with_side_names(whole, parts))
+    }
+
+    /// `parts` of `whole`, called by their sides, by ascending lowest id.
+    fn with_side_names(&self, whole: &FieldSpec, mut parts: Vec<FieldSpec>) -> Vec<FieldSpec> {
         parts.sort_by_key(|part| part.members.keys().next().copied());
         let members = |part: &FieldSpec| part.members.keys().filter_map(|&id| self.body.taxel_index(id)).collect();
         let names = self.side_names(&parts.iter().map(members).collect::<Vec<_>>());
         for (part, name) in parts.iter_mut().zip(names) {
             part.name = format!("{}/{name}", whole.name);
         }
-        Some(parts)
+        parts
     }
 
     /// The parts into which `taxels` of `whole` are split, unnamed.
@@ -213,8 +266,8 @@ impl Grouper<'_> {
             for (half, after) in halves.iter().zip([1, 0]) {
                 let room = most.checked_sub(parts.len() + after).filter(|&room| room > 0)?;
                 match self.part(made, whole, bare, half) {
-                    Some(part) => parts.push(part),
-                    None => parts.extend(self.parts(made, whole, bare, half, room)?),
+                    Ok(part) => parts.push(part),
+                    Err(_) => parts.extend(self.parts(made, whole, bare, half, room)?),
                 }
             }
             return Some(parts);
@@ -224,7 +277,7 @@ impl Grouper<'_> {
             if sectors.len() > 1
                 && sectors.len() <= most
                 && sectors.iter().all(|sector| sector.len() >= MIN_SECTOR_TAXELS)
-                && let Some(parts) = sectors.iter().map(|taxels| self.part(made, whole, bare, taxels)).collect()
+                && let Some(parts) = sectors.iter().map(|taxels| self.part(made, whole, bare, taxels).ok()).collect()
             {
                 return Some(parts);
             }
@@ -238,8 +291,8 @@ impl Grouper<'_> {
         let mut parts = Vec::new();
         for (half, after) in halves.iter().zip((0..halves.len()).rev()) {
             match self.part(made, whole, bare, half) {
-                Some(part) => parts.push(part),
-                None => {
+                Ok(part) => parts.push(part),
+                Err(_) => {
                     let room = most.checked_sub(parts.len() + after).filter(|&room| room > 1)?;
                     parts.extend(self.parts(made, whole, bare, half, room)?);
                 }
@@ -248,8 +301,14 @@ impl Grouper<'_> {
         Some(parts)
     }
 
-    /// The child of `whole` with `taxels`, if it has its chart.
-    fn part(&mut self, made: &FieldDraft, whole: &FieldSpec, bare: &mut Body, taxels: &[usize]) -> Option<FieldSpec> {
+    /// The child of `whole` with `taxels` and its chart; if there is none, the child without.
+    fn part(
+        &mut self,
+        made: &FieldDraft,
+        whole: &FieldSpec,
+        bare: &mut Body,
+        taxels: &[usize],
+    ) -> std::result::Result<FieldSpec, FieldSpec> {
         let member = |&taxel: &usize| {
             let id = self.body.taxels[taxel].id;
             (id, whole.members.get(&id).copied().unwrap_or_default())
@@ -257,8 +316,12 @@ impl Grouper<'_> {
         let members = taxels.iter().map(member).collect();
         let part = FieldSpec { name: whole.name.clone(), parent: Some(whole.name.clone()), members, chart: None };
         bare.fields = vec![planar(FieldSpec { parent: None, ..part.clone() }, made.u)];
-        let plane = FieldSet::new(bare).ok()?.fields.pop()?.chart;
-        self.fit(made, &part, plane).ok()
+        let plane = FieldSet::new(bare).ok().and_then(|mut set| set.fields.pop()).map(|field| field.chart);
+        let none = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
+        match plane {
+            Some(plane) => self.fit(made, &part, plane).map_err(|_| FieldSpec { chart: Some(none), ..part }),
+            None => Err(FieldSpec { chart: Some(none), ..part }),
+        }
     }
 
     /// `taxels` in `count` sectors by the direction of their normals around the axis most perpendicular to them; on the right half of a

@@ -17,8 +17,8 @@ pub(super) fn figure(names: [&str; 2], compared: &ComparedLayouts) -> Figure {
     let axis = |touch: &TouchError| touch.axis_rad.map(f64::to_degrees);
     let [first, second] = names.map(short_name);
     let panels = vec![
-        panel(format!("place; A: {first}"), "off by, mm", compared, place),
-        panel(format!("axis of lines; B: {second}"), "off by, degrees", compared, axis),
+        panel("place", "off by, mm", [&first, &second], compared, place),
+        panel("axis of lines", "off by, degrees", [&first, &second], compared, axis),
     ];
     Figure {
         title: "Errors of simulated touches",
@@ -37,16 +37,23 @@ fn short_name(name: &str) -> String {
     if count > MOST { format!("…{cut}") } else { cut }
 }
 
-fn panel(title: String, label: &'static str, compared: &ComparedLayouts, of: fn(&TouchError) -> Option<f64>) -> Panel {
+fn panel(
+    title: &str,
+    label: &'static str,
+    names: [&str; 2],
+    compared: &ComparedLayouts,
+    of: fn(&TouchError) -> Option<f64>,
+) -> Panel {
     let [a, b] = &compared.layouts;
     let [ideal_a, ideal_b] = &compared.ideal;
-    let mut curves = vec![(ideal_a, IDEAL[0], "ideal A"), (a, FIRST, "A"), (b, SECOND, "B")];
+    let [first, second] = [("A", names[0]), ("B", names[1])].map(|(letter, name)| format!("{letter}: {name}"));
+    let mut curves = vec![(ideal_a, IDEAL[0], "ideal A".to_owned()), (a, FIRST, first), (b, SECOND, second)];
     if (ideal_a.spacing_m / ideal_b.spacing_m - 1.0).abs() > ALIKE {
-        curves.insert(1, (ideal_b, IDEAL[1], "ideal B"));
+        curves.insert(1, (ideal_b, IDEAL[1], "ideal B".to_owned()));
     } else {
-        curves[0].2 = "ideal";
+        "ideal".clone_into(&mut curves[0].2);
     }
-    let sorted: Vec<(Vec<f64>, Colour, &str)> =
+    let sorted: Vec<(Vec<f64>, Colour, String)> =
         curves.into_iter().map(|(errors, colour, name)| (sorted(errors, of), colour, name)).collect();
     // All but the last percent, as a few touches may be far off.
     let far = |errors: &Vec<f64>| errors.get((0.99 * errors.len() as f64) as usize).copied();
@@ -54,10 +61,10 @@ fn panel(title: String, label: &'static str, compared: &ComparedLayouts, of: fn(
     let layers = sorted.into_iter().map(|(errors, colour, name)| Layer {
         mark: Mark::Lines { runs: vec![shares(&errors, end)], width: 2.0 },
         colour,
-        name: Some(name),
+        name: Some(name.into()),
     });
     Panel {
-        title,
+        title: title.to_owned(),
         x: Axis { label, range: [0.0, end], ticks },
         y: Axis {
             label: "touches, %",
