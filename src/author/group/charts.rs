@@ -226,7 +226,7 @@ impl Grouper<'_> {
         let is_right = self.halves.is_right(&self.taxels_of(whole)) == Some(true);
         let part = |part: &Vec<usize>| if is_right { self.halves.images(part) } else { part.clone() };
         let taxels: Vec<Vec<usize>> = on_left.iter().map(part).collect();
-        let parts = taxels.iter().map(|taxels| self.part(made, whole, bare, taxels).unwrap_or_else(|why| why));
+        let parts = taxels.iter().map(|taxels| self.part(made, whole, bare, taxels).0);
         let parts = parts.collect();
         self.with_side_names(whole, parts)
     }
@@ -266,8 +266,8 @@ impl Grouper<'_> {
             for (half, after) in halves.iter().zip([1, 0]) {
                 let room = most.checked_sub(parts.len() + after).filter(|&room| room > 0)?;
                 match self.part(made, whole, bare, half) {
-                    Ok(part) => parts.push(part),
-                    Err(_) => parts.extend(self.parts(made, whole, bare, half, room)?),
+                    (part, true) => parts.push(part),
+                    _ => parts.extend(self.parts(made, whole, bare, half, room)?),
                 }
             }
             return Some(parts);
@@ -277,7 +277,7 @@ impl Grouper<'_> {
             if sectors.len() > 1
                 && sectors.len() <= most
                 && sectors.iter().all(|sector| sector.len() >= MIN_SECTOR_TAXELS)
-                && let Some(parts) = sectors.iter().map(|taxels| self.part(made, whole, bare, taxels).ok()).collect()
+                && let Some(parts) = sectors.iter().map(|taxels| self.charted(made, whole, bare, taxels)).collect()
             {
                 return Some(parts);
             }
@@ -291,8 +291,8 @@ impl Grouper<'_> {
         let mut parts = Vec::new();
         for (half, after) in halves.iter().zip((0..halves.len()).rev()) {
             match self.part(made, whole, bare, half) {
-                Ok(part) => parts.push(part),
-                Err(_) => {
+                (part, true) => parts.push(part),
+                _ => {
                     let room = most.checked_sub(parts.len() + after).filter(|&room| room > 1)?;
                     parts.extend(self.parts(made, whole, bare, half, room)?);
                 }
@@ -301,14 +301,8 @@ impl Grouper<'_> {
         Some(parts)
     }
 
-    /// The child of `whole` with `taxels` and its chart; if there is none, the child without.
-    fn part(
-        &mut self,
-        made: &FieldDraft,
-        whole: &FieldSpec,
-        bare: &mut Body,
-        taxels: &[usize],
-    ) -> std::result::Result<FieldSpec, FieldSpec> {
+    /// The child of `whole` with `taxels`, and whether it has its chart.
+    fn part(&mut self, made: &FieldDraft, whole: &FieldSpec, bare: &mut Body, taxels: &[usize]) -> (FieldSpec, bool) {
         let member = |&taxel: &usize| {
             let id = self.body.taxels[taxel].id;
             (id, whole.members.get(&id).copied().unwrap_or_default())
@@ -318,10 +312,21 @@ impl Grouper<'_> {
         bare.fields = vec![planar(FieldSpec { parent: None, ..part.clone() }, made.u)];
         let plane = FieldSet::new(bare).ok().and_then(|mut set| set.fields.pop()).map(|field| field.chart);
         let none = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
-        match plane {
-            Some(plane) => self.fit(made, &part, plane).map_err(|_| FieldSpec { chart: Some(none), ..part }),
-            None => Err(FieldSpec { chart: Some(none), ..part }),
+        match plane.and_then(|plane| self.fit(made, &part, plane).ok()) {
+            Some(charted) => (charted, true),
+            None => (FieldSpec { chart: Some(none), ..part }, false),
         }
+    }
+
+    /// The same if it has its chart.
+    fn charted(
+        &mut self,
+        made: &FieldDraft,
+        whole: &FieldSpec,
+        bare: &mut Body,
+        taxels: &[usize],
+    ) -> Option<FieldSpec> {
+        Some(self.part(made, whole, bare, taxels)).filter(|(_, has_chart)| *has_chart).map(|(part, _)| part)
     }
 
     /// `taxels` in `count` sectors by the direction of their normals around the axis most perpendicular to them; on the right half of a

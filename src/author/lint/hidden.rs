@@ -10,10 +10,9 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::drawn_poses::DrawnPoses;
-use super::posed_surface::{DIRECTIONS, PosedSurface, directions};
+use super::posed_surface::{BodyPoint, DIRECTIONS, PosedSurface, directions};
 use super::shells::ShellsOfLinks;
 use super::taxels_at_rest::taxels_at_rest;
-use super::touchable::BodyPoint;
 use crate::body::Body;
 use crate::parallel;
 
@@ -109,10 +108,10 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn F
     for (index, seen) in checked.into_iter().zip(seen) {
         let Some(mut seen) = seen else { continue };
         let taxel = &body.taxels[index];
-        if seen.reach == Reach::CoveredAtRest {
-            if !shells.of(taxel.link).is_open_at(points[index].position, &surface, &search.directions) {
-                seen.reach = Reach::Hidden;
-            }
+        if seen.reach == Reach::CoveredAtRest
+            && !shells.of(taxel.link).is_open_at(points[index].position, &surface, &search.directions)
+        {
+            seen.reach = Reach::Hidden;
         }
         hidden.checked.push((index, seen.reach));
         if seen.is_inward {

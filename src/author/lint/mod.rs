@@ -20,4 +20,5 @@ pub(crate) use drawn_poses::drawn_position;
 pub use finding::{Finding, FindingKind, LinkShare};
 #[cfg(feature = "meshes")]
 pub(crate) use large::MAX_LIKELY_LINK_M;
-pub(super) use touchable::{BodyPoint, Touchable};
+pub(super) use posed_surface::BodyPoint;
+pub(super) use touchable::Touchable;

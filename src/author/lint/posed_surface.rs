@@ -3,7 +3,6 @@
 use glam::{DAffine3, DVec3};
 
 use super::drawn_poses::DrawnPoses;
-use super::touchable::BodyPoint;
 use crate::body::{Body, Home, Ray, RayTree, Surface};
 
 /// Directions from each taxel.
@@ -23,6 +22,17 @@ pub(super) fn directions() -> Vec<DVec3> {
         DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), height)
     };
     (0..DIRECTIONS).map(direction).collect()
+}
+
+/// A point of the surface of a body.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::author) struct BodyPoint {
+    /// The link that it moves with.
+    pub(in crate::author) link: usize,
+    /// In the body at rest, m.
+    pub(in crate::author) position: DVec3,
+    /// Outward unit normal, in the body at rest.
+    pub(in crate::author) normal: DVec3,
 }
 
 /// Triangles that move together, or those of a skinned mesh, one pose after the other.

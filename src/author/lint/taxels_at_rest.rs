@@ -4,8 +4,8 @@ use std::cell::OnceCell;
 
 use glam::{DAffine3, DVec3};
 
-use super::posed_surface::{START_M, is_skin_mirrored};
-use super::touchable::BodyPoint;
+use super::posed_surface::{BodyPoint, START_M, is_skin_mirrored};
+
 use crate::body::{Body, Home, Surface, SurfaceIndex, Taxel, area_vector};
 use crate::field::geodesic::barycentric;
 

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::drawn_poses::DrawnPoses;
-use super::posed_surface::{DIRECTIONS, PosedSurface, directions};
+use super::posed_surface::{BodyPoint, DIRECTIONS, PosedSurface, directions};
 use crate::body::Body;
 use crate::parallel;
 
@@ -16,17 +16,6 @@ const ENOUGH: usize = 5;
 
 /// Points that a thread takes at a time.
 const PER_TASK: usize = 32;
-
-/// A point of the surface of a body.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::author) struct BodyPoint {
-    /// The link that it moves with.
-    pub(in crate::author) link: usize,
-    /// In the body at rest, m.
-    pub(in crate::author) position: DVec3,
-    /// Outward unit normal, in the body at rest.
-    pub(in crate::author) normal: DVec3,
-}
 
 /// A body's surface, with what stands before it.
 pub(in crate::author) struct Touchable<'a> {
