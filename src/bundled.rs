@@ -2,31 +2,7 @@
 //!
 //! What each of them is, and the recipe that makes it, is in `bodies/README.md`.
 
-/// A right hand of four digits with 40 taxels, after the paper's.
-pub const HAND: &[u8] = include_bytes!("../bodies/hand.glb");
-
-/// A pressure mat for a bed: 64 × 32 taxels.
-pub const MAT: &[u8] = include_bytes!("../bodies/mat.glb");
-
-/// A humanoid of a small child's shape with 960 taxels, skinned to 17 links.
-pub const HUMANOID: &[u8] = include_bytes!("../bodies/humanoid.glb");
-
-/// Some seconds of touch on [`HAND`], as CSV. It is computed, not measured.
-pub const TOUCH: &[u8] = include_bytes!("../bodies/touch.csv");
-
-/// What the bundled bodies are called.
-pub const BODIES: [&str; 3] = ["hand", "mat", "humanoid"];
-
-/// The bundled body called `name`, one of [`BODIES`].
-#[must_use]
-pub fn body(name: &str) -> Option<&'static [u8]> {
-    match name {
-        "hand" => Some(HAND),
-        "mat" => Some(MAT),
-        "humanoid" => Some(HUMANOID),
-        _ => None,
-    }
-}
+pub use somatic_bodies::{BODIES, HAND, HUMANOID, MAT, TOUCH, body};
 
 #[cfg(test)]
 mod tests {

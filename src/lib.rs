@@ -51,54 +51,39 @@
 
 #[cfg(test)]
 extern crate self as somatic;
+// Its macros `setters!` and `words!`.
+#[macro_use]
+extern crate somatic_skin;
 
-#[macro_use]
-mod setters;
-#[macro_use]
-mod words;
 // The skins of `somatic bench`.
 #[cfg(all(test, feature = "cli"))]
 #[allow(dead_code, unreachable_pub, reason = "tests of the library need some of it")]
 #[path = "experiments/shape.rs"]
 mod shape;
 
-pub mod author;
 pub mod backend;
-pub mod body;
 pub mod bundled;
-#[cfg(any(feature = "page", feature = "cli"))]
-mod colours;
 #[cfg(feature = "ros2")]
 mod dds;
 mod engine;
-pub mod error;
 pub mod expected;
-pub mod field;
 #[cfg(feature = "cli")]
 pub mod figure;
 pub mod gains;
 #[cfg(feature = "cli")]
 mod ink;
-mod keys;
-mod length;
 mod limb;
-pub mod limits;
-pub mod output;
 #[cfg(feature = "page")]
 pub mod page;
-mod parallel;
 pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
-pub mod plain;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "mcap")]
 pub mod recording;
-pub mod renamed;
 pub mod robot;
 pub mod scene;
-pub mod signal;
 pub mod sink;
 pub mod source;
 mod stage;
@@ -106,6 +91,80 @@ pub mod touch;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 pub mod wire;
+
+pub use somatic_skin::{error, limits, plain, renamed};
+// The same paths in this crate as if they were its own.
+#[allow(unused_imports, reason = "which of them are used hangs on features")]
+use somatic_skin::{colours, keys, length, parallel, random};
+
+/// Authoring: taxels placed on a surface, fields of them, and what is wrong with a layout.
+pub mod author {
+    #[cfg(feature = "meshes")]
+    #[doc(inline)]
+    pub use somatic_author::mesh;
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_author::*;
+    #[doc(inline)]
+    pub use somatic_author::{
+        Authored, Coverage, DrawnPoses, Finding, FindingKind, GridOrder, Hole, LinkCoverage, LinkShare, PlaceReport,
+        Placed, Progress, Recipe, Sheet, SheetCell, SheetGrid, SurfacePoint, author, author_csv_skin, author_icub,
+        author_sheets, author_while, blend_skinning, cell_spread, coverage, group, heaviest_four, icub, lint,
+        lint_in_poses, lint_with_progress, place_apart, place_by_density, place_evenly, recipe_values, refresh, sheets,
+        widest_radius,
+    };
+}
+
+/// Bodies: links, surfaces and taxels, read from glTF and written to it.
+pub mod body {
+    #[doc(inline)]
+    pub use somatic_skin::body::{
+        BODY_FROM_WORLD, Body, ChartKind, ChartSpec, Details, EdgeRow, FieldSpec, Flaws, Glb, Hit, Home, Link,
+        LinkJoint, LinkMimic, LinkMotion, MAX_TAXEL_ID, Mark, MemberSpec, MeshData, Modality, NONE, Original, Paint,
+        Part, Sheet, SheetCell, Skinning, StoredEdges, Surface, SurfaceIndex, Taxel, TaxelRow, TaxelSource, Topology,
+        Up, WORLD_FROM_BODY, WORLD_FROM_BODY_ROTATION, blend_skinning, heaviest_four, read_taxel_table, sheets,
+        taxel_table,
+    };
+    // For this crate alone.
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_skin::body::*;
+}
+
+/// Receptive fields on a body's surface: distances, charts, cells and neighbours of taxels.
+pub mod field {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_skin::field::*;
+    #[doc(inline)]
+    pub use somatic_skin::field::{
+        Chart, ContactTolerance, Distortion, Field, FieldSet, Lift, Member, NoChart, RestOverlap, TaxelGraph, Unroller,
+        WORLD, geodesic, mean_normals, neighbours, rest_overlaps, unions,
+    };
+}
+
+/// What sensors say: frames of raw values, calibrations, wirings and drift.
+pub mod signal {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_skin::signal::*;
+    #[doc(inline)]
+    pub use somatic_skin::signal::{
+        BoardHealth, Calibration, ChangeCalibration, Checks, ContactThresholds, Curve, DriftKeys, FARTHEST_POSE_M,
+        Frame, FrameBlock, FrameTime, FsrCircuit, FsrResponse, FsrSignal, LaidOver, LayerResponse, Letter, Mark, Onset,
+        Pose, Quantity, RawValue, Receptor, Response, Sensors, TaxelCalibration, Unfit, UnitOfP, WiredBoard, Wiring,
+    };
+}
+
+/// Outputs: the only code that writes files, and the checks of where it may write.
+pub mod output {
+    #[cfg(unix)]
+    #[doc(inline)]
+    pub use somatic_skin::output::OutputLink;
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_skin::output::*;
+    #[doc(inline)]
+    pub use somatic_skin::output::{
+        GrowingFile, OutputFile, OutputFolder, OutputPath, OutputPaths, PrivateFile, abandon_outputs,
+        refuse_standard_output,
+    };
+}
 
 pub use backend::BackendKind;
 pub use backend::agreement::{Agreement, ComparedColumn, Comparison, Verdict};

@@ -1,6 +1,6 @@
 //! Where a layout is pressed, and how.
 
-use crate::author::random::Random;
+use crate::random::Random;
 use crate::source::GivenPress;
 
 /// Standard deviation of the pressure, and length of a line, in spacings.

@@ -4,12 +4,6 @@ use std::collections::BTreeMap;
 
 use glam::{DAffine3, DVec3};
 
-// The library's own random numbers.
-#[allow(clippy::duplicate_mod, reason = "the library's own tests have both")]
-#[path = "../author/random.rs"]
-mod random;
-
-use self::random::Random;
 use somatic::backend::BackendKind;
 use somatic::body::{Body, FieldSpec, Link, MAX_TAXEL_ID, MemberSpec, Modality, Taxel};
 use somatic::error::{Error, Result};
@@ -17,6 +11,7 @@ use somatic::percept::{Column, Outputs};
 use somatic::scene::{Coverage, Knobs, Scene};
 use somatic::signal::{Frame, RawValue};
 use somatic::{Engine, Options};
+use somatic_skin::random::Random;
 
 /// How many of what; the rest follows from it and the seed.
 ///

@@ -6,12 +6,12 @@ use std::fmt::Write as _;
 use glam::DVec2;
 
 use super::TestFrames;
-use crate::author::random::Random;
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::{Error, Result};
 use crate::field::FieldSet;
 use crate::percept::Outputs;
+use crate::random::Random;
 use crate::scene::{Knobs, Plan, PlanField, Scene};
 use crate::signal::{Calibration, Frame, LayerResponse, Letter};
 use crate::source::{SimulatedSource, Source as _};

@@ -42,9 +42,6 @@ mod plan;
 mod plot;
 mod presses;
 mod python;
-// The library's own numbers that look like chance.
-#[path = "../../src/author/random.rs"]
-mod random;
 mod recording;
 #[cfg(all(unix, feature = "zenoh"))]
 mod relay;
@@ -77,6 +74,9 @@ mod tune;
 mod view;
 mod voronoi;
 mod world;
+
+// The library's own numbers that look like chance.
+use somatic_skin::random;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

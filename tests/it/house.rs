@@ -17,6 +17,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("length", vec![]),
         ("limits", vec![]),
         ("plain", vec![]),
+        ("random", vec![]),
         ("renamed", vec![]),
         ("setters", vec![]),
         ("words", vec!["error"]),
@@ -70,7 +71,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
 }
 
 /// What every module may use, and which use nothing.
-const FOR_ALL: [&str; 3] = ["limits", "plain", "renamed"];
+const FOR_ALL: [&str; 4] = ["limits", "plain", "random", "renamed"];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -83,17 +84,47 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every file under `src/`, as (top module, path, text without its tests).
+/// The source folders of the crates, and what their paths begin with in the crate that has all of them under its own name.
+const CRATES: [(&str, &str); 3] = [("src", ""), ("crates/skin/src", ""), ("crates/author/src", "author")];
+
+/// The rooms of `somatic-skin` that other crates of the house call as if they were their own.
+const GROUND_FLOOR: [&str; 9] = ["body", "error", "field", "keys", "length", "limits", "parallel", "plain", "random"];
+
+/// Every file of every crate: its path as if all were one crate, and its text, in which the paths are such too.
+fn house() -> Vec<(PathBuf, String)> {
+    let mut all = Vec::new();
+    for (folder, room) in CRATES {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        let mut files = Vec::new();
+        rust_files(&root, &mut files);
+        for file in files {
+            let mut within = Path::new(room).join(file.strip_prefix(&root).unwrap());
+            let mut text = std::fs::read_to_string(&file).unwrap();
+            if folder != "src" && within.ends_with("lib.rs") {
+                if room.is_empty() {
+                    continue;
+                }
+                within = within.with_file_name("mod.rs");
+            }
+            if !room.is_empty() {
+                let own = format!("crate::{room}::");
+                text = text.replace("crate::", &own);
+                for ground in GROUND_FLOOR {
+                    text = text.replace(&format!("{own}{ground}"), &format!("crate::{ground}"));
+                }
+            }
+            all.push((within, text));
+        }
+    }
+    all
+}
+
+/// Every file, as (top module, path, text without its tests).
 fn sources() -> Vec<(String, PathBuf, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    rust_files(&root, &mut files);
-    files
+    house()
         .into_iter()
-        .map(|path| {
-            let within = path.strip_prefix(&root).unwrap().to_path_buf();
-            let module = within.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs").to_owned();
-            let text = std::fs::read_to_string(&path).unwrap();
+        .map(|(within, text)| {
+            let module = room(&within).to_owned();
             let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap().to_owned();
             (module, within, text)
         })
@@ -102,16 +133,10 @@ fn sources() -> Vec<(String, PathBuf, String)> {
 
 /// All files but the command's own root, with their tests, which [`Paths`] leaves out.
 fn paths() -> Paths {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    rust_files(&root, &mut files);
-    Paths::of(files.into_iter().filter(|file| !file.ends_with("main.rs")).map(|file| {
-        let text = std::fs::read_to_string(&file).unwrap();
-        (file.strip_prefix(&root).unwrap().to_path_buf(), text)
-    }))
+    Paths::of(house().into_iter().filter(|(file, _)| !file.ends_with("main.rs")))
 }
 
-/// The room that a file is of: a folder of `src/`, or a file there.
+/// The room that a file is of: a folder of a crate, or a file there.
 fn room(file: &Path) -> &str {
     file.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs")
 }
@@ -284,7 +309,11 @@ fn only_outputs_are_written() {
             line.match_indices(word).any(|(at, _)| !line[..at].ends_with(char::is_alphanumeric))
         };
         for word in writes.into_iter().filter(|word| code.iter().any(|line| says(line, word))) {
-            assert!(module == "output", "{} says {word}; files are written by src/output alone", path.display());
+            assert!(
+                module == "output",
+                "{} says {word}; files are written by crates/skin/src/output alone",
+                path.display()
+            );
             seen.push(word);
         }
     }
@@ -317,7 +346,7 @@ fn files_are_read_whole_within_limits_only() {
                 .any(|at| path.starts_with(at));
             let allowed =
                 path == Path::new("limits.rs") || (streams && ["File::open(", "read_to_end("].contains(&word));
-            assert!(allowed, "{} says {word}; a file is read whole by src/limits.rs alone", path.display());
+            assert!(allowed, "{} says {word}; a file is read whole by crates/skin/src/limits.rs alone", path.display());
             seen.push(word);
         }
     }

@@ -39,9 +39,6 @@ mod motion;
 mod on_skin;
 mod paths;
 mod properties;
-// The library's own numbers that look like chance.
-#[path = "../../src/author/random.rs"]
-mod random;
 mod real;
 mod recordings;
 // The skins of `somatic bench`.
@@ -62,3 +59,6 @@ mod verify;
 mod wire;
 mod world;
 mod worst;
+
+// The library's own numbers that look like chance.
+use somatic_skin::random;

@@ -150,7 +150,7 @@ impl Clock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::author::random::Random;
+    use crate::random::Random;
 
     /// The largest error of placing, s, after `from_s`, and the drift found, of a clock with this `drift` whose frames come
     /// every 20 ms with delays of 3 ms and up to `jitter_s` more, now and then 50 ms more.

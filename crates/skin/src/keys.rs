@@ -1,0 +1,110 @@
+//! Checks of values in TOML files; each error has its line and column.
+
+use std::fmt::Display;
+use std::ops::Range;
+
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+
+use crate::error::{Error, Result, parse_toml, place_in, unknown};
+
+/// Larger numbers are not credible in any unit.
+const MAX_CREDIBLE: f64 = 1e9;
+
+/// A file's text.
+#[derive(Clone, Copy)]
+pub struct Text<'a>(pub &'a str);
+
+impl Text<'_> {
+    /// The file's content.
+    pub fn parse<T: DeserializeOwned>(self) -> Result<T> {
+        parse_toml(self.0)
+    }
+
+    /// The error that `what` is wrong at `span`.
+    pub fn wrong(self, span: Range<usize>, what: impl Into<String>) -> Error {
+        self.put(span, Error::failed(what))
+    }
+
+    /// `error`, at `span`.
+    pub fn put(self, span: Range<usize>, error: Error) -> Error {
+        error.at(self.place(span))
+    }
+
+    /// Line and column of the start of `span`.
+    pub fn place(self, span: Range<usize>) -> String {
+        place_in(self.0, span.start)
+    }
+
+    /// The number under `key`, if it is credible and `fits`.
+    fn number(self, key: &str, value: &Spanned<f64>, must: &str, fits: impl Fn(f64) -> bool) -> Result<f64> {
+        let number = *value.get_ref();
+        if fits(number) && number.abs() <= MAX_CREDIBLE {
+            return Ok(number);
+        }
+        Err(self.wrong(value.span(), format!("`{key}` is {number}; it must be {must}, and no more than 1e9 in size")))
+    }
+
+    /// The number under `key`, which must be over 0.
+    pub fn positive(self, key: &str, value: &Spanned<f64>) -> Result<f64> {
+        self.number(key, value, "over 0", |x| x > 0.0)
+    }
+
+    /// The number under `key`, which must not be under 0.
+    pub fn not_negative(self, key: &str, value: &Spanned<f64>) -> Result<f64> {
+        self.number(key, value, "0 or more", |x| x >= 0.0)
+    }
+
+    /// The number under `key`, which must be finite.
+    pub fn finite(self, key: &str, value: &Spanned<f64>) -> Result<f64> {
+        self.number(key, value, "a finite number", f64::is_finite)
+    }
+
+    /// The whole number under `key`, where it is given and in `range`.
+    pub fn int(self, key: &str, value: Option<&Spanned<i64>>, range: Range<i64>) -> Result<Option<u32>> {
+        let Some(value) = value else { return Ok(None) };
+        let number = *value.get_ref();
+        if range.contains(&number) {
+            return Ok(Some(number as u32));
+        }
+        let last = range.end - 1;
+        Err(self.wrong(value.span(), format!("`{key}` is {number}; it must be between {} and {last}", range.start)))
+    }
+
+    /// Rejects times under `key` that are negative or do not increase.
+    pub fn check_times(self, key: &str, span: Range<usize>, times: impl IntoIterator<Item = f64>) -> Result<()> {
+        let mut before = None;
+        for t_s in times {
+            if !(0.0..=MAX_CREDIBLE).contains(&t_s) {
+                return Err(self.wrong(span, format!("`{key}` has the time {t_s}; times are 0 or more, in seconds")));
+            }
+            if let Some(before) = before.replace(t_s).filter(|&before| t_s <= before) {
+                return Err(self.wrong(span, format!("`{key}` has the time {t_s} after {before}; times must increase")));
+            }
+        }
+        if before.is_none() {
+            return Err(self.wrong(span, format!("`{key}` is empty; give at least one entry")));
+        }
+        Ok(())
+    }
+
+    /// Rejects `key` if it is given; `why` says where it has no meaning.
+    pub fn refuse<T>(self, key: &str, value: Option<&Spanned<T>>, why: impl Display) -> Result<()> {
+        match value {
+            Some(value) => Err(self.wrong(value.span(), format!("`{key}` has no effect {why}; remove it"))),
+            None => Ok(()),
+        }
+    }
+
+    /// The error that nothing is called `asked`, with a suggestion from the `known` names.
+    pub fn unknown<'n>(self, asked: &Spanned<String>, what: &str, known: impl IntoIterator<Item = &'n str>) -> Error {
+        self.wrong(asked.span(), unknown(what, asked.get_ref(), known))
+    }
+}
+
+/// `message` without its column.
+#[cfg(test)]
+pub fn without_column(message: &str) -> String {
+    let (before, after) = message.split_once(", column ").unwrap_or((message, ""));
+    format!("{before}{}", after.trim_start_matches(|c: char| c.is_ascii_digit()))
+}
