@@ -17,7 +17,7 @@ pub(super) fn presses(count: usize, spacing_m: f64, mut is_at: impl FnMut(&Given
     let mut next = |number: usize| GivenPress {
         chance: [random.unit(), random.unit(), random.unit()],
         turns: random.unit(),
-        length_m: if number % 2 == 0 { 0.0 } else { LINE_SPACINGS * spacing_m },
+        length_m: if number.is_multiple_of(2) { 0.0 } else { LINE_SPACINGS * spacing_m },
     };
     let tried = (0..count.saturating_mul(MAX_TRIES)).map(&mut next);
     tried.filter(|press| is_at(press)).take(count).collect()
