@@ -21,12 +21,15 @@ use crate::cli::words::{bullet, millimetres, span, spread, title};
 
 const HEADING: &str = "Two layouts side by side";
 
+/// The median and the 95th percentile of an error, where it is known.
+type Percentiles = fn(&LayoutErrors) -> Option<[String; 2]>;
+
 #[derive(Args)]
 pub(super) struct CompareArguments {
     /// Compare the layouts of two bodies: how far place, axis and force of simulated touches are off on each, how alike their cells
     /// are, and how long a frame takes. Nothing is placed; with -o FILE.svg or FILE.png the errors are drawn.
     #[arg(long, num_args = 2, value_names = ["A.glb", "B.glb"], help_heading = HEADING,
-        conflicts_with_all = ["mesh", "recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "grid",
+        conflicts_with_all = ["mesh", "recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid",
             "icub", "urdf_skin", "mjcf_skin", "csv_skin", "up", "packages", "geometry"])]
     compare: Vec<String>,
 }
@@ -70,7 +73,7 @@ fn text(names: [&str; 2], bodies: &[Body; 2], compared: &ComparedLayouts) -> Str
     row("taxels", &|side| [compared.layouts[side].taxels.to_string(), String::new()]);
     row("spacing mm", &|side| [millimetres(compared.layouts[side].spacing_m), String::new()]);
     row("cells", &|side| [cells(&bodies[side]).map_or_else(dash, spread), String::new()]);
-    let errors: [(&str, fn(&LayoutErrors) -> Option<[String; 2]>); 3] =
+    let errors: [(&str, Percentiles); 3] =
         [("place mm", expected::place), ("axis °", expected::axis), ("force %", expected::force)];
     for (what, of) in errors {
         row(what, &|side| {

@@ -25,9 +25,6 @@ const TRIES: usize = 4;
 /// The least height of a triangle, share of its longest edge, unless it was lower before.
 const MIN_HEIGHT: f64 = 0.1;
 
-/// The share of its height that a triangle keeps which was lower. In strips of needles that is what every move takes a little of.
-const KEPT_HEIGHT: f64 = 0.7;
-
 /// `triangles` without edges below `edge_m` where that goes, and with none that became longer than `longest_m`.
 pub(super) fn coarsen(positions: &[DVec3], triangles: Vec<[u32; 3]>, edge_m: f64, longest_m: f64) -> Vec<[u32; 3]> {
     let mut around = vec![Vec::new(); positions.len()];
@@ -160,8 +157,7 @@ impl Mesh<'_> {
             let after = corners_of(corners.map(|corner| if corner == vertex { onto } else { corner }));
             let (spanned, side, side_before) = (area_vector(after), longest(after), longest(before));
             let height = |twice: f64, side: f64| twice / (side * side);
-            let height_before = height(area_vector(before).length(), side_before);
-            let least = if height_before < MIN_HEIGHT { KEPT_HEIGHT * height_before } else { MIN_HEIGHT };
+            let least = MIN_HEIGHT.min(height(area_vector(before).length(), side_before));
             side <= self.longest_m.max(side_before)
                 && height(spanned.length(), side) >= least
                 && spanned.dot(normal) >= MIN_NORMAL_COSINE * spanned.length()
@@ -189,24 +185,6 @@ impl Mesh<'_> {
 mod tests {
     use super::*;
     use crate::body::Topology;
-
-    #[test]
-    fn strips_of_needles_are_taken_out() {
-        // A square tube of 1 m in 2,000 rings of 0.5 mm, with one square a side: triangles 2,000 times as long as high.
-        let rings = 2_000_u32;
-        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
-        let ring = |row: u32| corners.map(|(x, y)| DVec3::new(x, y, f64::from(row) * 5e-4));
-        let positions: Vec<DVec3> = (0..=rings).flat_map(ring).collect();
-        let square = |row: u32, side: u32| [4 * row + side, 4 * row + (side + 1) % 4];
-        let squares = (0..rings).flat_map(|row| (0..4).map(move |side| square(row, side)));
-        let triangles: Vec<[u32; 3]> = squares.flat_map(|[a, b]| [[a, b, b + 4], [a, b + 4, a + 4]]).collect();
-        let coarse = coarsen(&positions, triangles.clone(), 0.2, 0.4);
-        assert!(coarse.len() < triangles.len() / 50, "{} of {}", coarse.len(), triangles.len());
-        let coarse = Topology::new(&positions, &coarse);
-        assert_eq!((coarse.parts(), coarse.flaws.degenerate, coarse.flaws.flipped_edges), (1, 0, 0));
-        let area: f64 = (0..coarse.triangles.len() as u32).map(|t| area_vector(coarse.corners(t)).length() / 2.0).sum();
-        assert!((area - 4.0).abs() < 1e-9, "{area}");
-    }
 
     #[test]
     fn a_fine_box_without_a_top_keeps_its_shape_and_its_border() {
