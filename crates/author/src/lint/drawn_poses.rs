@@ -68,6 +68,7 @@ impl DrawnPoses {
 }
 
 /// A position of a joint within its range, rad or m.
+#[cfg_attr(not(feature = "meshes"), allow(unreachable_pub, reason = "robots alone ask for it from outside"))]
 pub fn drawn_position(limits: Option<[f64; 2]>, is_turn: bool, random: &mut Random) -> f64 {
     let share = random.unit();
     let turn = [-std::f64::consts::PI, std::f64::consts::PI];
