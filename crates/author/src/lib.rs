@@ -12,7 +12,7 @@
 //! let placed = place_evenly(&corners, &[[0, 1, 2], [0, 2, 3]], 50, 1, &mut |_| true)?;
 //! let shared: f64 = placed.iter().map(|p| p.point.area).sum();
 //! assert!(placed.len() == 50 && (shared - 0.02).abs() < 1e-9);
-//! # Ok::<(), somatic_author::error::Error>(())
+//! # Ok::<(), somatic_skin::Error>(())
 //! ```
 //!
 //! Results are the same on every machine: arithmetic is `+ − × ÷ √`, randomness is seeded, and ties go to the lower index.

@@ -25,13 +25,15 @@ pub struct Grouping {
 /// taxels, equal in number, that have charts.
 ///
 /// ```
-/// use somatic::{Body, author::group::group, bundled};
+/// use somatic_author::group::group;
+/// use somatic_bodies as bundled;
+/// use somatic_skin::body::Body;
 ///
 /// let body = Body::from_bytes("mat", bundled::MAT)?;
 /// let rules = vec![serde_json::from_str(r#"{"name": "mat", "rows": {"of": 32}}"#).unwrap()];
 /// let grouping = group(&body, &(), &rules)?;
 /// assert_eq!((grouping.fields[0].name.as_str(), grouping.fields[64].name.as_str()), ("mat", "mat/row_64"));
-/// # Ok::<(), somatic_author::error::Error>(())
+/// # Ok::<(), somatic_skin::Error>(())
 /// ```
 ///
 /// # Errors

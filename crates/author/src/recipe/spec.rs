@@ -20,10 +20,10 @@ use crate::region::Region;
 ///
 /// ```
 /// use somatic_author::{Recipe, author};
-/// use somatic::body::Original;
-/// use somatic::bundled;
+/// use somatic_skin::body::Original;
+/// use somatic_bodies as bundled;
 ///
-/// # fn main() -> somatic::Result<()> {
+/// # fn main() -> somatic_skin::Result<()> {
 /// let text = r#"
 ///     [regions.head]
 ///     node = "head"

@@ -4,13 +4,13 @@
 //!
 //! ```
 //! use somatic_author::{SheetGrid, sheets};
-//! use somatic::Body;
+//! use somatic_skin::body::Body;
 //!
 //! // An insole of 31 rows and 11 columns, 8.6 mm apart.
 //! let insole = SheetGrid::new(31, 11, 0.0086).sheet("insole")?;
 //! let body = Body::from_bytes("insole.glb", &sheets(&[insole])?.to_bytes()?)?;
 //! assert_eq!((body.taxels.len(), body.fields[0].name.as_str()), (341, "insole"));
-//! # Ok::<(), somatic_author::error::Error>(())
+//! # Ok::<(), somatic_skin::Error>(())
 //! ```
 
 mod author;
