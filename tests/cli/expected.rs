@@ -23,7 +23,7 @@ fn errors_are_printed_beside_those_of_an_ideal_skin() {
     let text = done(&["inspect", grid, "--errors"]);
     let line = |name: &str| text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_default();
     assert!(line("errors").contains(" mm, axis ") && line("errors").contains("of 400 touches"), "{text}");
-    assert!(line("ideal").contains("hexagons as dense, 10.0 mm apart"), "{text}");
+    assert!(line("ideal").contains("the same on a flat sheet of regular hexagons as dense"), "{text}");
     let told: Value = serde_json::from_str(&done(&["inspect", grid, "--errors", "--json"])).unwrap();
     let errors = &told["errors"];
     assert_eq!(keys(errors), [&KEYS[..], &["ideal"]].concat());
