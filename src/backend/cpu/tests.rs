@@ -13,8 +13,8 @@ use crate::percept::{Flags, Outputs, Precision};
 use crate::scene::{Arithmetic, Coverage, Knobs, PlanField, Scene};
 use crate::signal::{Calibration, Frame, Letter, Receptor};
 
-const HAND: &[u8] = crate::bundled::HAND;
-const HUMANOID: &[u8] = crate::bundled::HUMANOID;
+const HAND: &[u8] = somatic_bodies::HAND;
+const HUMANOID: &[u8] = somatic_bodies::HUMANOID;
 
 /// `frames` frames for `plan`: pressed here and there, with everything in between that a value can be.
 fn values(plan: &Plan, frames: usize) -> Vec<RawValue> {

@@ -200,7 +200,7 @@ fn a_batch_is_cut_into_blocks_that_hold_it() {
 
 /// A backend for the hand on a device that computes nothing.
 fn on_noop() -> Gpu {
-    let body = Body::from_bytes("hand", crate::bundled::HAND).unwrap();
+    let body = Body::from_bytes("hand", somatic_bodies::HAND).unwrap();
     let plan = plan_of(&body, &Scene::default());
     Gpu::on(adapter::open(wgpu::Backends::NOOP).unwrap(), &plan, 4).unwrap()
 }
@@ -271,7 +271,7 @@ pub(super) fn plan_of(body: &Body, scene: &Scene) -> Plan {
 #[test]
 fn raw_values_are_read_alike_as_they_come_and_through_calibration() {
     let Ok(device) = adapter::shared() else { return skip("GPU", "no adapter answers") };
-    let body = Body::from_bytes("hand", crate::bundled::HAND).unwrap();
+    let body = Body::from_bytes("hand", somatic_bodies::HAND).unwrap();
     let scene = Scene { outputs: Outputs::USUAL - Outputs::POSITION - Outputs::NORMAL, ..Scene::default() };
     let plan = plan_of(&body, &scene);
     // One that must be calibrated, though nothing comes of it: what is so small counts as 0 anyway.

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::super::surface_search::SurfaceSearch;
 use super::drawn_poses::DrawnPoses;
-use super::finding::{Finding, FindingKind};
+use super::finding::{Finding, FindingKind, count, place};
 use super::hidden_findings;
 use super::large::large;
 use super::spacing;
@@ -63,15 +63,6 @@ pub fn lint_with_progress(
     let mut of_rays = |share: f64| progress(CHARTS_DONE + (1.0 - CHARTS_DONE) * share);
     findings.extend(hidden_findings::hidden(body, poses, &mut of_rays));
     findings
-}
-
-/// A taxel's place for people.
-pub(super) fn place(body: &Body, taxel: &Taxel) -> String {
-    format!("taxel {} on link `{}`", taxel.id, body.links[taxel.link].name)
-}
-
-pub(super) fn count(count: usize, thing: &str) -> String {
-    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
 fn empty(body: &Body) -> Vec<Finding> {

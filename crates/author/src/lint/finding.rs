@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::body::{Body, Taxel};
+
 /// The kind of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -121,4 +123,14 @@ impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}; {}", self.what, self.remedy())
     }
+}
+
+/// A taxel's place for people.
+pub(super) fn place(body: &Body, taxel: &Taxel) -> String {
+    format!("taxel {} on link `{}`", taxel.id, body.links[taxel.link].name)
+}
+
+/// `count` and what of, one or several.
+pub(super) fn count(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }

@@ -9,8 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use super::super::placed::COINCIDENT_M;
-use super::checks::{count, place};
-use super::finding::{Finding, FindingKind};
+use super::finding::{Finding, FindingKind, count, place};
 use crate::body::{Body, PointTree, listed, point_tree};
 
 /// Taxels of a region, at least and at most.
