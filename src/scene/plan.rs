@@ -109,7 +109,7 @@ pub(crate) struct PlanField {
     /// Members by their links, in the body's order, where they lie on several and positions in the world are wanted; else none.
     pub(crate) parts: Arc<[LinkPart]>,
     pub(crate) origin_in_anchor: DVec3,
-    #[cfg_attr(not(feature = "cli"), expect(dead_code, reason = "only trade-offs compare charts"))]
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "only trade-offs compare charts"))]
     pub(crate) chart: Option<Chart>,
     /// Why there is none.
     #[cfg_attr(not(feature = "page"), expect(dead_code, reason = "only a page says it"))]
