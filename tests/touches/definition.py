@@ -121,6 +121,8 @@ def regions(skin, frame, sigma, were_two):
             if any({id(a), id(b)} == {id(own), id(other)} for a, b, _ in pairs):
                 continue
             two, doubts = are_two(skin, frame, sigma, own, other, pressures[node], were_two(own.peak, other.peak))
+            # What either might hold as well changes what is between them.
+            doubts |= own.doubts | other.doubts
             if two:
                 pairs.append((own, other, doubts))
                 own.doubts |= doubts

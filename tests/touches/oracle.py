@@ -81,6 +81,8 @@ class Comparison:
     def forget(self):
         self.t, self.id_of, self.pairs, self.onset, self.doubtful = None, {}, set(), {}, set()
         self.trails, self.known = {}, set()
+        # Of touches whose beginning, or parting, was too close to call: the trail is not known until it begins anew.
+        self.unknown_trails = set()
 
     def error(self, what, **details):
         self.wrong += 1
@@ -105,20 +107,30 @@ class Comparison:
         claims = self.identities(frame, found)
         touches = {frozenset(self.skin.node_of[i] for i in touch["taxels"]): touch for touch in told["touches"]}
         ids, new = {}, []
+        # Touches of the frame before that share pressure with a region which was told otherwise, by a choice too close to call: how they
+        # go on hangs on it.
+        unlike = [region for region in found if region.doubts and frozenset(region.members) not in touches]
+        claimed = {self.id_of.get(node) for region in unlike for node in region.members} - {None}
         for region, (kept, merged, doubts) in zip(found, claims):
             region.doubts |= doubts
             touch = touches.pop(frozenset(region.members), None)
             total = frame.pressures[region.members].sum()
             wanted = total > self.on or (kept is not None and total > self.off)
+            contested = bool({self.id_of.get(node) for node in region.members} & claimed)
             if not wanted and touch is None:
+                continue
+            if touch is None and contested and total <= self.on:
+                self.exclude({"identity"})
                 continue
             if touch is None or not wanted:
                 self.mismatch(region, touch)
                 continue
             ids[id(region)] = touch["id"]
+            if contested:
+                self.unknown_trails.add(touch["id"])
             if touch["id"] != kept and (kept is not None or touch["id"] <= highest or touch["id"] in new):
-                if region.doubts:
-                    self.exclude(region.doubts)
+                if region.doubts or contested:
+                    self.exclude(region.doubts or {"identity"})
                 else:
                     self.error("another identity", told=touch["id"], here=kept, taxels=touch["taxels"])
             if kept is None:
@@ -128,6 +140,9 @@ class Comparison:
         for touch in touches.values():
             if not doubtful:
                 self.error("no such region", told=touch["taxels"])
+        # What was divided otherwise, by a choice that is too close to call, goes on as it was told.
+        self.unlike = {touch["id"] for touch in touches.values()}
+        self.unknown_trails |= self.unlike
         told_ids = {touch["id"] for touch in told["touches"]}
         gone = before - told_ids if not restarts else set(before)
         if sorted(gone) != told["released"]:
@@ -182,8 +197,11 @@ class Comparison:
         self.t, self.pressures = t, pressures
         self.id_of = {self.skin.node_of[i]: touch["id"] for touch in told["touches"] for i in touch["taxels"]}
         both = [(ids.get(id(a)), ids.get(id(b)), d) for a, b, d in pairs]
-        self.pairs = {frozenset((a, b)) for a, b, _ in both if a is not None and b is not None}
-        self.doubtful = {i for a, b, doubts in both if doubts for i in (a, b)} - {None}
+        # Two that were found to be two are known as such as long as both last.
+        last = {touch["id"] for touch in told["touches"]}
+        self.pairs = {pair for pair in self.pairs if pair <= last}
+        self.pairs |= {frozenset((a, b)) for a, b, _ in both if a is not None and b is not None}
+        self.doubtful = {i for a, b, doubts in both if doubts for i in (a, b)} - {None} | self.unlike
         self.onset = {touch["id"]: self.onset.get(touch["id"], t) for touch in told["touches"]}
 
     # Quantities of one touch.
@@ -367,13 +385,16 @@ class Comparison:
         old = lambda entry, by: t - entry[0] >= by * (1 - 1e-6)
         if is_new_or_merged or lost or (trail and trail[-1][2] != link):
             trail.clear()
+            self.unknown_trails.discard(touch["id"])
         place = np.array(touch["position"])
         then = next((entry for entry in reversed(trail) if old(entry, VELOCITY_OVER_S)), None)
         if not trail or (t > trail[-1][0] and old(trail[-1], VELOCITY_OVER_S / 16)):
             trail.append((t, place, link))
         told = touch.get("velocity")
         here = None if then is None else (place - then[1]) / (t - then[0])
-        if (told is None) != (here is None) or (told is not None and np.abs(here - told).max() > 100 * SAME):
+        if touch["id"] in self.unknown_trails:
+            self.exclude({"trail"})
+        elif (told is None) != (here is None) or (told is not None and np.abs(here - told).max() > 100 * SAME):
             wrong["velocity"] = (told, here)
 
     def report(self):
