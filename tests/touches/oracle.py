@@ -109,8 +109,8 @@ class Comparison:
         ids, new = {}, []
         # Touches of the frame before that share pressure with a region which was told otherwise, by a choice too close to call: how they
         # go on hangs on it.
-        unlike = [region for region in found if region.doubts and frozenset(region.members) not in touches]
-        claimed = {self.id_of.get(node) for region in unlike for node in region.members} - {None}
+        told_otherwise = [region for region in found if region.doubts and frozenset(region.members) not in touches]
+        claimed = {self.id_of.get(node) for region in told_otherwise for node in region.members} - {None}
         for region, (kept, merged, doubts) in zip(found, claims):
             region.doubts |= doubts
             touch = touches.pop(frozenset(region.members), None)
@@ -141,8 +141,8 @@ class Comparison:
             if not doubtful:
                 self.error("no such region", told=touch["taxels"])
         # What was divided otherwise, by a choice that is too close to call, goes on as it was told.
-        self.unlike = {touch["id"] for touch in touches.values()}
-        self.unknown_trails |= self.unlike
+        self.told_otherwise = {touch["id"] for touch in touches.values()}
+        self.unknown_trails |= self.told_otherwise
         told_ids = {touch["id"] for touch in told["touches"]}
         gone = before - told_ids if not restarts else set(before)
         if sorted(gone) != told["released"]:
@@ -201,7 +201,7 @@ class Comparison:
         last = {touch["id"] for touch in told["touches"]}
         self.pairs = {pair for pair in self.pairs if pair <= last}
         self.pairs |= {frozenset((a, b)) for a, b, _ in both if a is not None and b is not None}
-        self.doubtful = {i for a, b, doubts in both if doubts for i in (a, b)} - {None} | self.unlike
+        self.doubtful = {i for a, b, doubts in both if doubts for i in (a, b)} - {None} | self.told_otherwise
         self.onset = {touch["id"]: self.onset.get(touch["id"], t) for touch in told["touches"]}
 
     # Quantities of one touch.
