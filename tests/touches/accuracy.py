@@ -69,6 +69,7 @@ def judge(skin, truth, touches):
     found["good"] = bool(np.sqrt((angles**2).mean()) < GOOD_ANGLE and few < GOOD_FEW)
     found["touches"], found["links"] = len(touches), len({link for touch in touches for link in touch["links"]})
     found["ids"] = [touch["id"] for touch in touches]
+    found["anisotropy"] = main.get("anisotropy", 0.0)
     if truth["axis"] is not None and main.get("principal_axis") and not found["wrapped"] and main["anisotropy"] >= ANISOTROPY:
         # The axis lies in the plane of the taxel in the middle, the truth's in that of its place.
         base = nodes[np.linalg.norm(skin.at[nodes] - found["at"], axis=1).argmin()]
@@ -109,6 +110,20 @@ def presses(scene, flat, arguments):
         if None not in b + f:
             result[title]["ratios"] = [b[0] / f[0], b[1] / f[1]]
 
+    def alike(kind):
+        """The axis beside that of the flat touches most alike: how far a touch is from round decides how true its axis can be."""
+        of = {name: [one for one in ones if one["kind"] == kind and "axis" in one] for name, ones in counted.items()}
+        if not all(of.values()):
+            return
+        measures = {name: np.array([[one["anisotropy"] / 0.05, np.log(one["active"]) / 0.3] for one in ones]) for name, ones in of.items()}
+        far = np.linalg.norm(measures["body"][:, None] - measures["flat"][None], axis=2)
+        # The three most alike of each, as one alone is chance.
+        flat = np.array([one["axis"] for one in of["flat"]])[np.argsort(far, axis=1, kind="stable")[:, :3]].ravel()
+        b, f = quantiles([one["axis"] for one in of["body"]]), quantiles(flat)
+        result[f"axis, {kind}, beside flat touches as far from round"] = {
+            "touches": len(of["body"]), "median": b[0], "p95": b[1], "flat_median": f[0], "flat_p95": f[1], "ratios": [b[0] / f[0], b[1] / f[1]]
+        }
+
     every = lambda one: True
     ratio("place", "position, all", every)
     ratio("place", "position, good", lambda one: one["good"], every)
@@ -117,6 +132,10 @@ def presses(scene, flat, arguments):
     for kind in KINDS[1:]:
         ratio("axis", f"axis, {kind}", lambda one: one["kind"] == kind)
         ratio("axis", f"axis, {kind}, good", lambda one: one["kind"] == kind and one["good"], lambda one: one["kind"] == kind)
+        alike(kind)
+        of_kind = [one for one in counted["body"] if one["kind"] == kind]
+        round_ones = sum(not one["wrapped"] and one["anisotropy"] < ANISOTROPY for one in of_kind)
+        result[f"axis, {kind}, none"] = {"wrapped": sum(one["wrapped"] for one in of_kind), "round": round_ones, "of": len(of_kind)}
     all_places = [one["place"] for one in counted["body"]]
     result["p95_in_spacings"] = quantiles(all_places)[1] / spacing if all_places else None
     on_one = [one for one in counted["body"] if one["links"] == 1]

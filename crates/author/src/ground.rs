@@ -33,6 +33,9 @@ const BESIDE: f64 = 0.5;
 /// Where more than this share of a surface has no mirror image, its halves are not alike.
 const MAX_ALONE_SHARE: f64 = 0.01;
 
+/// So far around a taxel nothing stands before it, m: more than a file's 32 bits round, and much less than rays start outside.
+const AROUND_M: f64 = 1e-6;
+
 const SEED: u64 = 0x6e0d;
 
 /// Why a point gets no taxel.
@@ -68,6 +71,27 @@ impl Rules<'_> {
     pub(super) fn without_closed(&self, placed: Vec<Placed>, progress: Progress<'_>) -> Result<Vec<Placed>> {
         let states = self.states(&placed, progress)?;
         Ok(placed.into_iter().zip(states).filter(|(_, state)| *state == State::Open).map(|(one, _)| one).collect())
+    }
+
+    /// The states of places where taxels stay. At the foot of a wall or on a rim, which taxels go to as they are relaxed, rays start
+    /// exactly on a surface, and rounding says on which side: there the points around must be open as well.
+    fn states_of_final(&self, placed: &[Placed], progress: Progress<'_>) -> Result<Vec<State>> {
+        let mut states = self.states(placed, &mut |share| progress(0.5 * share))?;
+        if self.touchable.is_none() {
+            return Ok(states);
+        }
+        let around = placed.iter().flat_map(|one| {
+            let point = self.body_point(one);
+            let (u, v) = point.normal.any_orthonormal_pair();
+            [u, -u, v, -v].map(|way| BodyPoint { position: point.position + AROUND_M * way, ..point })
+        });
+        let around = self.states_of(&around.collect::<Vec<_>>(), &mut |share| progress(0.5 + 0.5 * share))?;
+        for (state, around) in states.iter_mut().zip(around.chunks(4)) {
+            if *state == State::Open && around.contains(&State::Hidden) {
+                *state = State::Hidden;
+            }
+        }
+        Ok(states)
     }
 
     fn states(&self, placed: &[Placed], progress: Progress<'_>) -> Result<Vec<State>> {
@@ -246,7 +270,7 @@ impl<'a> Ground<'a> {
     /// `placed`, of which those that may not be where they are went to the nearest open sample of their cells that is not beside another
     /// of them, else of their cells, else of all.
     pub(super) fn settled(&self, mut placed: Vec<Placed>, progress: Progress<'_>) -> Result<Vec<Placed>> {
-        let states = self.rules.states(&placed, progress)?;
+        let states = self.rules.states_of_final(&placed, progress)?;
         if states.iter().all(|state| *state == State::Open) {
             return Ok(placed);
         }
@@ -282,5 +306,76 @@ impl<'a> Ground<'a> {
         }
         placed.sort_by_key(|one| one.triangle);
         Ok(placed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lint::DrawnPoses;
+    use crate::body::{Glb, MeshData, Original};
+
+    /// A floor of 0.2 m by 0.2 m, on which a box stands where x > 0, so thin that the floor ends at its wall.
+    fn floor_and_box() -> Original {
+        let (mut floor, mut walls) = (MeshData::default(), MeshData::default());
+        let mut quad = |mesh: &mut MeshData, corners: [[f32; 3]; 4], normal: [f32; 3]| {
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend(corners);
+            mesh.normals.extend([normal; 4]);
+            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        };
+        quad(&mut floor, [[-0.2, 0.0, -0.1], [-0.2, 0.0, 0.1], [0.0, 0.0, 0.1], [0.0, 0.0, -0.1]], [0.0, 1.0, 0.0]);
+        let (low, high) = ([0.0, -0.1, -0.2], [0.1, 0.3, 0.2]);
+        for axis in 0..3 {
+            for side in 0..2 {
+                let corner = |u: usize, v: usize| {
+                    let mut at = [0.0; 3];
+                    at[axis] = [low, high][side][axis];
+                    at[(axis + 1) % 3] = [low, high][u][(axis + 1) % 3];
+                    at[(axis + 2) % 3] = [low, high][v][(axis + 2) % 3];
+                    at
+                };
+                let mut corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+                let mut normal = [0.0; 3];
+                normal[axis] = [-1.0, 1.0][side];
+                if side == 0 {
+                    corners.reverse();
+                }
+                quad(&mut walls, corners, normal);
+            }
+        }
+        let mut glb = Glb::new();
+        for (name, mesh) in [("floor", floor), ("box", walls)] {
+            let link = glb.node(name, None, DVec3::ZERO);
+            glb.mesh(link, name, &mesh, None, None);
+        }
+        Original::from_bytes("corner", &glb.to_bytes().unwrap(), None).unwrap()
+    }
+
+    #[test]
+    fn a_taxel_at_the_foot_of_a_wall_moves_away_from_it_whatever_rounding_says() {
+        let (body, details) = floor_and_box().read().unwrap();
+        let rest_surface = RestSurface::new(&body, &details);
+        let drawn = DrawnPoses::of(&body);
+        let touchable = Touchable::new(&body, &drawn);
+        let chosen: Vec<usize> = (0..rest_surface.triangles.len()).collect();
+        let rules = Rules {
+            rest_surface: &rest_surface,
+            chosen: &chosen,
+            touchable: Some(&touchable),
+            borders: None,
+            mirror: None,
+        };
+        let (positions, triangles) = (&rest_surface.positions, &rest_surface.triangles);
+        let ground = Ground::new(rules, positions, triangles, 100, &mut |_| true).unwrap();
+        for x in [-1e-11, 0.0, 1e-11, -0.01] {
+            let point = SurfacePoint { position: DVec3::new(x, 0.0, 0.01), normal: DVec3::Y, area: 0.0 };
+            let placed = vec![Placed { point, triangle: 1, barycentric: [0.0; 3] }];
+            let settled = ground.settled(placed, &mut |_| true).unwrap()[0];
+            let has_moved = settled.point.position != point.position;
+            assert_eq!(has_moved, x > -0.001, "{x}: {settled:?}");
+// Onto the floor, or up the wall.
+            assert!(settled.point.position.with_z(0.0).length() > AROUND_M, "{x}: {settled:?}");
+        }
     }
 }
