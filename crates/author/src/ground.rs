@@ -312,8 +312,8 @@ impl<'a> Ground<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lint::DrawnPoses;
     use crate::body::{Glb, MeshData, Original};
+    use crate::lint::DrawnPoses;
 
     /// A floor of 0.2 m by 0.2 m, on which a box stands where x > 0, so thin that the floor ends at its wall.
     fn floor_and_box() -> Original {
@@ -374,7 +374,7 @@ mod tests {
             let settled = ground.settled(placed, &mut |_| true).unwrap()[0];
             let has_moved = settled.point.position != point.position;
             assert_eq!(has_moved, x > -0.001, "{x}: {settled:?}");
-// Onto the floor, or up the wall.
+            // Onto the floor, or up the wall.
             assert!(settled.point.position.with_z(0.0).length() > AROUND_M, "{x}: {settled:?}");
         }
     }

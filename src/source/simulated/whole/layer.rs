@@ -9,8 +9,10 @@ const CUTOFF_SIGMAS: f64 = 5.0;
 const CUTOFF_DEPTHS: f64 = 10.0;
 /// A layer counts as spreading at least this much, m.
 const MIN_SIGMA_M: f64 = 5e-4;
-/// Pieces of the surface are at most this large, m.
+/// Pieces of the surface are at most this large, m, or this share of the smallest cell, whichever is more: a robot of six metres with
+/// taxels 120 mm apart needs no pieces of 2 mm.
 const MAX_PIECE_M: f64 = 2e-3;
+const MAX_PIECE_SHARE: f64 = 0.1;
 
 /// The layer over the taxels.
 #[derive(Clone, Copy, Debug)]
@@ -20,11 +22,13 @@ pub(super) struct Layer {
     sigma_m: f64,
     /// Pressure per depth, Pa/m.
     pub(super) stiffness_pa_m: f64,
+    /// Pieces of the surface are at most this large, m.
+    max_piece_m: f64,
 }
 
 impl Layer {
-    /// The layer that the file describes, which has a thickness.
-    pub(super) fn new(given: &contact::Layer) -> Self {
+    /// The layer that the file describes, which has a thickness, over taxels with cells of at least `least_side_m` square.
+    pub(super) fn new(given: &contact::Layer, least_side_m: f64) -> Self {
         let sigma_m = match given.kernel {
             Kernel::Gaussian => given.sigma_m(),
             Kernel::Boussinesq => given.thickness_m * contact::Layer::SPREAD,
@@ -33,6 +37,7 @@ impl Layer {
             kernel: given.kernel,
             sigma_m: sigma_m.max(MIN_SIGMA_M),
             stiffness_pa_m: given.stiffness_pa / given.thickness_m,
+            max_piece_m: MAX_PIECE_M.max(MAX_PIECE_SHARE * least_side_m),
         }
     }
 
@@ -50,7 +55,7 @@ impl Layer {
 
     /// The edges of pieces that are small enough for this layer, m.
     pub(super) fn piece_m(&self) -> f64 {
-        (self.sigma_m / 2.0).min(MAX_PIECE_M)
+        (self.sigma_m / 2.0).min(self.max_piece_m)
     }
 
     /// The edges of cubes in which forces may be put together, m.

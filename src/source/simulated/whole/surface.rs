@@ -9,8 +9,9 @@ use super::chart::is_beside;
 use super::pieces::{middle, pieces};
 use crate::body::{Body, Home, NONE, SurfaceIndex, Topology, area_vector};
 
-/// Edges of the tiles into which large triangles are cut first.
+/// Edges of the tiles into which large triangles are cut first, m, and in edges of pieces.
 const TILE_M: f64 = 0.012;
+const TILE_PIECES: f64 = 6.0;
 /// A surface that faces the same way and lies this far above a point, or less, covers it.
 const COVER_M: f64 = 0.02;
 /// Surfaces nearer than this lie in each other.
@@ -148,7 +149,7 @@ impl WholeSurface {
             let mut tiles = Vec::new();
             pieces(
                 facet.corners,
-                TILE_M,
+                TILE_M.max(TILE_PIECES * self.edge_m),
                 |_, _| true,
                 |corners, _| {
                     let middle = middle(corners);

@@ -67,7 +67,7 @@ fn cylinder(radius_m: f64) -> Body {
 
 /// What `shape` at the top of `body` does, pressed along −z with `force_newton`, `along` its direction.
 fn press(body: &Body, shape: Shape, along: DVec3, force_newton: f64) -> (WholeSurface, Pressure, Footprint) {
-    let layer = Layer::new(&LAYER);
+    let layer = Layer::new(&LAYER, 0.0);
     let (surface, cells) = (WholeSurface::new(body, layer.piece_m()), Cells::new(body, &[]));
     let spot = surface.nearest(DVec3::Z, DVec3::Z).unwrap();
     let placed = Placed::new(&surface, shape, Pose { spot, normal: DVec3::Z, along });
@@ -252,7 +252,7 @@ fn a_strap_around_a_cylinder_is_where_it_would_be_unrolled() {
 
 #[test]
 fn boussinesqs_kernel_conserves_the_force_too() {
-    let layer = Layer::new(&contact::Layer { kernel: super::super::layer::Kernel::Boussinesq, ..LAYER });
+    let layer = Layer::new(&contact::Layer { kernel: super::super::layer::Kernel::Boussinesq, ..LAYER }, 0.0);
     let body = plane();
     let (surface, cells) = (WholeSurface::new(&body, layer.piece_m()), Cells::new(&body, &[]));
     let spot = surface.nearest(DVec3::ZERO, DVec3::Z).unwrap();
@@ -284,7 +284,7 @@ fn covered_surface_bears_nothing_and_links_keep_their_pressure() {
     let other = Link { name: "other".to_owned(), ..body.links[0].clone() };
     body.links.push(other);
     body.surfaces.push(beside);
-    let (layer, at) = (Layer::new(&LAYER), DVec3::new(0.076, 0.0, 0.0));
+    let (layer, at) = (Layer::new(&LAYER, 0.0), DVec3::new(0.076, 0.0, 0.0));
     let (surface, cells) = (WholeSurface::new(&body, layer.piece_m()), Cells::new(&body, &[]));
     let press = |x: f64| {
         let spot = surface.nearest(at + DVec3::X * x, DVec3::Z).unwrap();

@@ -77,7 +77,8 @@ impl BodySkin {
         taxels: &[(usize, f64)],
         covers: Covers,
     ) -> Self {
-        let layer = Layer::new(layer);
+        let least_side_m = taxels.iter().map(|(_, side_m)| *side_m).min_by(f64::total_cmp).unwrap_or(0.0);
+        let layer = Layer::new(layer, least_side_m);
         let (surface, cells) = (WholeSurface::new(body, layer.piece_m()), Cells::new(body, taxels));
         Self { surface, cells, layer, covers }
     }
