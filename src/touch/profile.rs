@@ -1,8 +1,8 @@
 //! Whether there is a dip between two peaks: the mean pressure along the line between them.
 //!
 //! The line runs in the chart based at the taxel nearest to the middle of the two peaks. The mean at a place of it is over the
-//! taxels of both regions and their neighbours, those without pressure too, with the weights exp(−½(along / 0.5 d)²), of those at
-//! most 1.5 d across and 3 d along from the place; d is the root of their median cell (of an even number
+//! taxels of both regions and their neighbours, those without pressure too, with the weights exp(−½(along / 0.35 d)²), of those at
+//! most d across and 3 d along from the place; d is the root of their median cell (of an even number
 //! the larger of the middle two). It is taken at max(5, ⌊L / 0.25 d⌋ + 1)
 //! places from peak to peak, L apart, up to 257; a place without a taxel does not count.
 //!
@@ -13,9 +13,9 @@ use super::chart;
 use super::skin::Skin;
 
 /// Spread of the weights along the line, in d.
-const SPREAD: f64 = 0.5;
+const SPREAD: f64 = 0.35;
 /// How far across the line a taxel may be, in d.
-const ACROSS: f64 = 1.5;
+const ACROSS: f64 = 1.0;
 /// How far along the line a taxel may be from a place, in d: there it has e⁻¹⁸ of the weight.
 const ALONG: f64 = 3.0;
 /// Distance of places, in d.
@@ -173,13 +173,13 @@ mod tests {
 
     #[test]
     fn weights_from_place_to_place_are_those_of_the_exponential() {
-        let line = Line { step_m: 0.25, spread_m: 0.5, reach_m: 3.0 };
+        let line = Line { step_m: 0.25, spread_m: SPREAD, reach_m: 3.0 };
         for x_m in [-2.9, -0.3, 0.0, 0.1, 1.13, 4.0, 5.7, 8.0] {
             let mut sums = [[0.0; 2]; 25];
             line.add(x_m, 2.0, &mut sums);
             for (place, [weight, pull]) in sums.into_iter().enumerate() {
                 let away_m = x_m - 0.25 * place as f64;
-                let right = if away_m.abs() <= 3.0 { (-0.5 * (away_m / 0.5_f64).powi(2)).exp() } else { 0.0 };
+                let right = if away_m.abs() <= 3.0 { (-0.5 * (away_m / SPREAD).powi(2)).exp() } else { 0.0 };
                 assert!((weight - right).abs() <= 1e-12 * right && pull == 2.0 * weight, "{x_m} {place}: {weight}");
             }
         }

@@ -71,12 +71,12 @@ def dip(skin, frame, a, b):
         way = (end - start) / length
         along = (places - start) @ way
         across = np.linalg.norm(places - start - np.outer(along, way), axis=1)
-        beside = across <= 1.5 * d
+        beside = across <= d
         quarters = length / (0.25 * d)
         for count in {max(5, int(quarters * share) + 1) for share in (1 - CLOSE, 1 + CLOSE)}:
             steps = np.linspace(0, length, count)
             away = np.abs(along[beside][None] - steps[:, None])
-            weights = np.where(away <= 3 * d, np.exp(-0.5 * (away / (0.5 * d)) ** 2), 0)
+            weights = np.where(away <= 3 * d, np.exp(-0.5 * (away / (0.35 * d)) ** 2), 0)
             # Places without a taxel as near as that say nothing.
             known = weights.sum(axis=1) > 0
             means = weights[known] @ frame.pressures[nodes[beside]] / weights[known].sum(axis=1)
