@@ -4,17 +4,14 @@
 //! and finds its memory as it left it.
 
 // The skins of `somatic bench`.
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../src/experiments/shape.rs"]
-mod shape;
 
 use std::hint::black_box;
 use std::time::Instant;
 
-use crate::shape::Shape;
 use somatic::body::MemberSpec;
 use somatic::scene::{Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, Outputs, RawValue, Scene};
+use somatic_engine::shape::Shape;
 
 const SENSORS: usize = 100_000;
 const MEMBERS: usize = 16;

@@ -6,14 +6,11 @@
 //!     cargo bench -- --max-time 5          longer, and so steadier
 
 // The skins of `somatic bench`.
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../src/experiments/shape.rs"]
-mod shape;
 
-use crate::shape::Shape;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use somatic::{BackendKind, Body, Outputs};
+use somatic_engine::shape::Shape;
 
 fn main() {
     divan::main();

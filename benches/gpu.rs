@@ -8,16 +8,13 @@
 //! percepts in memory, in turns with empty ones: the same bytes up and down, as many groups, and nothing computed.
 
 // The skins of `somatic bench`.
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../src/experiments/shape.rs"]
-mod shape;
 
 use std::time::{Duration, Instant};
 
-use crate::shape::Shape;
 use serde_json::{Value, json};
 use somatic::backend::gpu::{Bandwidth, EmptyCall, adapters, bandwidth, device_time};
 use somatic::{BackendKind, Body, Outputs, Result};
+use somatic_engine::shape::Shape;
 
 /// Sensors, fields, members, and of one field more.
 const SKINS: [(usize, usize, usize, usize); 5] = [

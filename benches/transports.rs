@@ -8,9 +8,6 @@
 //! send it, or that read the bare loop.
 
 // The skins of `somatic bench`.
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../src/experiments/shape.rs"]
-mod shape;
 
 use std::net::UdpSocket;
 use std::process::{Child, Command};
@@ -22,7 +19,7 @@ use somatic::sink::{FieldNames, InputFrames, LimbSends, Ros2Sink, Session, Sink,
 use somatic::source::{LimbOptions, LimbSource, Source as _};
 use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue, Scene, touch};
 
-use crate::shape::Shape;
+use somatic_engine::shape::Shape;
 
 const TAXELS: usize = 1000;
 const FIELDS: usize = 80;

@@ -8,9 +8,6 @@
 //! processes of their own that read everything, plot two outputs, show all columns, and draw nothing.
 
 // The skins of `somatic bench`.
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../src/experiments/shape.rs"]
-mod shape;
 
 use std::io::Write as _;
 use std::net::TcpStream;
@@ -23,7 +20,7 @@ use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue, Scene};
 use tungstenite::http::Request;
 use tungstenite::{Message, WebSocket};
 
-use crate::shape::Shape;
+use somatic_engine::shape::Shape;
 
 const TAXELS: usize = 7560;
 const FIELDS: usize = 600;

@@ -1,19 +1,16 @@
 //! The ways in and out: reading CSV into frames, and writing percepts as NDJSON, in bytes a second.
 
 // The skins of `somatic bench`.
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../src/experiments/shape.rs"]
-mod shape;
 
 use std::fmt::Write as _;
 use std::io::{Seek as _, SeekFrom};
 
-use crate::shape::Shape;
 use divan::Bencher;
 use divan::counter::BytesCount;
 use somatic::sink::{FieldNames, NdjsonSink, Sink};
 use somatic::source::{CsvSource, Source as _};
 use somatic::{BackendKind, Frame, Outputs};
+use somatic_engine::shape::Shape;
 
 fn main() {
     divan::main();

@@ -1,4 +1,4 @@
-// calibrate: raw values to pressures, one invocation four taxels and a few quads of frames (src/stage/calibrate.rs).
+// calibrate: raw values to pressures, one invocation four taxels and a few quads of frames (crates/engine/src/stage/calibrate.rs).
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> taxels: array<Taxel>;

@@ -1,4 +1,4 @@
-// centroid: the pressure-weighted mean place (src/stage/centroid.rs).
+// centroid: the pressure-weighted mean place (crates/engine/src/stage/centroid.rs).
 
 // u; v is the next.
 override CENTROID_AT: u32 = NOWHERE;

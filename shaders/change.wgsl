@@ -1,4 +1,4 @@
-// change: how fast pressures change, one invocation a taxel and quad of frames (src/stage/change.rs). It reads pressures
+// change: how fast pressures change, one invocation a taxel and quad of frames (crates/engine/src/stage/change.rs). It reads pressures
 // that have been written, never computes them: a product fused into the difference would make changes where there are
 // none.
 

@@ -1,4 +1,4 @@
-// contact: sums over a field (src/stage/contact.rs).
+// contact: sums over a field (crates/engine/src/stage/contact.rs).
 
 override TOTAL_AT: u32 = NOWHERE;
 override PEAK_AT: u32 = NOWHERE;

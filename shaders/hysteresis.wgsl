@@ -1,4 +1,4 @@
-// hysteresis: when a field counts as touched, one invocation a field, through the batch's frames (src/stage/hysteresis.rs).
+// hysteresis: when a field counts as touched, one invocation a field, through the batch's frames (crates/engine/src/stage/hysteresis.rs).
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> thresholds: array<vec2<f32>>;

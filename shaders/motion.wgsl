@@ -1,4 +1,4 @@
-// motion: how the centroid moved since the frame before (src/stage/motion.rs).
+// motion: how the centroid moved since the frame before (crates/engine/src/stage/motion.rs).
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> steps: array<Step>;

@@ -1,4 +1,4 @@
-// orientation: the line through the two farthest points (src/stage/orientation.rs).
+// orientation: the line through the two farthest points (crates/engine/src/stage/orientation.rs).
 
 override ORIENTATION_AT: u32 = NOWHERE;
 

@@ -1,4 +1,4 @@
-// principal_axis: the axis of the second moments (src/stage/principal_axis.rs).
+// principal_axis: the axis of the second moments (crates/engine/src/stage/principal_axis.rs).
 
 override PRINCIPAL_AXIS_AT: u32 = NOWHERE;
 override ANISOTROPY_AT: u32 = NOWHERE;

@@ -55,27 +55,17 @@ extern crate self as somatic;
 #[macro_use]
 extern crate somatic_skin;
 
-// The skins of `somatic bench`.
-#[cfg(all(test, feature = "cli"))]
-#[allow(dead_code, unreachable_pub, reason = "tests of the library need some of it")]
-#[path = "experiments/shape.rs"]
-mod shape;
-
-pub mod backend;
 pub mod bundled;
 #[cfg(feature = "ros2")]
 mod dds;
-mod engine;
 pub mod expected;
 #[cfg(feature = "cli")]
 pub mod figure;
-pub mod gains;
 #[cfg(feature = "cli")]
 mod ink;
 mod limb;
 #[cfg(feature = "page")]
 pub mod page;
-pub mod percept;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
 #[cfg(feature = "cli")]
@@ -83,11 +73,8 @@ pub mod plot;
 #[cfg(feature = "mcap")]
 pub mod recording;
 pub mod robot;
-pub mod scene;
 pub mod sink;
 pub mod source;
-mod stage;
-pub mod touch;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 pub mod wire;
@@ -111,6 +98,58 @@ pub mod author {
         author_sheets, author_while, blend_skinning, cell_spread, coverage, group, heaviest_four, icub, lint,
         lint_in_poses, lint_with_progress, place_apart, place_by_density, place_evenly, recipe_values, refresh, sheets,
         widest_radius,
+    };
+}
+
+/// Backends, which compute percepts, and what they run on.
+pub mod backend {
+    #[cfg(feature = "gpu")]
+    #[doc(inline)]
+    pub use somatic_engine::backend::gpu;
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_engine::backend::*;
+    #[doc(inline)]
+    pub use somatic_engine::backend::{BackendKind, processor};
+}
+
+/// How much each sensor says of what it feels, from recorded touches.
+pub mod gains {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_engine::gains::*;
+    #[doc(inline)]
+    pub use somatic_engine::gains::{GainsEstimate, GainsSurvey};
+}
+
+/// What a field reports for a frame, and a touch: quantities that are present or absent with a reason.
+pub mod percept {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_engine::percept::*;
+    #[doc(inline)]
+    pub use somatic_engine::percept::{
+        COLUMNS, Column, ColumnValues, ContactKind, FieldShare, FitSigma, Flags, LinkShare, Measure, Outputs, Percept,
+        Percepts, Precision, SelfContact, SelfContactSide, TOUCH_COLUMNS, Touch, TouchColumn, TouchFit, TouchFlags,
+        TouchFrame, TouchOutputs, Unit, Wrench,
+    };
+}
+
+/// What is asked for, and the plan that an engine makes of it.
+pub mod scene {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_engine::scene::*;
+    #[doc(inline)]
+    pub use somatic_engine::scene::{
+        Arithmetic, AskedOutputs, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy,
+        Plan, PlannedStage, Scene, choose_fields,
+    };
+}
+
+/// Touches of the whole body, found on its skin.
+pub mod touch {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_engine::touch::*;
+    #[doc(inline)]
+    pub use somatic_engine::touch::{
+        Input, Options, Reading, Skin, SkinParts, SkinTaxel, Splits, TouchState, Touches, Unrolled,
     };
 }
 
@@ -167,9 +206,7 @@ pub mod output {
 }
 
 pub use backend::BackendKind;
-pub use backend::agreement::{Agreement, ComparedColumn, Comparison, Verdict};
 pub use body::Body;
-pub use engine::{Engine, EngineState, Options};
 pub use error::{Error, Result};
 pub use output::OutputPath;
 pub use percept::{
@@ -178,3 +215,6 @@ pub use percept::{
 };
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, FrameTime, Letter, Pose, RawValue, Receptor};
+pub use somatic_engine::{Agreement, ComparedColumn, Comparison, Engine, EngineState, Options, Verdict};
+#[allow(unused_imports, reason = "which of them are used hangs on features")]
+use somatic_engine::{engine, stage};

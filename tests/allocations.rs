@@ -2,10 +2,6 @@
 
 // The skins of `somatic bench`.
 #[cfg(feature = "cli")]
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../src/experiments/shape.rs"]
-mod shape;
-
 use somatic::{BackendKind, Body, Calibration, Engine, Options, Outputs, RawValue, Scene, bundled};
 
 /// Allocations of 100 frames, one a call, after some that make room.
@@ -102,7 +98,7 @@ fn positions_of_joints_in_a_frame_allocate_nothing() {
 #[cfg(feature = "cli")]
 #[test]
 fn a_frame_that_is_shared_allocates_its_tasks_alone() {
-    use crate::shape::Shape;
+    use somatic_engine::shape::Shape;
     let shape = Shape { sensors: 5000, fields: 4400, members: 16, wide: 0, local: true, frames: 1, seed: 1 };
     let made = allocations(&shape.body(), Outputs::CENTROID | Outputs::ORIENTATION, None);
     let others = rayon::current_num_threads() as u64 - 1;

@@ -1,12 +1,10 @@
 //! Every command that the documentation shows is run, as written, in a folder with what a reader would have there.
 #![cfg(feature = "cli")]
 
-mod skips;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use self::skips::skip;
+use somatic_skips::skip;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
 const RUN_ELSEWHERE: [&str; 17] = [

@@ -11,7 +11,6 @@ mod fuzz;
 #[allow(dead_code, reason = "the tests of exports use more of it")]
 #[path = "vendor/make.rs"]
 mod make;
-mod skips;
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};

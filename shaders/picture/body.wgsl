@@ -1,5 +1,5 @@
 // A body's surface and its taxels, seen from one side: parallel projection, light that goes with the eye.
-// Colours are linear. The structs stand in src/backend/gpu/raster.rs.
+// Colours are linear. The structs stand in crates/engine/src/backend/gpu/raster.rs.
 
 struct View {
     clip_from_world: mat4x4<f32>,

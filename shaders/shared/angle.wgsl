@@ -1,4 +1,4 @@
-// Angles of lines, as src/stage/angle.rs has them; the built-in atan2 may be off by 4096 ulp.
+// Angles of lines, as crates/engine/src/stage/angle.rs has them; the built-in atan2 may be off by 4096 ulp.
 
 const PI = 3.1415927f;
 const HALF_PI = 1.5707964f;

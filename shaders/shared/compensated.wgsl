@@ -1,4 +1,4 @@
-// Compensated sums (Sums in src/stage/mod.rs): Kahan's, which carries along what each addition has too much.
+// Compensated sums (Sums in crates/engine/src/stage/mod.rs): Kahan's, which carries along what each addition has too much.
 
 override COMPENSATED: bool = false;
 

@@ -1,4 +1,4 @@
-// The structs of src/stage/layout.rs, and the bits of src/percept.rs and src/stage/calibrate.rs.
+// The structs of crates/engine/src/stage/layout.rs, and the bits of crates/engine/src/percept.rs and crates/engine/src/stage/calibrate.rs.
 
 struct Batch {
     frames: u32,

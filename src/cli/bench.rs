@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::experiments::dump;
-use crate::experiments::shape::Shape;
 use clap::Args;
 use serde_json::json;
 use somatic::limits::{self, MAX_SYSTEM_BYTES};
 use somatic::output::OutputFolder;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
+use somatic_engine::shape::Shape;
 
 use super::bar::Bar;
 use super::files::FilesRead;

@@ -3,13 +3,13 @@
 use serde_json::{Map, Value, json};
 
 use super::npy;
-use super::shape::Shape;
 use somatic::body::Body;
 use somatic::error::{Error, Result};
 use somatic::field::{Field, FieldSet};
 use somatic::output::OutputFolder;
 use somatic::percept::{Flags, Outputs, Percept, Percepts, Precision};
 use somatic::signal::Frame;
+use somatic_engine::shape::Shape;
 
 /// The files that [`write()`] writes for `shape` and `outputs`.
 pub fn files(shape: &Shape, outputs: Outputs) -> Vec<String> {

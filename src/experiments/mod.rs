@@ -8,7 +8,6 @@ mod kalman;
 mod metric;
 mod motion;
 mod npy;
-pub mod shape;
 mod table;
 mod trial;
 

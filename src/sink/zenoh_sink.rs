@@ -208,9 +208,7 @@ mod tests {
     #[test]
     fn a_limb_sends_the_taxels_of_its_fields_also_where_touches_read_all() {
         let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-        let scene = |touches: Option<touch::Options>| {
-            Scene { fields: vec!["hand/midhand/thumb".into()], ..Scene::default() }.touches(touches)
-        };
+        let scene = |touches: Option<touch::Options>| Scene::default().fields(["hand/midhand/thumb"]).touches(touches);
         let plan = |touches: Option<touch::Options>| {
             let options = Options::default().scene(scene(touches)).backend(crate::BackendKind::Reference);
             Engine::new(&body, options).unwrap().plan().clone()

@@ -9,7 +9,7 @@ use crate::engine::Options;
 use crate::error::Result;
 use crate::field::Recharted;
 use crate::percept::{Flags, Outputs, Percept, TouchFrame};
-use crate::scene::{Charts, Knobs, OrientationBy, Plan, PlanField, Scene};
+use crate::scene::{Charts, OrientationBy, Plan, PlanField, Scene};
 use crate::signal::{Calibration, Letter};
 use crate::source::Truth;
 use crate::stage::angle;
@@ -65,13 +65,9 @@ pub(super) struct ChartGeometry {
 impl ChartGeometry {
     /// For `charted`, which are the body's fields in `charts`.
     pub(super) fn new(body: &Body, options: &Options, charts: Charts, charted: &Recharted) -> Result<Self> {
-        let scene = Scene {
-            outputs: Outputs::CENTROID | Outputs::POSITION,
-            fields: options.scene.fields.clone(),
-            letters: vec![Letter::default()],
-            knobs: Knobs::default(),
-            ..Scene::default()
-        };
+        let mut scene =
+            Scene::default().outputs(Outputs::CENTROID | Outputs::POSITION).letters(vec![Letter::default()]);
+        scene.fields.clone_from(&options.scene.fields);
         let plan = Plan::new(body, &charted.fields, &scene, &Calibration::identity(body.taxels.len()))?;
         let kept = charted.kept.iter().map(|(name, why)| format!("{charts}: {name}: {why}")).collect();
         Ok(Self { plan, kept })

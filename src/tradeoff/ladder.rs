@@ -46,8 +46,8 @@ mod tests {
     use crate::backend::BackendKind;
     use crate::engine::{Engine, Options};
     use crate::scene::Scene;
-    use crate::shape::Shape;
     use crate::{bundled, touch};
+    use somatic_engine::shape::Shape;
 
     fn plan(outputs: Outputs) -> Plan {
         let shape = Shape { sensors: 64, fields: 8, members: 8, wide: 0, local: true, frames: 2, seed: 1 };

@@ -233,8 +233,8 @@ impl ReferencePercepts {
     fn new(body: &Body, options: &Options, played: &TestFrames) -> Result<Self> {
         let outputs = Outputs::CENTROID | Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS;
         let touches = can_fit(options).then(fits::asked);
-        let scene = Scene { outputs, knobs: Knobs::default(), touches, ..options.scene.clone() };
-        let options = Options { scene, backend: BackendKind::Reference, ..options.clone() };
+        let scene = options.scene.clone().outputs(outputs).knobs(Knobs::default()).touches(touches);
+        let options = options.clone().scene(scene).backend(BackendKind::Reference);
         let mut engine = Engine::new(body, options)?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
         let percepts = engine.process(&played.frames)?.clone();
@@ -267,8 +267,9 @@ impl Trial {
         // Orientations are compared at their centroids.
         let outputs = options.scene.outputs | Outputs::CENTROID;
         // Touches are the same whatever the knobs, and looked for where they are fitted.
-        let scene = Scene { knobs, outputs, touches: None, ..options.scene.clone() };
-        let mut engine = Engine::in_charts(body, recharted, Options { scene, backend, batch, ..options.clone() })?;
+        let scene = options.scene.clone().knobs(knobs).outputs(outputs).touches(None);
+        let options = options.clone().scene(scene).backend(backend).batch(batch);
+        let mut engine = Engine::in_charts(body, recharted, options)?;
         engine.set_channels(&played.taxels).map_err(|e| e.at(&played.source))?;
         let (times_us, errors) = (Vec::new(), ErrorSamples::default());
         Ok(Self { way, combination, engine, next: 0, passes: 0, times_us, errors, truth: None })
@@ -362,10 +363,7 @@ mod tests {
     #[test]
     fn every_combination_has_its_turns_and_errors_are_those_of_its_arithmetic() {
         let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-        let options = Options {
-            scene: Scene { outputs: Outputs::CENTROID | Outputs::ORIENTATION, ..Scene::default() },
-            ..Options::default()
-        };
+        let options = Options::default().scene(Scene::default().outputs(Outputs::CENTROID | Outputs::ORIENTATION));
         let mut shares = Vec::new();
         let report = measure(&body, &options, &touch(), None, &measure_options(0.05), &mut |share| {
             shares.push(share);
@@ -395,8 +393,7 @@ mod tests {
     #[test]
     fn methods_are_held_against_the_truth_of_simulated_touches() {
         let body = Body::from_bytes("hand", bundled::HAND).unwrap();
-        let scene = Scene { fields: vec!["hand/back".into()], ..Scene::default() };
-        let options = Options { scene, ..Options::default() };
+        let options = Options::default().scene(Scene::default().fields(["hand/back"]));
         let mut touches = SimulatedTouches::on(&body, &options, 400).unwrap();
         let own = options.clone().calibration(touches.calibration.clone());
         let played = TestFrames { truth: Vec::new(), ..touches.frames.clone() };

@@ -77,7 +77,7 @@ impl Combination {
     /// Its backend and knobs in words.
     #[must_use]
     pub fn words(&self) -> Words {
-        let Knobs { arithmetic, charts, orientation_by, coverage, cadence } = self.knobs;
+        let Knobs { arithmetic, charts, orientation_by, coverage, cadence, .. } = self.knobs;
         let backend = match self.backend {
             BackendKind::Gpu => "gpu",
             BackendKind::Reference => "reference",
@@ -146,7 +146,12 @@ impl Combination {
                         for &coverage in &coverages {
                             for &cadence in &cadences {
                                 let arithmetic = Some(arithmetic);
-                                let knobs = Knobs { arithmetic, charts, orientation_by, coverage, cadence };
+                                let knobs = Knobs::default()
+                                    .arithmetic(arithmetic)
+                                    .charts(charts)
+                                    .orientation_by(orientation_by)
+                                    .coverage(coverage)
+                                    .cadence(cadence);
                                 let first = arithmetic == Some(arithmetics[0])
                                     && backend == backends[0]
                                     && charts == charts_to_try[0]
@@ -212,13 +217,12 @@ impl Measurement {
     /// Its words are of another version.
     pub fn combination(&self) -> crate::Result<Combination> {
         let Words { backend, arithmetic, charts, orientation_by, coverage, cadence } = &self.words;
-        let knobs = Knobs {
-            arithmetic: (backend != "reference").then(|| arithmetic.parse()).transpose()?,
-            charts: charts.parse()?,
-            orientation_by: orientation_by.parse()?,
-            coverage: coverage.parse()?,
-            cadence: cadence.parse()?,
-        };
+        let knobs = Knobs::default()
+            .arithmetic((backend != "reference").then(|| arithmetic.parse()).transpose()?)
+            .charts(charts.parse()?)
+            .orientation_by(orientation_by.parse()?)
+            .coverage(coverage.parse()?)
+            .cadence(cadence.parse()?);
         Ok(Combination { backend: backend.parse()?, knobs })
     }
 
@@ -331,7 +335,7 @@ mod tests {
             let [rms, median, p99, worst] = [p95 / 2.0, p95 / 4.0, p95, p95 * 2.0];
             Errors { compared: 10, rms, median, p95, p99, worst }
         };
-        let knobs = Knobs { arithmetic: (backend != "reference").then_some(Arithmetic::OnePass), ..Knobs::default() };
+        let knobs = Knobs::default().arithmetic((backend != "reference").then_some(Arithmetic::OnePass));
         let combination = Combination { backend: backend.parse().unwrap(), knobs };
         Measurement {
             way: CallMode::Live,
@@ -388,9 +392,9 @@ mod tests {
         for combination in live.iter().chain(&batch) {
             assert!(combination.backend.with(combination.knobs.arithmetic).is_ok(), "{combination}");
         }
-        let knobs = Knobs { charts: Charts::Plane, arithmetic: Some(Arithmetic::OnePass), ..Knobs::default() };
+        let knobs = Knobs::default().charts(Charts::Plane).arithmetic(Arithmetic::OnePass);
         let some = Combination::all(
-            &Scene { knobs, outputs: Outputs::CENTROID, ..scene },
+            &scene.knobs(knobs).outputs(Outputs::CENTROID),
             CallMode::Batch,
             &[BackendKind::Cpu],
             true,

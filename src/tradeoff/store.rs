@@ -153,7 +153,7 @@ impl Key {
 
 /// The requested options without knobs, as all of these are measured.
 fn requested(options: &Options) -> String {
-    let scene = crate::Scene { knobs: Knobs::default(), ..options.scene.clone() };
+    let scene = options.scene.clone().knobs(Knobs::default());
     format!("{:?} {scene:?}", options.backend)
 }
 
@@ -229,11 +229,11 @@ mod tests {
         moved.taxels[0].position_in_link.x += 1e-3;
         assert!(why(find(&moved, &options, "a")).contains("the body before it changed"));
         // Another scene has another file; knobs are no part of it.
-        let other = |scene: Scene| Options { scene, ..options.clone() };
-        let total = other(Scene { outputs: Outputs::TOTAL, ..Scene::default() });
+        let other = |scene: Scene| options.clone().scene(scene);
+        let total = other(Scene::default().outputs(Outputs::TOTAL));
         assert!(matches!(find(&body, &total, "a"), Found::Nothing));
-        let knobs = Knobs { coverage: crate::scene::Coverage::All, ..Knobs::default() };
-        assert!(matches!(find(&body, &other(Scene { knobs, ..Scene::default() }), "a"), Found::Fresh(_)));
+        let knobs = Knobs::default().coverage(crate::scene::Coverage::All);
+        assert!(matches!(find(&body, &other(Scene::default().knobs(knobs)), "a"), Found::Fresh(_)));
         let path = store.file(&body, &options);
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replace("\"version\": 3", "\"version\": 1").replace("\"recording\"", "\"other\""))

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::field::FieldSet;
 use crate::percept::Outputs;
 use crate::random::Random;
-use crate::scene::{Knobs, Plan, PlanField, Scene};
+use crate::scene::{Plan, PlanField, Scene};
 use crate::signal::{Calibration, Frame, LayerResponse, Letter};
 use crate::source::{SimulatedSource, Source as _};
 
@@ -70,13 +70,8 @@ impl SimulatedTouches {
     /// No field has a chart, no taxel an area, or the body no surface.
     pub fn on(body: &Body, options: &Options, most: usize) -> Result<Self> {
         let calibration = Calibration::identity(body.taxels.len());
-        let scene = Scene {
-            outputs: Outputs::CENTROID,
-            fields: options.scene.fields.clone(),
-            letters: vec![Letter::default()],
-            knobs: Knobs::default(),
-            ..Scene::default()
-        };
+        let mut scene = Scene::default().outputs(Outputs::CENTROID).letters(vec![Letter::default()]);
+        scene.fields.clone_from(&options.scene.fields);
         let plan = Plan::new(body, &FieldSet::new(body)?, &scene, &calibration)?;
         let fields: Vec<&PlanField> =
             plan.fields.iter().filter(|field| field.chart.is_some() && field.count > 1).collect();

@@ -80,7 +80,7 @@ impl<'a> Truths<'a> {
         let mut truths = Self { body, options, frames, truth, description, with_fit: None, known };
         if truths.options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some()) {
             let mut with_fit = BTreeSet::new();
-            let scene = Scene { touches: Some(fits::asked()), ..truths.scene(Knobs::default()) };
+            let scene = truths.scene(Knobs::default()).touches(fits::asked());
             let recharted = &charted[Charts::AsAuthored.word()];
             truths.each(BackendKind::Cpu, scene, recharted, &mut |frame, Seen { percept, fit }, _| {
                 if fit.is_some() {
@@ -102,12 +102,12 @@ impl<'a> Truths<'a> {
     ) -> Result<OfTouches> {
         let Combination { backend, knobs } = combination;
         let by = knobs.orientation_by;
-        let knobs = Knobs { coverage: Coverage::All, cadence: Cadence::EveryFrame, ..knobs };
+        let knobs = knobs.coverage(Coverage::All).cadence(Cadence::EveryFrame);
         let key = Combination { backend, knobs }.to_string();
         if let Some(errors) = self.known.get(&key) {
             return Ok(*errors);
         }
-        let knobs = Knobs { arithmetic: knobs.arithmetic.filter(|_| backend != BackendKind::Reference), ..knobs };
+        let knobs = knobs.arithmetic(knobs.arithmetic.filter(|_| backend != BackendKind::Reference));
         let [mut all, mut fitted] = [(); 2].map(|()| TrueErrorSamples::default());
         self.each(backend, self.scene(knobs), recharted, &mut |frame, Seen { percept, fit }, truth| {
             let add = |to: &mut TrueErrorSamples| match by.steps() {
@@ -130,8 +130,10 @@ impl<'a> Truths<'a> {
         let outputs = self.options.scene.outputs & (Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) | Outputs::CENTROID;
         let letters = vec![Letter::default()];
         // The truth is on links.
-        let (coordinates, relative_to) = (Coordinates::Anchor, None);
-        Scene { knobs, outputs, touches: None, letters, coordinates, relative_to, ..self.options.scene.clone() }
+        let scene = self.options.scene.clone().knobs(knobs).outputs(outputs).touches(None).letters(letters);
+        let mut scene = scene.coordinates(Coordinates::Anchor);
+        scene.relative_to = None;
+        scene
     }
 
     /// Calls `on` with the number of each frame, what is seen of each field that is touched, and the truth.
@@ -142,7 +144,7 @@ impl<'a> Truths<'a> {
         recharted: &Recharted,
         on: &mut dyn FnMut(usize, Seen, &Truth),
     ) -> Result<()> {
-        let options = Options { scene, backend, batch: BATCH, tare: false, ..self.options.clone() };
+        let options = self.options.clone().scene(scene).backend(backend).batch(BATCH).tare(false);
         let mut engine = Engine::in_charts(self.body, recharted.clone(), options)?;
         engine.set_channels(&self.frames.taxels).map_err(|e| e.at(&self.frames.source))?;
         for (call, frames) in self.frames.frames.chunks(BATCH).enumerate() {

@@ -14,8 +14,8 @@ use somatic::robot::messages::{
 
 use super::python::python_with;
 use super::random::Random;
-use super::skips::skip;
 use super::{done, fails, file, frames, output, stderr, text_of};
+use somatic_skips::skip;
 
 pub(super) const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
 const MS: u64 = 1_000_000;

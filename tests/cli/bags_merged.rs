@@ -8,8 +8,8 @@ use somatic::source::{BagName, JointStates};
 
 use super::bags::{ROBOT, Said, What, refused, rows, with, write_mcap};
 use super::python::python_with;
-use super::skips::skip;
 use super::{done, fails, file, frames, output, stderr, text_of};
+use somatic_skips::skip;
 
 const MS: u64 = 1_000_000;
 const CLOUD: &str = "sensor_msgs/msg/PointCloud2";

@@ -6,8 +6,8 @@ use std::process::Command;
 use serde_json::Value;
 
 use crate::python::python_with;
-use crate::skips::skip;
 use crate::stderr;
+use somatic_skips::skip;
 
 /// What `tests/hidden/escape.py` finds on `files` with so many `taxels`, `None` without Python, which is said.
 fn checked(taxels: &str, files: &[&str]) -> Option<Value> {

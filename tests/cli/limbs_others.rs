@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::limbs_network::{LIMBS, Limb, Lines, Place, free_port, play, undistributed, wait_for};
 use super::python::python_with;
-use super::skips::skip;
+use somatic_skips::skip;
 
 /// Kills a program that a test does not need any more.
 struct Killed(Child);

@@ -5,8 +5,8 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use super::skips::skip;
 use super::{file, text_of};
+use somatic_skips::skip;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_somatic");
 

@@ -61,8 +61,6 @@ mod serial;
 mod signals;
 mod simulate;
 mod skins;
-#[path = "../skips/mod.rs"]
-mod skips;
 mod sources;
 mod tables;
 mod touches;

@@ -7,8 +7,8 @@ use std::process::Command;
 use serde_json::Value;
 
 use super::python::python_with;
-use super::skips::skip;
 use super::{done, fails, stderr, text_of};
+use somatic_skips::skip;
 
 const MODEL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mujoco/skin.xml");
 

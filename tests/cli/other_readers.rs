@@ -8,8 +8,8 @@ use serde_json::Value;
 use somatic::author::mesh::{MeshOptions, Up, open};
 
 use crate::python::python_with;
-use crate::skips::skip;
 use crate::{stderr, text_of};
+use somatic_skips::skip;
 
 /// The corners of the triangles of the mesh at `path` as doubles, in its own axes, m.
 fn corners(path: &Path) -> Vec<u8> {

@@ -8,8 +8,8 @@ use serde_json::Value;
 
 use crate::python::python_with;
 use crate::random::Random;
-use crate::skips::skip;
 use crate::{done, stderr, text_of};
+use somatic_skips::skip;
 
 /// Touches per body; `SOMATIC_PRESSES` sets another number, and presses robots too, which takes minutes.
 const PRESSES: usize = 5;

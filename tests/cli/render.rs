@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::skips::skip;
 use super::{done, fails, file, files_in, output, somatic, stderr, text_of};
+use somatic_skips::skip;
 
 /// Renders with `arguments` into a folder of its own. `None`, and a skip, where no adapter answers.
 fn render(arguments: &[&str]) -> Option<Picture> {

@@ -9,8 +9,8 @@ use somatic::robot::Kinematics;
 
 use super::python::python_with;
 use super::random::Random;
-use super::skips::skip;
 use super::{done, fails, file, frames, stderr, text_of};
+use somatic_skips::skip;
 
 const URDF: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots/arm.urdf");
 const TOUCH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots/arm-touch.csv");

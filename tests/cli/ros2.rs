@@ -12,8 +12,8 @@ use somatic::robot::messages::{
 };
 
 use super::python::python_with;
-use super::skips::skip;
 use super::{done, fails, file, files_in, frames, output, stderr, text_of};
+use somatic_skips::skip;
 
 const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
 

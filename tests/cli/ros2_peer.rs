@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use super::python::python_with;
-use super::skips::skip;
 use super::{somatic, stderr};
+use somatic_skips::skip;
 
 pub const CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 

@@ -6,8 +6,8 @@ use std::process::Command;
 use serde_json::Value;
 
 use crate::python::python_with;
-use crate::skips::skip;
 use crate::{stderr, text_of};
+use somatic_skips::skip;
 
 /// What `tests/touches/oracle.py` finds on random recordings, `None` without Python, which is said.
 fn random(flags: &[&str]) -> Option<Value> {

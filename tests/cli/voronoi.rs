@@ -6,8 +6,8 @@ use std::process::Command;
 use serde_json::Value;
 
 use crate::python::python_with;
-use crate::skips::skip;
 use crate::{done, stderr, text_of};
+use somatic_skips::skip;
 
 /// Taxels per body; `SOMATIC_VORONOI` sets another number.
 const TAXELS: usize = 250;

@@ -7,8 +7,8 @@ use std::process::{Command as Process, Stdio};
 use proptest::prelude::*;
 use somatic::wire::{Answer, Command, Status};
 
-use crate::skips::skip;
 use crate::wire::{Packet, decoded, examples, hex, root, unhex, vectors};
+use somatic_skips::skip;
 
 const FLAGS: [&str; 4] = ["-Wall", "-Wextra", "-Werror", "-std=c99"];
 

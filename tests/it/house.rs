@@ -36,6 +36,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
             "expected",
             [&below_backend[..], &["backend", "engine", "touch", "source", "author", "parallel", "setters"]].concat(),
         ),
+        ("shape", [&below_backend[..], &["backend", "engine"]].concat()),
         ("wire", vec!["error"]),
         ("limb", vec!["error", "signal", "wire"]),
         ("recording", vec!["error", "output", "signal", "body"]),
@@ -85,7 +86,8 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// The source folders of the crates, and what their paths begin with in the crate that has all of them under its own name.
-const CRATES: [(&str, &str); 3] = [("src", ""), ("crates/skin/src", ""), ("crates/author/src", "author")];
+const CRATES: [(&str, &str); 4] =
+    [("src", ""), ("crates/skin/src", ""), ("crates/engine/src", ""), ("crates/author/src", "author")];
 
 /// The rooms of `somatic-skin` that other crates of the house call as if they were their own.
 const GROUND_FLOOR: [&str; 9] = ["body", "error", "field", "keys", "length", "limits", "parallel", "plain", "random"];

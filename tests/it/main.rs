@@ -43,13 +43,8 @@ mod real;
 mod recordings;
 // The skins of `somatic bench`.
 mod drift;
-#[allow(dead_code, unused_imports, reason = "not every test and bench needs all of it")]
-#[path = "../../src/experiments/shape.rs"]
-mod shape;
 mod simulated;
 mod skipped;
-#[path = "../skips/mod.rs"]
-mod skips;
 mod state;
 mod sure;
 mod sure_on_skin;

@@ -6,8 +6,6 @@ mod damaged;
 mod insoles;
 mod make;
 mod oracle;
-#[path = "../skips/mod.rs"]
-mod skips;
 mod variants;
 
 use std::path::{Path, PathBuf};

@@ -318,7 +318,7 @@ mod tests {
     /// A floor of 0.2 m by 0.2 m, on which a box stands where x > 0, so thin that the floor ends at its wall.
     fn floor_and_box() -> Original {
         let (mut floor, mut walls) = (MeshData::default(), MeshData::default());
-        let mut quad = |mesh: &mut MeshData, corners: [[f32; 3]; 4], normal: [f32; 3]| {
+        let quad = |mesh: &mut MeshData, corners: [[f32; 3]; 4], normal: [f32; 3]| {
             let first = mesh.positions.len() as u32;
             mesh.positions.extend(corners);
             mesh.normals.extend([normal; 4]);

@@ -275,7 +275,7 @@ mod tests {
         let newtons = "[all]\nunit = \"N\"\n";
         let none = remarks(&body, newtons, with_touches(), &[]);
         assert!(none.contains("the source sends none of its taxels"), "{none}");
-        let fields = Scene { fields: vec!["hand/midhand/thumb".into()], ..Scene::default() }.touches(None);
+        let fields = Scene::default().fields(["hand/midhand/thumb"]).touches(None);
         assert!(remarks(&body, newtons, fields, &ids).contains("leave out some of its taxels; add touches"));
         body.taxels.iter_mut().for_each(|taxel| taxel.area = 0.0);
         assert!(remarks(&body, "[all]\nunit = \"Pa\"\n", with_touches(), &ids).contains("taxels have no area"));

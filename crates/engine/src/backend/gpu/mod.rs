@@ -1,0 +1,384 @@
+//! Backend `gpu`: WGSL compute shaders through wgpu, the only place that knows wgpu.
+//!
+//! Frames stream through a few sets of buffers: while the device computes some, the next are packed and those before are
+//! read. Every stage runs over all fields and frames of a submission at once, and only the columns that were asked for
+//! come back, in the order that percepts have. Pipelines, buffers and bind groups are made once; a call allocates no
+//! device memory. On the device a taxel's frames lie side by side, four to a vector, so that neighbouring invocations
+//! read neighbouring words.
+
+pub(crate) mod adapter;
+mod bus;
+mod capacity;
+mod columns;
+mod members;
+mod over_fields;
+mod pack;
+pub mod raster;
+mod report;
+mod ring;
+pub(crate) mod shaders;
+mod shares;
+mod stage;
+mod unpack;
+
+#[cfg(test)]
+mod tests;
+
+pub use adapter::{AdapterSummary, adapters};
+pub use bus::silent_gpus;
+use bytemuck::cast_slice;
+use glam::DVec2;
+pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
+
+use self::adapter::Device;
+use self::capacity::FRAMES_A_BLOCK;
+use self::columns::{Columns, NOTHING};
+use self::over_fields::{Bound, OverFields};
+use self::pack::{Form, HEADER, Packer, STEP};
+use self::ring::{SETS, Set};
+use self::shaders::Values;
+use self::shares::Shares;
+use self::stage::{Over, Stage, table};
+use super::{Backend, BackendState, FieldState, RawBatch};
+use crate::error::Result;
+use crate::percept::Percepts;
+use crate::scene::Plan;
+use crate::signal::RawValue;
+use crate::stage::{layout, motion};
+
+/// The backend, with everything it needs on the device.
+pub(crate) struct Gpu {
+    plan: Plan,
+    device: Device,
+    /// Frames that one submission takes at most.
+    capacity: usize,
+    ring: Vec<Set>,
+    batch: wgpu::Buffer,
+    /// What is in `batch`.
+    told: Option<layout::Batch>,
+    steps: wgpu::Buffer,
+    raw: wgpu::Buffer,
+    /// The raw values of the frame before, where the plan has changes.
+    before: Option<wgpu::Buffer>,
+    taxels: wgpu::Buffer,
+    stages: Vec<Stage>,
+    /// Stages that take the place of the first ones, so many, should the plan cease to be plain.
+    fallback: (usize, Vec<Stage>),
+    packer: Packer,
+    columns: Columns,
+    results: wgpu::Buffer,
+    /// Per taxel and frame, where they are read back.
+    pressures: Option<wgpu::Buffer>,
+    /// Per field, the power of two that its lengths are counted in, m.
+    units_m: Vec<f32>,
+    /// By field, contact and centroid of the last frame, as hysteresis and motion keep them.
+    memory: [wgpu::Buffer; 2],
+}
+
+impl Gpu {
+    /// The backend for `plan` on the process's device, for calls of about `batch` frames.
+    pub(crate) fn new(plan: &Plan, batch: usize) -> Result<Self> {
+        Self::on(adapter::shared()?, plan, batch)
+    }
+
+    /// The same on a device that is not the CPU itself.
+    pub(crate) fn on_hardware(plan: &Plan, batch: usize) -> Result<Self> {
+        Self::on(adapter::hardware()?, plan, batch)
+    }
+
+    fn on(device: Device, plan: &Plan, batch: usize) -> Result<Self> {
+        let cut = (over_fields::of_part(&device), over_fields::most_members(&device));
+        Self::in_shares(device, plan, batch, cut)
+    }
+
+    /// With so many members in a part of a wide field, and at most so many in one table on the device.
+    fn in_shares(device: Device, plan: &Plan, batch: usize, (of_part, most): (usize, usize)) -> Result<Self> {
+        let columns = Columns::new(plan);
+        let capacity = capacity::of(&device, plan, &columns, batch)?;
+        let shares = Shares::new(plan, of_part, most);
+        let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
+        let frames = capacity as u64;
+        let working = |name: &str, size: u64| {
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+            device.buffer(name, size, usage)
+        };
+        let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let batch = device.buffer("batch", HEADER, uniform);
+        let steps = working("steps", frames * STEP);
+        let row = layout::padded_channels(plan.channels()) as u64 * 4;
+        let plain = is_plain(plan);
+        let direct = plain && !plan.has_changes() && !plan.stages().pressures && plan.calibrated() == plan.channels();
+        let form = match (direct, capacity) {
+            (false, _) => Form::Rows,
+            (true, 1) => Form::One,
+            (true, _) => Form::Quads,
+        };
+        // Should the plan cease to be plain, they go up in rows.
+        let up = [Form::Rows, form].map(|form| form.bytes(plan.channels(), capacity));
+        let up = up[0].max(up[1]) as u64;
+        let raw = working("raw", up);
+        let taxels = table(&device, "taxels", &plan.taxels);
+        let quads = layout::padded_quads(capacity) as u64;
+        let pressures = working("pressures", quads * slots * 16);
+        let statuses = working("statuses", quads * slots * 4);
+        let results = working("results", frames * fields * 4 * columns.count() as u64);
+        // What the frame before left; buffers begin as zeros, and zero is no contact.
+        let (touched, last) = (working("touched", fields * 4), working("last", fields * 16));
+
+        let wanted = plan.stages();
+        let (curves, knots) =
+            (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
+        let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
+        let (entry, used) = if plan.curves.curves.is_empty() { ("main", 5) } else { ("curved", 7) };
+        let calibrated = |plain: bool| {
+            let signals = (plan.calibrated() / plan.channels()) as f64;
+            let told = [("SIGNALS", signals), ("PLAIN", f64::from(u8::from(plain)))];
+            Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &told, &buffers[..used])
+        };
+        let mut stages = if direct { Vec::new() } else { vec![calibrated(plain)] };
+        // For a plan that ceases to be plain.
+        let mut fallback: Vec<Stage> = plain.then(|| calibrated(false)).into_iter().collect();
+        // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
+        let before = plan.has_changes().then(|| working("raw before", row));
+        if let Some(before) = &before {
+            let one = device.buffer("one frame", HEADER, uniform);
+            device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1)));
+            let calibrated = plan.calibrated() as u64;
+            let pressed = working("pressures before", calibrated * 16);
+            let statuses_before = working("statuses before", calibrated * 4);
+            let buffers = [&one, &taxels, before, &pressed, &statuses_before, &curves, &knots];
+            for stages in [&mut stages, &mut fallback].into_iter().filter(|stages| !stages.is_empty()) {
+                stages.push(stages[0].again(&device, Over::CalibratedOnce, &buffers[..used]));
+            }
+            let buffers = [&batch, &taxels, &steps, &pressed, &statuses_before, &pressures, &statuses];
+            stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
+        }
+        let tables = OverFields::new(&device, plan, &shares, &columns, capacity);
+        let over_fields = |direct: bool| {
+            let (values, at) = match direct {
+                true => (Values::Raw, (raw.as_entire_binding(), None)),
+                false => (Values::Pressures, (pressures.as_entire_binding(), Some(statuses.as_entire_binding()))),
+            };
+            let (batch, taxels, results) = (&batch, &taxels, &results);
+            tables.stages(&device, &Bound { batch, taxels, results, values, at })
+        };
+        let replaced = match direct {
+            true => {
+                fallback.extend(over_fields(false));
+                fallback.len() - 1
+            }
+            false => fallback.len(),
+        };
+        let fallback = (replaced, fallback);
+        stages.extend(over_fields(direct));
+        if wanted.hysteresis {
+            let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| f.thresholds.rounded()).collect();
+            let buffers = [&batch, &table(&device, "thresholds", &thresholds), &results, &touched];
+            let told = columns.of_hysteresis();
+            stages.push(Stage::new(&device, &shaders::HYSTERESIS, "main", Over::Fields, &told, &buffers));
+        }
+        if wanted.motion {
+            let still: Vec<layout::Still> = plan.fields.iter().map(|field| field.still).collect();
+            let still = table(&device, "still", &still);
+            let told = columns.of_motion();
+            let main = [&batch, &steps, &still, &results, &last];
+            stages.push(Stage::new(&device, &shaders::MOTION, "main", Over::Cells, &told, &main));
+            let keep = [(0, &batch), (3, &results), (4, &last)];
+            let keep = keep.map(|(binding, buffer)| (binding, buffer.as_entire_binding()));
+            stages.push(Stage::bound(&device, &shaders::MOTION, "keep", Over::Fields, &told, &keep));
+        }
+
+        let back = frames * fields * 4 * columns.read().len() as u64;
+        let back = back + if wanted.pressures { quads * slots * 16 } else { 0 };
+        // Calls that fit into one submission never have another on its way.
+        let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
+        let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
+        device.check()?;
+        Ok(Self {
+            plan: plan.clone(),
+            device,
+            capacity,
+            ring,
+            batch,
+            told: None,
+            steps,
+            raw,
+            before,
+            taxels,
+            stages,
+            fallback,
+            packer: Packer::new(form, plan.channels(), capacity),
+            columns,
+            results,
+            pressures: wanted.pressures.then_some(pressures),
+            units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
+            memory: [touched, last],
+        })
+    }
+
+    /// Sends `raw`, which is at most the capacity and starts at frame `first` of a call, with set `set`, which is free.
+    fn submit(&mut self, set: usize, raw: &RawBatch<'_>, first: usize) -> Result<()> {
+        let header = header(&self.plan, raw.frames as u32);
+        let (upload, readback) = (&self.ring[set].upload, &self.ring[set].readback);
+        let bytes = self.packer.bytes(raw.frames) as u64;
+        let mapped = upload.get_mapped_range_mut(0..pack::values_at(raw.frames) + bytes);
+        self.packer.pack(raw, &header, mapped.map_err(|e| self.device.lost(&e))?.slice(..));
+        upload.unmap();
+        let frames = raw.frames as u64;
+        let steps = frames * STEP;
+        let mut encoder = self.device.encoder();
+        // Each copy waits for the one before: none that changes nothing.
+        if self.told != Some(header) {
+            encoder.copy_buffer_to_buffer(upload, 0, &self.batch, 0, HEADER);
+            self.told = Some(header);
+        }
+        if self.plan.stages().motion || self.plan.has_changes() {
+            encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);
+        }
+        encoder.copy_buffer_to_buffer(upload, pack::values_at(raw.frames), &self.raw, 0, bytes);
+        {
+            let descriptor = wgpu::ComputePassDescriptor { label: Some("somatic"), timestamp_writes: None };
+            let mut pass = encoder.begin_compute_pass(&descriptor);
+            self.stages.iter().for_each(|stage| stage.dispatch(&mut pass, stage.over.groups(&header)));
+        }
+        if let Some(before) = &self.before {
+            let row = layout::padded_channels(self.plan.channels()) as u64 * 4;
+            encoder.copy_buffer_to_buffer(&self.raw, (frames - 1) * row, before, 0, row);
+        }
+        let mut end = frames * self.plan.fields.len() as u64 * 4 * self.columns.read().len() as u64;
+        encoder.copy_buffer_to_buffer(&self.results, 0, readback, 0, end);
+        if let Some(pressures) = &self.pressures {
+            let size = (layout::padded_quads(raw.frames) * self.plan.slots()) as u64 * 16;
+            encoder.copy_buffer_to_buffer(pressures, 0, readback, end, size);
+            end += size;
+        }
+        self.ring[set].submit(&self.device, encoder.finish(), (first, raw.frames), end);
+        Ok(())
+    }
+
+    /// Waits for set `set`, if it is on its way, and takes what it brings into `percepts` from frame `first` on.
+    fn collect(&mut self, set: usize, first: usize, percepts: &mut Percepts) -> Result<()> {
+        let mut taken = std::mem::take(&mut self.ring);
+        let done = taken[set].collect(&self.device, |pending, bytes| {
+            let Some(all) = percepts.cells_f32() else { unreachable!("the engine made percepts of this precision") };
+            let mut cells = all.split_at(first + pending.first).1.split_at(pending.frames).0;
+            self.unpack(bytes, pending.frames, &mut cells);
+        });
+        self.ring = taken;
+        done
+    }
+}
+
+impl Backend for Gpu {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn describe(&self) -> String {
+        let summary = adapter::summary(&self.device.info);
+        format!("{}, {} ({}, {})", summary.name, summary.kind, summary.api, summary.driver)
+    }
+
+    fn state(&mut self) -> Result<BackendState> {
+        let [touched, last] = &self.memory;
+        let touched: Vec<u32> = readback(&self.device, touched)?;
+        let last: Vec<[u32; 4]> = readback(&self.device, last)?;
+        let mut raw = match &self.before {
+            Some(before) => readback(&self.device, before)?,
+            None => Vec::new(),
+        };
+        raw.resize(self.plan.channels(), RawValue::MISSING);
+        let fields = self.units_m.iter().zip(touched).zip(last).map(|((&unit_m, touched), [u, v, pressed, known])| {
+            let place = DVec2::new(f32::from_bits(u).into(), f32::from_bits(v).into()) * f64::from(unit_m);
+            let centroid = (known == 1).then_some(motion::Centroid { place, pressed });
+            FieldState { contact: touched == 1 || centroid.is_some(), centroid }
+        });
+        Ok(BackendState { raw, fields: fields.collect() })
+    }
+
+    fn restore(&mut self, state: &BackendState) -> Result<()> {
+        let fields = || state.fields.iter();
+        let touched: Vec<u32> = fields().map(|field| field.contact.into()).collect();
+        let last = fields().zip(&self.units_m).map(|(field, &unit_m)| match field.centroid {
+            Some(motion::Centroid { place, pressed }) => {
+                let place = (place / f64::from(unit_m)).as_vec2();
+                [place.x.to_bits(), place.y.to_bits(), pressed, 1]
+            }
+            None => [0; 4],
+        });
+        let last: Vec<[u32; 4]> = last.collect();
+        self.device.queue.write_buffer(&self.memory[0], 0, cast_slice(&touched));
+        self.device.queue.write_buffer(&self.memory[1], 0, cast_slice(&last));
+        if let Some(before) = &self.before {
+            self.device.queue.write_buffer(before, 0, cast_slice(&state.raw));
+        }
+        Ok(())
+    }
+
+    fn recalibrate(&mut self, plan: &Plan) {
+        self.plan.recalibrate(plan);
+        self.device.queue.write_buffer(&self.taxels, 0, cast_slice(&self.plan.taxels));
+        if !is_plain(&self.plan) {
+            let (replaced, fallback) = std::mem::take(&mut self.fallback);
+            self.stages.splice(..replaced, fallback);
+            self.packer.form = Form::Rows;
+        }
+    }
+
+    fn run(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
+        self.device.check()?;
+        // What is on its way when something goes wrong is never collected: the device is not to be used again.
+        self.stream(raw, percepts).inspect_err(|e| self.device.note(&e.to_string()))
+    }
+}
+
+impl Gpu {
+    /// All frames of `raw`, some sets of buffers on their way at any time.
+    fn stream(&mut self, raw: &RawBatch<'_>, percepts: &mut Percepts) -> Result<()> {
+        let sets = self.ring.len();
+        let mut parts = 0;
+        for (part, steps) in raw.steps.chunks(self.capacity).enumerate() {
+            let (first, frames) = (part * self.capacity, steps.len());
+            self.collect(part % sets, raw.first, percepts)?;
+            let rows = raw.rows.part(first..first + frames);
+            self.submit(part % sets, &RawBatch { first: 0, frames, rows, steps }, first)?;
+            parts = part + 1;
+        }
+        // The oldest first.
+        for part in parts..parts + sets {
+            self.collect(part % sets, raw.first, percepts)?;
+        }
+        Ok(())
+    }
+}
+
+/// The contents of `buffer`, waiting for all work before.
+fn readback<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer) -> Result<Vec<T>> {
+    let copy = device.buffer("state", buffer.size(), wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+    let mut encoder = device.encoder();
+    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
+    encoder.map_buffer_on_submit(&copy, wgpu::MapMode::Read, .., |_| {});
+    let submission = device.queue.submit([encoder.finish()]);
+    let until = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+    device.device.poll(until).map_err(|e| device.lost(&e))?;
+    device.check()?;
+    let bytes = copy.get_mapped_range(..).map_err(|e| device.lost(&e))?;
+    Ok(bytemuck::pod_collect_to_vec(&bytes))
+}
+
+/// Whether raw values are pressures, with nothing to check but that they are numbers.
+fn is_plain(plan: &Plan) -> bool {
+    plan.taxels[..plan.calibrated()].iter().all(layout::Taxel::raw_is_pressure)
+}
+
+/// What a dispatch over `frames` frames is told of the plan.
+fn header(plan: &Plan, frames: u32) -> layout::Batch {
+    layout::Batch {
+        frames,
+        channels: plan.channels() as u32,
+        calibrated: plan.calibrated() as u32,
+        changes: (plan.slots() - plan.calibrated()) as u32,
+        fields: plan.fields.len() as u32,
+        lanes_log2: layout::lanes(frames as usize).ilog2(),
+    }
+}

@@ -1,0 +1,418 @@
+//! The engine: a plan, a backend and the state between frames. Frames in, percepts out; it does no I/O.
+
+mod advance;
+mod block;
+mod cadence;
+mod check;
+mod dominated;
+mod drift_state;
+mod ids;
+mod input;
+mod links;
+mod on_skin;
+mod place;
+mod post;
+mod self_contacts;
+mod skin_fits;
+mod skin_sigmas;
+mod spread;
+mod state;
+mod touch_check;
+
+use self::cadence::OnChange;
+use self::check::Check;
+use self::drift_state::DriftState;
+use self::ids::ranges;
+use self::input::Input;
+use self::links::Links;
+use self::on_skin::OnSkin;
+use self::post::PostState;
+pub use self::state::EngineState;
+use crate::backend::agreement::{Agreement, ComparedColumn, compare, compare_columns};
+use crate::backend::{self, Backend, BackendKind, Picks, Step};
+use crate::body::Body;
+use crate::error::{Error, Result};
+use crate::field::{FieldSet, NoChart, Recharted, neighbours};
+use crate::percept::{LinkShare, Percepts};
+use crate::scene::{Cadence, Plan, Scene};
+use crate::signal::{Calibration, Frame, FrameTime, Intake, RawValue, Receptor, Unfit, Wiring};
+use crate::stage::{Pressed, calibrate};
+use crate::touch::Skin;
+
+/// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Options {
+    /// What is asked for.
+    pub scene: Scene,
+    /// The robot's calibration; without one P is the raw value.
+    pub calibration: Option<Calibration>,
+    /// What it runs on.
+    pub backend: BackendKind,
+    /// Take the first frame's values as the baselines: only for a robot that nothing touches when it starts.
+    pub tare: bool,
+    /// Frames a call, about: 1 for a live robot, some hundred for recordings. More are taken in turns.
+    pub batch: usize,
+}
+
+setters!(Options {
+    scene: Scene,
+    calibration: impl Into<Option<Calibration>>,
+    backend: BackendKind,
+    tare: bool,
+    batch: usize,
+});
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { scene: Scene::default(), calibration: None, backend: BackendKind::Auto, tare: false, batch: 1 }
+    }
+}
+
+/// Turns frames into percepts.
+///
+/// ```
+/// # fn main() -> somatic::Result<()> {
+/// let body = somatic::Body::from_bytes("hand.glb", somatic::bundled::HAND)?;
+/// let mut engine = somatic::Engine::new(&body, somatic::Options::default())?;
+/// let mut frame = engine.frame(0.0);
+/// frame.values.fill(somatic::RawValue::new(0.0));
+/// frame.values[engine.index_of_taxel(4).unwrap()] = somatic::RawValue::new(512.0);
+/// let percepts = engine.process_one(&frame)?;
+/// assert!(percepts.touched(0).all(|percept| percept.total == Some(512.0)));
+/// # Ok(())
+/// # }
+/// ```
+pub struct Engine {
+    plan: Plan,
+    backend: Box<dyn Backend>,
+    why: String,
+    intake: Intake,
+    raw: Vec<RawValue>,
+    /// Where frames have the plan's values, if those pass as they are; `raw` stays empty then.
+    picks: Option<Picks>,
+    steps: Vec<Step>,
+    last_time: Option<FrameTime>,
+    max_gap_s: f64,
+    percepts: Percepts,
+    /// The reference's side of the last comparison, if no frame was processed without one since.
+    check: Option<Box<Check>>,
+    /// If the calibration asks for any drift compensation.
+    drift: Option<DriftState>,
+    post: PostState,
+    /// With cadence `on-change`.
+    cadence: Option<OnChange>,
+    /// Whether the first frame is still to be taken as the baselines.
+    tare: bool,
+    /// Whether the calibration may change while the engine runs, by drift compensation or tare.
+    recalibrates: bool,
+    frames_done: u64,
+    /// Times and poses of frames that came in one slice, for the next such call.
+    heads: Vec<Frame>,
+    ids: Vec<u32>,
+    /// Per taxel of the body its channel of the plan, if it has one.
+    channel_of_taxel: Vec<Option<u32>>,
+    links: Links,
+    /// Memory for the pressed taxels of a field, empty between calls.
+    pressed: Vec<Pressed>,
+    /// Where touches of the whole body are asked for.
+    on_skin: Option<OnSkin>,
+    /// Fields that could not have the kind of chart that is asked for.
+    kept_charts: Vec<(String, NoChart)>,
+}
+
+impl Engine {
+    /// An engine for `body`.
+    ///
+    /// # Errors
+    /// The body has no taxels or no fields, a field is empty, the scene asks for what is not there, or the backend that
+    /// was asked for cannot run here ([`Error::is_no_adapter`]).
+    pub fn new(body: &Body, options: Options) -> Result<Self> {
+        let scene = &options.scene;
+        let recharted = scene.knobs.charts.applied(body, FieldSet::new(body)?, &scene.fields)?;
+        Self::in_charts(body, recharted, options)
+    }
+
+    /// [`Engine::new`] with the fields in the charts that the scene asks for, which take seconds to lay on some bodies.
+    #[doc(hidden)]
+    pub fn in_charts(body: &Body, recharted: Recharted, options: Options) -> Result<Self> {
+        let Options { scene, calibration, backend: kind, tare, batch } = options;
+        let kind = kind.with(scene.knobs.arithmetic)?;
+        let calibration = calibration.unwrap_or_else(|| Calibration::identity(body.taxels.len()));
+        if calibration.taxels.len() != body.taxels.len() {
+            return Err(Error::failed(format!(
+                "the calibration is for {} taxels, the body has {}; read it again for this body",
+                calibration.taxels.len(),
+                body.taxels.len()
+            )));
+        }
+        let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
+        // Of a large skin these take as much memory as the plan.
+        drop(recharted.fields);
+        let drift = DriftState::new(&plan, calibration.drift, body);
+        if drift.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
+            return Err(Error::usage(
+                "the calibration's [drift] must know what is touched; ask for letter `sustained` too",
+            ));
+        }
+        let chosen = backend::choose(kind, &plan, batch.max(1))?;
+        let layer = calibration.layer;
+        let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
+        let mut engine = Self {
+            steps: Vec::new(),
+            last_time: None,
+            max_gap_s: scene.max_gap_s,
+            percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
+                .with_columns(plan.columns, plan.kept_pressures())
+                .with_letters(plan.letters().len())
+                .with_touch_frames(plan.touched_from.is_some())
+                .with_names((0..plan.fields.len()).map(|field| plan.label(field)).collect()),
+            check: None,
+            post: PostState::initial(&plan),
+            recalibrates: drift.is_some() || tare,
+            drift,
+            cadence: (scene.knobs.cadence == Cadence::OnChange).then(|| OnChange::new(&plan, scene.max_gap_s)),
+            backend: chosen.backend,
+            why: chosen.why,
+            intake: Intake::new(calibration, beside, scene.max_age_s),
+            raw: Vec::new(),
+            picks: None,
+            tare,
+            frames_done: 0,
+            heads: Vec::new(),
+            ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
+            channel_of_taxel: (0..body.taxels.len())
+                .map(|taxel| plan.body_taxels.binary_search(&taxel).ok().and_then(|channel| channel.try_into().ok()))
+                .collect(),
+            links: Links::new(body, &scene),
+            pressed: Vec::with_capacity(
+                plan.fields.iter().map(|field| plan.members_of(field).len()).max().unwrap_or(0),
+            ),
+            on_skin: OnSkin::new(body, &plan, &scene, layer),
+            kept_charts: recharted.kept,
+            plan,
+        };
+        engine.pick();
+        Ok(engine)
+    }
+
+    /// What is run.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The backend: its name, what it runs on, and why it was chosen.
+    #[must_use]
+    pub fn backend(&self) -> (&'static str, String, &str) {
+        (self.backend.name(), self.backend.describe(), &self.why)
+    }
+
+    /// Fields that stay in the charts of the layout as they cannot have the kind that [`crate::scene::Knobs::charts`]
+    /// asks for, and why.
+    pub fn kept_charts(&self) -> impl ExactSizeIterator<Item = (&str, &NoChart)> {
+        self.kept_charts.iter().map(|(name, why)| (name.as_str(), why))
+    }
+
+    /// Says which taxels a source's frames hold, in their order. Until then, it is all of the body's, by ascending id.
+    ///
+    /// # Errors
+    /// An id that the body does not have, or one twice.
+    pub fn set_channels(&mut self, ids: &[u32]) -> Result<()> {
+        let mut taken = vec![false; self.ids.len()];
+        let mut taxel_of_value = Vec::with_capacity(ids.len());
+        for id in ids {
+            let taxel = self.ids.binary_search(id).map_err(|_| {
+                Error::failed(format!(
+                    "there is a taxel id {id}, which the body does not have (its ids are {}); is it the right body?",
+                    ranges(&self.ids)
+                ))
+            })?;
+            if std::mem::replace(&mut taken[taxel], true) {
+                return Err(Error::failed(format!("taxel id {id} appears twice")));
+            }
+            taxel_of_value.push(taxel);
+        }
+        self.intake.set_channels(taxel_of_value);
+        self.pick();
+        Ok(())
+    }
+
+    /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`crate::Flags::STALE`] beside
+    /// [`crate::Flags::INCOMPLETE`]. For sources that say so; it costs a look at every value.
+    pub fn track_stale(&mut self) {
+        self.intake.track_stale();
+        self.pick();
+    }
+
+    /// From now on [`crate::TouchFrame::taxels`] has the taxels of touches, whatever [`Scene::touches`] asks for, if `are_kept`. For
+    /// pages, which show them.
+    pub fn keep_touch_taxels(&mut self, are_kept: bool) {
+        self.on_skin.iter_mut().filter(|_| are_kept).for_each(OnSkin::keep_taxels);
+    }
+
+    /// Tells which board each taxel hangs on: from now on, the drift of one that is touched is that of its board's
+    /// untouched taxels, where there are three. Without, it is that of its link's, else of the body's. For before the first
+    /// frame.
+    pub fn wire(&mut self, wiring: &Wiring) {
+        if let Some(kept) = &mut self.drift {
+            kept.wire(&self.plan, wiring, |channel| self.ids[self.plan.body_taxels[channel]]);
+        }
+    }
+
+    /// Finds out whether values can be read where they are. Drift compensation looks at all of them, gathered.
+    fn pick(&mut self) {
+        let picks = self.intake.picks(&self.plan.body_taxels).filter(|picks| !picks.is_empty());
+        let (width, calibrated) = (self.intake.width(), self.plan.calibrated());
+        self.picks = picks.filter(|_| self.drift.is_none()).map(|picks| Picks::new(&picks, calibrated, width));
+    }
+
+    /// A frame for all of the body's taxels by ascending id, every value missing.
+    #[must_use]
+    pub fn frame(&self, t_s: f64) -> Frame {
+        Frame::missing(t_s, self.ids.len())
+    }
+
+    /// Where the taxel with `id` stands in the values of [`Engine::frame`].
+    #[must_use]
+    pub fn index_of_taxel(&self, id: u32) -> Option<usize> {
+        self.ids.binary_search(&id).ok()
+    }
+
+    /// What is to be known before the first frame, a line each: taxels that no letter reads, drift that no taxel can tell, edges
+    /// between taxels that are not those of the body's file, and sensors of which nothing says what they cover.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        let drift = self.drift.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
+            "no taxel can tell the drift of a touched field: fewer than 3 are in other fields. While a touch lasts, baselines stay, \
+             and drift is taken for pressure; give the body more fields, or leave `time_constant_s` of [drift] out"
+                .to_owned()
+        });
+        let on_skin = self.on_skin.iter().flat_map(OnSkin::remarks).cloned();
+        self.plan.left_out.remark().into_iter().chain(drift).chain(on_skin).collect()
+    }
+
+    /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`] asks for them. Its nodes are what
+    /// [`crate::TouchFrame::taxels`] counts.
+    #[must_use]
+    pub fn skin(&self) -> Option<&Skin> {
+        self.on_skin.as_ref().map(OnSkin::skin)
+    }
+
+    /// Puts into `to`, in place of what it holds, what pressed on each link in the last frame, whatever touches it is of, in the body's
+    /// order: its total, and its wrench in the link's frame where that is known. A controller takes this off what it measures.
+    /// Nothing unless [`Scene::touches`] asks for touches.
+    ///
+    /// ```
+    /// # fn main() -> somatic::Result<()> {
+    /// use somatic::{Body, Engine, Options, RawValue, Scene, bundled, touch};
+    ///
+    /// let body = Body::from_bytes("hand", bundled::HAND)?;
+    /// let scene = Scene::default().touches(touch::Options::default());
+    /// let mut engine = Engine::new(&body, Options::default().scene(scene))?;
+    /// let mut frame = engine.frame(0.0);
+    /// frame.values.fill(RawValue::new(0.0));
+    /// frame.values[engine.index_of_taxel(4).unwrap()] = RawValue::new(5.0);
+    /// engine.process_one(&frame)?;
+    /// let mut presses = Vec::new();
+    /// engine.presses_on_links(&mut presses);
+    /// // Counts are no newtons: there is no wrench.
+    /// assert!(presses[0].total == 5.0 && presses[0].wrench.is_none());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn presses_on_links(&self, to: &mut Vec<LinkShare>) {
+        to.clear();
+        if let Some(on_skin) = &self.on_skin {
+            on_skin.on_links(to);
+        }
+    }
+
+    /// What has changed since about how percepts are computed, to be said once: a GPU that [`BackendKind::Auto`] had chosen was
+    /// lost, and the CPU goes on.
+    pub fn notice(&mut self) -> Option<String> {
+        self.backend.notice()
+    }
+
+    /// Turns `frames` into percepts, in order. However a recording is cut into calls, its percepts are the same bits.
+    ///
+    /// # Errors
+    /// A frame has another number of values than the engine listens to, or poses a link that the body does not have; or
+    /// the device was lost.
+    pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
+        self.check = None;
+        self.advance(Input::of(frames), None, None)?;
+        Ok(&self.percepts)
+    }
+
+    /// The same for one frame, as on a live robot.
+    ///
+    /// # Errors
+    /// As [`Engine::process`].
+    pub fn process_one(&mut self, frame: &Frame) -> Result<&Percepts> {
+        self.process(std::slice::from_ref(frame))
+    }
+
+    /// What the last call gave.
+    #[must_use]
+    pub fn percepts(&self) -> &Percepts {
+        &self.percepts
+    }
+
+    /// Puts into `to`, in place of what it holds, the taxels of the plan by id and their pressures in `frame`, as far as
+    /// these are known: to look at, in double precision and without what only a run of frames can tell, such as values that
+    /// are held.
+    pub fn pressures(&self, frame: &Frame, to: &mut Vec<(u32, f64)>) {
+        to.clear();
+        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+            let Some(channel) = self.channel_of_taxel[taxel].map(|channel| channel as usize) else { continue };
+            let curve = self.plan.curves.of(self.plan.taxels[channel].response);
+            let value = self.intake.read(taxel, value);
+            let pressure = calibrate::pressure(value, &self.plan.calibrations[channel], curve);
+            to.extend(pressure.map(|pressure| (self.ids[taxel], pressure)));
+        }
+    }
+
+    /// The values that the last frame's percepts were made of, by the plan's channels (ascending taxel id), where they may
+    /// differ from the frame's own: values that were held, or rejected as faulty. `None` where every value passes unchanged.
+    #[must_use]
+    pub fn values_read(&self) -> Option<&[RawValue]> {
+        let channels = self.plan.channels();
+        self.picks.is_none().then(|| &self.raw[self.raw.len().saturating_sub(channels)..])
+    }
+
+    /// Does what [`Engine::process`] does, on the reference too, and compares the two by derived bounds. After frames that
+    /// were not compared, and after [`Engine::restore`], the reference goes on from the backend's state.
+    ///
+    /// # Errors
+    /// As [`Engine::process`].
+    pub fn process_and_compare(&mut self, frames: &[Frame]) -> Result<(&Percepts, Agreement)> {
+        let mut check = match self.check.take() {
+            Some(check) => check,
+            None => Box::new(Check::new(&self.plan, &self.backend.state()?, &self.post)?),
+        };
+        self.advance(Input::of(frames), Some(&mut check), None)?;
+        let names: Vec<String> = (0..self.plan.fields.len()).map(|field| self.plan.label(field)).collect();
+        let mut agreement = compare(&check.right, &check.bounds, &self.percepts, &names);
+        if let Some(touches) = &mut check.touches {
+            agreement.merge(touches.found());
+        }
+        self.check = Some(check);
+        Ok((&self.percepts, agreement))
+    }
+
+    /// The outputs of field `field` in frame `frame` of the last call, beside the reference's; none unless that call was
+    /// [`Engine::process_and_compare`].
+    #[must_use]
+    pub fn compared(&self, frame: usize, field: usize) -> Vec<ComparedColumn> {
+        let Some(check) = &self.check else { return Vec::new() };
+        let bound = &check.bounds[frame * self.plan.fields.len() + field];
+        compare_columns(&check.right.get(frame, field), bound, &self.percepts.get(frame, field))
+    }
+
+    /// Taxels that are not used at present, by id, and why: those that drift compensation has found unfit.
+    pub fn unfit(&self) -> impl Iterator<Item = (u32, Unfit)> + '_ {
+        let judged = self.drift.iter().flat_map(|kept| kept.compensation.taxels());
+        judged.zip(&self.plan.body_taxels).filter_map(|((_, unfit), &taxel)| Some((self.ids[taxel], unfit?)))
+    }
+}

@@ -1,0 +1,78 @@
+//! What backends look up in a plan: by slot, by field, by knob.
+
+use super::super::stages::Stages;
+use super::super::{Arithmetic, Knobs};
+use super::{Plan, PlanField};
+use crate::error::{Error, Result};
+use crate::percept::{Outputs, TouchOutputs};
+use crate::signal::Receptor;
+use crate::stage::calibrate::Table;
+use crate::stage::{Sums, layout};
+
+impl Plan {
+    /// Per slot that is calibrated.
+    #[doc(hidden)]
+    pub fn curve_of(&self, slot: usize) -> Table<'_> {
+        self.curves.of(self.taxels[slot].response)
+    }
+
+    #[doc(hidden)]
+    pub fn members_of(&self, field: &PlanField) -> &[layout::Member] {
+        &self.members[field.first..field.first + field.count]
+    }
+
+    /// The weight of member `member` of `field`, as the layout has it.
+    #[doc(hidden)]
+    pub fn weight(&self, field: &PlanField, member: usize) -> f64 {
+        field.weights.get(member).copied().unwrap_or_else(|| self.members[field.first + member].weight.into())
+    }
+
+    /// How many taxels' pressures percepts keep.
+    pub(crate) fn kept_pressures(&self) -> usize {
+        if self.stages().pressures { self.slots() } else { 0 }
+    }
+
+    /// What is given of touches of the whole body; `None` where none are looked for.
+    #[must_use]
+    pub fn touch_outputs(&self) -> Option<TouchOutputs> {
+        self.touch_outputs
+    }
+
+    /// Keeps the pressures that touches of the whole body are found in: those of the first letter `sustained`.
+    pub(super) fn find_touches(&mut self, first_slots: &[u32]) -> Result<()> {
+        let mut letters = self.letters.iter().zip(first_slots);
+        let Some((_, &first)) = letters.find(|(letter, _)| letter.receptor == Receptor::Sustained) else {
+            return Err(Error::usage(
+                "touches are found in pressures: ask for letter `sustained` too, or for no touches",
+            ));
+        };
+        self.touched_from = Some(first as usize);
+        self.stages.pressures = true;
+        Ok(())
+    }
+
+    /// What a device gives back: the outputs, and what tells the host of which touches one taxel is nearly all.
+    pub(crate) fn read_back(&self) -> Outputs {
+        let of_orientation = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
+        if self.outputs.contains(Outputs::ORIENTATION) { self.outputs | of_orientation } else { self.outputs }
+    }
+
+    /// What is traded for what.
+    #[must_use]
+    pub fn knobs(&self) -> Knobs {
+        self.knobs
+    }
+
+    /// How single precision adds up over a field of `members`, and so how far it may be off.
+    pub(crate) fn sums(&self, members: usize) -> Sums {
+        if self.is_compensated() { Sums::compensated(members) } else { Sums::OnePass }
+    }
+
+    pub(crate) fn is_compensated(&self) -> bool {
+        self.knobs.arithmetic == Some(Arithmetic::Compensated)
+    }
+
+    pub(crate) fn stages(&self) -> Stages {
+        self.stages
+    }
+}
