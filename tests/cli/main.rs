@@ -64,6 +64,7 @@ mod skins;
 mod sources;
 mod tables;
 mod touches;
+mod touches_accuracy;
 mod touches_oracle;
 mod tradeoff;
 #[cfg(unix)]
