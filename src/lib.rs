@@ -63,21 +63,16 @@ pub mod expected;
 pub mod figure;
 #[cfg(feature = "cli")]
 mod ink;
-mod limb;
 #[cfg(feature = "page")]
 pub mod page;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
 #[cfg(feature = "cli")]
 pub mod plot;
-#[cfg(feature = "mcap")]
-pub mod recording;
 pub mod robot;
 pub mod sink;
-pub mod source;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
-pub mod wire;
 
 pub use somatic_skin::{error, limits, plain, renamed};
 // The same paths in this crate as if they were its own.
@@ -153,6 +148,58 @@ pub mod touch {
     };
 }
 
+/// Recordings in MCAP, and bags of ROS 2.
+#[cfg(feature = "mcap")]
+pub mod recording {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_recording::*;
+    #[doc(inline)]
+    pub use somatic_recording::{
+        Attached, BODY, BagSurvey, CALIBRATION, FIELDS, FRAMES, LINKS, PERCEPTS, Reader, Recorder, Rhythm, SCENE,
+        SURFACE, Survey, SurveyedTopic, TAXELS, TOUCHES, Topic,
+    };
+}
+
+/// Where frames come from.
+pub mod source {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_sources::source::*;
+    #[doc(inline)]
+    pub use somatic_sources::source::{
+        BagName, Cell, CsvFile, CsvSource, Cut, JointPosition, JointStates, Layout, NdjsonSource, Panel, Replay,
+        SimulatedSource, Source, SourceSpec, Truth, VendorFormat, VendorOptions, VendorSource, write_recording,
+        write_recording_with_progress,
+    };
+    #[cfg(any(feature = "serial", feature = "zenoh"))]
+    #[doc(inline)]
+    pub use somatic_sources::source::{
+        BoardAccount, BoardState, ChannelWiper, LimbPercepts, Lines, Notice, WiperTrouble,
+    };
+    #[cfg(feature = "zenoh")]
+    #[doc(inline)]
+    pub use somatic_sources::source::{LimbOptions, LimbSource};
+    #[cfg(feature = "serial")]
+    #[doc(inline)]
+    pub use somatic_sources::source::{PortSummary, SerialOptions, SerialSource, serial_ports};
+}
+
+/// The serial protocol between sensor boards and the host.
+pub mod wire {
+    #[doc(inline)]
+    pub use somatic_sources::board;
+    #[doc(inline)]
+    pub use somatic_wire::encode;
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_wire::*;
+    #[doc(inline)]
+    pub use somatic_wire::{
+        ANY_BOARD, Answer, Bits, BoardCounts, CHECKSUM_BYTES, COMMAND_HEAD_BYTES, Command, Corruption, Decoder,
+        DecoderCounts, Dialogue, Ended, Event, FrameCounts, HEAD_BYTES, Head, Identity, MAX_CHANNELS,
+        MAX_ENCODED_BYTES, MAX_FIRMWARE_BYTES, MAX_PACKET_BYTES, NO_LAYOUT, Outcome, PacketOrder, RetryPolicy, Status,
+        VERSION, Values, layout_hash,
+    };
+}
+
 /// Bodies: links, surfaces and taxels, read from glTF and written to it.
 pub mod body {
     #[doc(inline)]
@@ -218,3 +265,5 @@ pub use signal::{Calibration, Frame, FrameTime, Letter, Pose, RawValue, Receptor
 pub use somatic_engine::{Agreement, ComparedColumn, Comparison, Engine, EngineState, Options, Verdict};
 #[allow(unused_imports, reason = "which of them are used hangs on features")]
 use somatic_engine::{engine, stage};
+#[allow(unused_imports, reason = "which of them are used hangs on features")]
+use somatic_sources::limb;

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// Commands that are the project's own builds and tests; CI runs them, or they would run themselves from here.
 const RUN_ELSEWHERE: [&str; 17] = [

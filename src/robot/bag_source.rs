@@ -145,7 +145,7 @@ impl Source for BagSource {
                     return Ok(false);
                 }
             }
-            let Some(message) = self.bag.next()? else {
+            let Some(message) = self.bag.next_message()? else {
                 let Kind::Clouds(merge) = &mut self.kind else { return Ok(false) };
                 merge.end();
                 continue;
@@ -196,12 +196,12 @@ mod tests {
     use std::path::Path;
 
     use super::super::messages::{Header, JointState, PointField, Time};
+    use somatic_testing::{damage, numbers};
+
     use super::*;
     use crate::bundled;
     use crate::output::OutputPaths;
-    use crate::recording::harm::tests::{damage, numbers};
     use crate::recording::{BAG_METADATA, BagType, BagWriter};
-    use crate::source::JointStates;
 
     const FIRST_NS: u64 = 1_700_000_000_000_000_000;
     const NAME: &str = "a.mcap";
@@ -268,7 +268,7 @@ mod tests {
             // In a double alone they are not.
             assert!(times.windows(2).any(|pair| (pair[1].s - pair[0].s - 0.010_000_077).abs() > 1e-7), "{topic}");
         }
-        let states = JointStates::open_bag(&BagName::new(&path)).unwrap();
+        let states = super::super::joint_states_of_bag(&BagName::new(&path)).unwrap();
         let at = FrameTime::from_ns((FIRST_NS + 10_000_077 + 100) as i64);
         let found = states.at(0, at, false).unwrap();
         assert_eq!((found.age_s, found.position), (1e-7, 1.0 + 1e-7 / 0.010_000_077));
@@ -307,7 +307,7 @@ mod tests {
                 }
                 Err(e) => assert_eq!(e.to_string().lines().count(), 1, "{e}"),
             }
-            if let Err(e) = JointStates::open_bag(&BagName::new(&path)) {
+            if let Err(e) = super::super::joint_states_of_bag(&BagName::new(&path)) {
                 assert_eq!(e.to_string().lines().count(), 1, "{e}");
             }
             assert!(began.elapsed().as_secs() < 5, "round {round} of seed {seed} took {:?}", began.elapsed());

@@ -17,50 +17,46 @@ pub(super) fn states_of(bag: &BagName) -> Result<BagReader> {
     BagReader::open(&bag.path, &WantedTopics { topics: &bag.topics, kinds: &[JointState::TYPE], merged: None })
 }
 
-impl JointStates {
-    /// Reads `sensor_msgs/msg/JointState` from a bag in MCAP: from the topic that is named, or the only one of that type.
-    ///
-    /// The time of a state is its stamp; that of one whose stamp is 0 is when it came, by the recorder's clock. Several
-    /// publishers may each tell of some joints. A position that is no finite number tells nothing, and is among
-    /// [`JointStates::losses`], as is what is damaged or cut off.
-    ///
-    /// # Errors
-    /// The bag cannot be read, or has no such topic, or several; no state has positions, or one has not as many as names.
-    pub fn open_bag(bag: &BagName) -> Result<Self> {
-        let mut reader = states_of(bag)?;
-        let name = format!("{}: {}", bag.path.display(), reader.topics().join(", "));
-        let mut states = Self::named(name.clone());
-        let mut odd: Option<(u64, String)> = None;
-        while let Some(message) = reader.next()? {
-            let bytes = message.data.len();
-            let log_ns = message.log_ns;
-            let Some(state) = JointState::from_cdr(message.data) else {
-                reader.damaged(bytes);
-                continue;
-            };
-            let stamp = &state.header.stamp;
-            let time = if stamp.nanoseconds() == 0 { time_of(log_ns) } else { stamp.frame_time() };
-            let t_s = time.s;
-            reader.saw(t_s);
-            for (joint, position) in told_positions(&state).map_err(|e| e.at(format!("{name}: at {t_s} s")))? {
-                if position.is_finite() {
-                    states.add(joint, time, position);
-                } else {
-                    let first = || (0, format!("the first of joint `{joint}` at {t_s} s: {position}"));
-                    odd.get_or_insert_with(first).0 += 1;
-                }
+/// Reads `sensor_msgs/msg/JointState` from a bag in MCAP: from the topic that is named, or the only one of that type.
+///
+/// The time of a state is its stamp; that of one whose stamp is 0 is when it came, by the recorder's clock. Several
+/// publishers may each tell of some joints. A position that is no finite number tells nothing, and is among
+/// [`JointStates::losses`], as is what is damaged or cut off.
+///
+/// # Errors
+/// The bag cannot be read, or has no such topic, or several; no state has positions, or one has not as many as names.
+pub fn joint_states_of_bag(bag: &BagName) -> Result<JointStates> {
+    let mut reader = states_of(bag)?;
+    let name = format!("{}: {}", bag.path.display(), reader.topics().join(", "));
+    let mut states = JointStates::named(name.clone());
+    let mut odd: Option<(u64, String)> = None;
+    while let Some(message) = reader.next_message()? {
+        let bytes = message.data.len();
+        let log_ns = message.log_ns;
+        let Some(state) = JointState::from_cdr(message.data) else {
+            reader.damaged(bytes);
+            continue;
+        };
+        let stamp = &state.header.stamp;
+        let time = if stamp.nanoseconds() == 0 { time_of(log_ns) } else { stamp.frame_time() };
+        let t_s = time.s;
+        reader.saw(t_s);
+        for (joint, position) in told_positions(&state).map_err(|e| e.at(format!("{name}: at {t_s} s")))? {
+            if position.is_finite() {
+                states.add(joint, time, position);
+            } else {
+                let first = || (0, format!("the first of joint `{joint}` at {t_s} s: {position}"));
+                odd.get_or_insert_with(first).0 += 1;
             }
         }
-        let mut losses = reader.losses();
-        losses.extend(
-            odd.map(|(count, first)| format!("{name}: positions that are no finite numbers: {count}, {first}")),
-        );
-        states.sort(losses);
-        if states.joint_names().is_empty() {
-            return Err(
-                Error::failed("no state in it has positions; name the topic that has: ros2-mcap:PATH:/TOPIC").at(name)
-            );
-        }
-        Ok(states)
     }
+    let mut losses = reader.losses();
+    losses.extend(odd.map(|(count, first)| format!("{name}: positions that are no finite numbers: {count}, {first}")));
+    states.sort(losses);
+    if states.joint_names().is_empty() {
+        return Err(
+            Error::failed("no state in it has positions; name the topic that has: ros2-mcap:PATH:/TOPIC").at(name)
+        );
+    }
+    Ok(states)
 }

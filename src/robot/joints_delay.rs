@@ -99,7 +99,7 @@ impl fmt::Display for DelayEstimate {
 /// How long the messages of `reader`, which begin with a header, took.
 fn transport(reader: &mut BagReader, place: &str) -> Result<Transport> {
     let mut took_ns = Vec::new();
-    while let Some(message) = reader.next()? {
+    while let Some(message) = reader.next_message()? {
         let header = CdrReader::new(message.data).and_then(|mut from| Header::read(&mut from));
         let stamp_ns = header.map_or(0, |header| header.stamp.nanoseconds());
         if stamp_ns != 0 {

@@ -47,6 +47,8 @@ mod told_positions;
 
 #[cfg(feature = "mcap")]
 pub use bag_source::BagSource;
+#[cfg(feature = "mcap")]
+pub use bag_states::joint_states_of_bag;
 #[cfg(feature = "meshes")]
 pub use drawn::drawn_poses;
 #[cfg(feature = "meshes")]

@@ -15,7 +15,7 @@ use somatic::robot::messages::{
 use super::python::python_with;
 use super::random::Random;
 use super::{done, fails, file, frames, output, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 pub(super) const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
 const MS: u64 = 1_000_000;

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::python::python_with;
 use crate::stderr;
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// What `tests/hidden/escape.py` finds on `files` with so many `taxels`, `None` without Python, which is said.
 fn checked(taxels: &str, files: &[&str]) -> Option<Value> {

@@ -5,7 +5,7 @@ use super::fails;
 #[cfg(not(feature = "zenoh"))]
 #[test]
 fn a_build_without_it_says_how_to_get_it() {
-    somatic_skips::skip("ZENOH", "built without the feature `zenoh`: cargo test --features zenoh --test cli limbs");
+    somatic_testing::skip("ZENOH", "built without the feature `zenoh`: cargo test --features zenoh --test cli limbs");
     for arguments in [["--sink", "zenoh:robot/arm"], ["--sink", "zenoh-percepts:arm"], ["--source", "zenoh:robot/arm"]]
     {
         assert!(fails(1, &[&["run"], &arguments[..]].concat()).contains("--features zenoh"));

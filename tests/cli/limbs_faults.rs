@@ -12,7 +12,7 @@ use super::limbs_network::{
     Head, LIMBS, Limb, PERIOD, Place, compared, free_port, limbs_are_read, number, play, undistributed, wait_for,
 };
 use super::relay::{Link, Relay};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 const KEYS: [&str; 4] = ["thumb", "index", "middle", "ring"];
 

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::limbs_network::{LIMBS, Limb, Lines, Place, free_port, play, undistributed, wait_for};
 use super::python::python_with;
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// Kills a program that a test does not need any more.
 struct Killed(Child);

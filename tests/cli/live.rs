@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use super::{file, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_somatic");
 

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::python::python_with;
 use super::{done, fails, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 const MODEL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mujoco/skin.xml");
 

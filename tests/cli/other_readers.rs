@@ -9,7 +9,7 @@ use somatic::author::mesh::{MeshOptions, Up, open};
 
 use crate::python::python_with;
 use crate::{stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// The corners of the triangles of the mesh at `path` as doubles, in its own axes, m.
 fn corners(path: &Path) -> Vec<u8> {

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::python::python_with;
 use crate::random::Random;
 use crate::{done, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// Touches per body; `SOMATIC_PRESSES` sets another number, and presses robots too, which takes minutes.
 const PRESSES: usize = 5;

@@ -12,7 +12,7 @@ use somatic::{Frame, OutputPath, RawValue};
 use super::python::python_with;
 use super::random::Random;
 use super::{code_of, done, fails, files_in, frames, output, somatic, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 const TOUCH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
 const CALIBRATION: &str = "[all]\nbaseline = 10.5\ngain = 0.25\ndead_band = 1\n";

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{done, fails, file, files_in, output, somatic, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// Renders with `arguments` into a folder of its own. `None`, and a skip, where no adapter answers.
 fn render(arguments: &[&str]) -> Option<Picture> {

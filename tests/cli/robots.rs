@@ -10,7 +10,7 @@ use somatic::robot::Kinematics;
 use super::python::python_with;
 use super::random::Random;
 use super::{done, fails, file, frames, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 const URDF: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots/arm.urdf");
 const TOUCH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots/arm-touch.csv");

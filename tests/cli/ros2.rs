@@ -13,7 +13,7 @@ use somatic::robot::messages::{
 
 use super::python::python_with;
 use super::{done, fails, file, files_in, frames, output, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 const ROBOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
 

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::python::python_with;
 use super::{somatic, stderr};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 pub const CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::{code_of, done, fails, file, files_in, frames, output, somatic, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// One taxel of the bundled hand's palm, pressed in two of three frames.
 const PRESSED: &str = "t,4\n0,0\n0.1,5\n0.2,7\n";

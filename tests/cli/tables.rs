@@ -235,7 +235,7 @@ mod parquet {
 
     use super::*;
     use crate::python::python_with;
-    use somatic_skips::skip;
+    use somatic_testing::skip;
 
     fn compared(python: &Path, arguments: &[&Path]) -> Result<Value, String> {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/parquet/compare.py");

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 use crate::python::python_with;
 use crate::{stderr, text_of};
@@ -29,7 +29,8 @@ fn printed(script: &str, flags: &[&str]) -> Option<String> {
 
 #[test]
 fn presses_strokes_and_pairs_are_measured_against_the_truth() {
-    let Some(text) = printed("accuracy.py", &["--body", "hand", "--presses", "4", "--strokes", "2", "--pairs", "4"]) else {
+    let Some(text) = printed("accuracy.py", &["--body", "hand", "--presses", "4", "--strokes", "2", "--pairs", "4"])
+    else {
         return;
     };
     let found: Value = serde_json::from_str(&text).unwrap();

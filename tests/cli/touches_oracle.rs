@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::python::python_with;
 use crate::{stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// What `tests/touches/oracle.py` finds on random recordings, `None` without Python, which is said.
 fn random(flags: &[&str]) -> Option<Value> {

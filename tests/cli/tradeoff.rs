@@ -140,7 +140,7 @@ fn contradictions_are_found_where_they_stand() {
 fn a_software_gpu_is_measured_only_if_it_is_asked_for() {
     let adapters = somatic::backend::gpu::adapters();
     if adapters.is_empty() || adapters.iter().any(|adapter| adapter.kind != "software") {
-        return somatic_skips::skip("SOFTWARE_GPU", "there is no software GPU, or a real one beside it");
+        return somatic_testing::skip("SOFTWARE_GPU", "there is no software GPU, or a real one beside it");
     }
     let folder = tempfile::tempdir().unwrap();
     let (text, _) = done(folder.path(), &["tradeoff", "--seconds", "0.05", "--frames", "30", "--json"]);

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::python::python_with;
 use crate::{done, stderr, text_of};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// Taxels per body; `SOMATIC_VORONOI` sets another number.
 const TAXELS: usize = 250;

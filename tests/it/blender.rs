@@ -13,7 +13,7 @@ use somatic::field::{FieldSet, TaxelGraph};
 use tempfile::TempDir;
 
 use crate::lint::{Plate, kinds};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// Positions are current within this, m, and directions within this, rad; `docs/layout.md` has them.
 const NEAR_M: f64 = 1e-6;

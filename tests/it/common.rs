@@ -9,7 +9,7 @@ use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, 
 use somatic::scene::{Arithmetic, Cadence, Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue};
 
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// Every backend that can run here. Without an adapter the GPU is skipped.
 pub fn backends() -> Vec<BackendKind> {

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use somatic::wire::{Answer, Command, Status};
 
 use crate::wire::{Packet, decoded, examples, hex, root, unhex, vectors};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 const FLAGS: [&str; 4] = ["-Wall", "-Wextra", "-Werror", "-std=c99"];
 

@@ -37,7 +37,8 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
             [&below_backend[..], &["backend", "engine", "touch", "source", "author", "parallel", "setters"]].concat(),
         ),
         ("shape", [&below_backend[..], &["backend", "engine"]].concat()),
-        ("wire", vec!["error"]),
+        ("wire", vec![]),
+        ("board", vec!["error", "signal", "wire"]),
         ("limb", vec!["error", "signal", "wire"]),
         ("recording", vec!["error", "output", "signal", "body"]),
         (
@@ -86,11 +87,19 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// The source folders of the crates, and what their paths begin with in the crate that has all of them under its own name.
-const CRATES: [(&str, &str); 4] =
-    [("src", ""), ("crates/skin/src", ""), ("crates/engine/src", ""), ("crates/author/src", "author")];
+const CRATES: [(&str, &str); 7] = [
+    ("src", ""),
+    ("crates/skin/src", ""),
+    ("crates/engine/src", ""),
+    ("crates/author/src", "author"),
+    ("crates/wire/src", "wire"),
+    ("crates/recording/src", "recording"),
+    ("crates/sources/src", ""),
+];
 
 /// The rooms of `somatic-skin` that other crates of the house call as if they were their own.
-const GROUND_FLOOR: [&str; 9] = ["body", "error", "field", "keys", "length", "limits", "parallel", "plain", "random"];
+const GROUND_FLOOR: [&str; 11] =
+    ["body", "error", "field", "keys", "length", "limits", "output", "parallel", "plain", "random", "signal"];
 
 /// Every file of every crate: its path as if all were one crate, and its text, in which the paths are such too.
 fn house() -> Vec<(PathBuf, String)> {

@@ -35,13 +35,13 @@ fn every_skip_goes_through_the_helper() {
     while let Some(folder) = open.pop() {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            let skips = ["tests/skips/lib.rs", "tests/it/skipped.rs"].iter().any(|own| path.ends_with(own));
+            let skips = ["tests/shared/lib.rs", "tests/it/skipped.rs"].iter().any(|own| path.ends_with(own));
             if path.is_dir() {
                 open.push(path);
             } else if path.extension().is_some_and(|e| e == "rs") && !skips {
                 let text = std::fs::read_to_string(&path).unwrap();
                 let by_itself = ["\"SKIPPED", "SOMATIC_REQUIRE_"].iter().find(|word| text.contains(**word));
-                assert_eq!(by_itself, None, "{}: use tests/skips", path.display());
+                assert_eq!(by_itself, None, "{}: use tests/shared", path.display());
                 looked_at += 1;
             }
         }

@@ -10,7 +10,7 @@ use somatic::author::{Recipe, author};
 use somatic::body::Original;
 
 use crate::common::data;
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 /// The folder with the installed validator, or why there is none.
 fn installed() -> Result<PathBuf, String> {

@@ -326,7 +326,7 @@ fn crc(bytes: &[u8]) -> u32 {
 #[test]
 fn the_encoder_needs_neither_std_nor_allocation() {
     let folder = tempfile::tempdir().unwrap();
-    let wire = root().join("src/wire");
+    let wire = root().join("crates/wire/src");
     let lock = std::fs::read_to_string(root().join("Cargo.lock")).unwrap();
     let manifest = "[package]\nname = \"somatic\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[workspace]\n[lib]\npath = \"lib.rs\"\n\
         [dependencies]\ncobs = { version = \"0.5\", default-features = false }\ncrc = \"3.4\"\n";

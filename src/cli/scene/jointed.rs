@@ -128,7 +128,7 @@ impl RunOptions {
                     Some(_) => e,
                     None => Error::failed(format!("{e}; or give joint states of another file: --joint-states FILE")),
                 };
-                options.states = Some(JointStates::open_bag(&bag).map_err(failed)?);
+                options.states = Some(somatic::robot::joint_states_of_bag(&bag).map_err(failed)?);
                 source
             }
             Some(StatesFrom::File(file)) => {

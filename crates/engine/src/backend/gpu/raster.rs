@@ -265,7 +265,7 @@ mod tests {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     use super::*;
-    use somatic_skips::skip;
+    use somatic_testing::skip;
 
     #[test]
     fn the_shader_validates_and_its_pipelines_build_without_any_driver() {

@@ -90,7 +90,7 @@ mod tests {
     use crate::scene::{Arithmetic, Knobs, Scene};
     use crate::shape::Shape;
     use crate::signal::RawValue;
-    use somatic_skips::skip;
+    use somatic_testing::skip;
 
     /// The device; where there is none, that is a skip.
     fn device() -> Option<adapter::Device> {

@@ -9,7 +9,7 @@ use super::columns::NOTHING;
 use super::pack::Form;
 use super::shaders::{Abreast, CALIBRATE, CHANGE, Members, Shader, Values, all, narrow_fields, wide_fields};
 use super::stage::{GROUP, folded, pipeline};
-use somatic_skips::skip;
+use somatic_testing::skip;
 
 use super::{Gpu, adapter};
 use crate::backend::{Backend, BackendState, RawBatch, Rows, Step};

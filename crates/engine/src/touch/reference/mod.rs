@@ -95,7 +95,7 @@ pub(crate) struct Frame {
 }
 
 /// What regions are found with.
-pub(super) struct Scene<'a> {
+pub struct Scene<'a> {
     skin: &'a Skin,
     options: &'a Options,
     frame: &'a Frame,

@@ -1,0 +1,102 @@
+//! Sources: where frames come from.
+//!
+//! A source knows the ids of the taxels it delivers; only the simulated one knows a body.
+
+mod bag_name;
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+mod boards;
+mod column_names;
+mod csv;
+mod csv_cells;
+mod csv_file;
+mod csv_header;
+mod joint_states;
+#[cfg(feature = "zenoh")]
+mod limbs;
+mod ndjson;
+#[cfg(feature = "serial")]
+mod ports;
+#[cfg(feature = "mcap")]
+mod recorded;
+mod replay;
+#[cfg(any(feature = "serial", feature = "zenoh", feature = "mcap"))]
+pub mod send_rate;
+#[cfg(feature = "serial")]
+mod serial;
+mod simulated;
+mod spec;
+mod time_column;
+mod unknown_taxels;
+mod vendor;
+
+pub use self::bag_name::BagName;
+pub use self::csv::CsvSource;
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+pub use boards::{BoardAccount, BoardState, ChannelWiper, LimbPercepts, Lines, Notice, WiperTrouble};
+pub use csv_file::CsvFile;
+pub use joint_states::{JointPosition, JointStates, position_between};
+#[cfg(feature = "zenoh")]
+pub use limbs::{LimbOptions, LimbSource};
+pub use ndjson::NdjsonSource;
+#[cfg(feature = "serial")]
+pub use ports::{PortSummary, serial_ports};
+pub use replay::{Cut, Replay};
+#[cfg(feature = "serial")]
+pub use serial::{SerialOptions, SerialSource};
+pub use simulated::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
+pub use simulated::{SimulatedSource, Truth, write_recording, write_recording_with_progress};
+pub use spec::SourceSpec;
+pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};
+
+use std::time::Instant;
+
+use crate::error::Result;
+use crate::signal::Frame;
+
+/// Something that delivers frames.
+pub trait Source {
+    /// The ids of the frames' taxels, in the order of [`Frame::values`].
+    fn taxels(&self) -> &[u32];
+
+    /// Reads the next frame into `frame`, whose `values` already have the right length. `false` at the end.
+    ///
+    /// # Errors
+    /// The input is invalid; the message names the place.
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool>;
+
+    /// The share of the input that has been read, 0..=1, if known.
+    fn progress(&self) -> Option<f64> {
+        None
+    }
+
+    /// Lets the source skip frames before `t_s`, if it can do so without reading them.
+    fn skip_to(&mut self, _t_s: f64) {}
+
+    /// From now on delivers stale values as [`crate::RawValue::STALE`] instead of as missing, for engines that track them.
+    fn report_stale(&mut self) {}
+
+    /// Whether any value so far was stale.
+    fn has_stale(&self) -> bool {
+        false
+    }
+
+    /// When the last byte of the last frame was read, if known; call it once per frame.
+    fn read_at(&mut self) -> Option<Instant> {
+        None
+    }
+
+    /// Messages about the frames since the last call, a line each.
+    fn notices(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What is to be said if no further frame is read, a line each.
+    fn closing(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Input that was never processed, such as a truncated last row; reported to the user, exit code 3.
+    fn losses(&self) -> Vec<String> {
+        Vec::new()
+    }
+}

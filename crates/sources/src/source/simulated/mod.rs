@@ -1,0 +1,404 @@
+//! Simulated touches: indenters move over a body's surface; the source delivers the sensors' frames and the truth.
+//!
+//! `docs/simulation.md` has the file's keys and the model. The same file gives the same bytes on every machine.
+
+mod calibration;
+mod contact;
+mod file;
+mod layer;
+mod noise;
+mod patch;
+mod path;
+mod profile;
+mod record;
+mod sensor;
+mod sensors;
+mod setup;
+mod truth;
+mod whole;
+mod whole_setup;
+mod whole_truth;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec3;
+
+pub use record::{write_recording, write_recording_with_progress};
+pub use truth::Truth;
+pub use whole::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
+
+use self::contact::{Footprint, Layer};
+use self::file::File;
+use self::sensor::{Reading, Sensor};
+use self::setup::{Setup, Touch};
+use self::truth::line_angle;
+use self::whole::{BodySkin, Covers};
+use self::whole_truth::{Moment, TouchOfBody};
+use super::Source;
+use crate::body::{Body, Modality, Taxel};
+use crate::bundled;
+use crate::error::{Error, Result, failed};
+use crate::field::FieldSet;
+use crate::keys::Text;
+use crate::limits::{self, MAX_TOML_BYTES};
+use crate::signal::{Frame, RawValue, Sensors};
+
+/// A source of frames of simulated touches.
+pub struct SimulatedSource {
+    name: String,
+    body: Body,
+    rate_hz: f64,
+    frames: u64,
+    layer: Layer,
+    sensor: Sensor,
+    /// What the sensors cover.
+    sensors: Sensors,
+    /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
+    ids: Vec<u32>,
+    taxels: Vec<(usize, f64)>,
+    touches: Vec<Pressing>,
+    /// The skin of the whole body, if touches press that.
+    body_skin: Option<Arc<BodySkin>>,
+    next: u64,
+    truth: Vec<Truth>,
+    forces_newton: Vec<f64>,
+}
+
+/// A touch, and the taxels' (position, normal) in its link's frame.
+struct LinkTouch {
+    touch: Touch,
+    link: String,
+    taxels: Arc<[(DVec3, DVec3)]>,
+}
+
+/// A touch of one link, or of the whole body.
+enum Pressing {
+    Link(LinkTouch),
+    Body(TouchOfBody),
+}
+
+/// What becomes of a touch that the body has no place for.
+#[derive(Clone, Copy, PartialEq)]
+enum WrongTouch {
+    Refuse,
+    LeaveOut,
+}
+
+impl SimulatedSource {
+    /// Opens the simulation in the TOML file at `path`.
+    ///
+    /// # Errors
+    /// The file or its body cannot be read, or something in it makes no sense; the message has line and key.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_text(&path.display().to_string(), &text, folder)
+    }
+
+    /// Whether the file at `path` has the keys of a simulation, and so is no scene.
+    #[must_use]
+    pub fn is_named(path: impl AsRef<Path>) -> bool {
+        let keys = limits::read_to_string(path, MAX_TOML_BYTES).ok().and_then(|text| text.parse::<toml::Table>().ok());
+        keys.is_some_and(|keys| keys.contains_key("duration_s") || keys.contains_key("touch"))
+    }
+
+    /// The files that the simulation at `path` reads: itself and its body's files, as far as they can be found.
+    #[must_use]
+    pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
+        let path = path.as_ref();
+        let mut files = vec![path.to_owned()];
+        let text = if path.is_file() {
+            limits::read_to_string(path, MAX_TOML_BYTES).unwrap_or_default()
+        } else {
+            String::new()
+        };
+        if let Ok(File { body: Some(body), .. }) = Text(&text).parse() {
+            files.extend(Body::files(path.parent().unwrap_or(Path::new("")).join(body.get_ref())));
+        }
+        files
+    }
+
+    /// The simulation in `text`, called `name` in messages, whose body is bundled or a file relative to `folder`.
+    ///
+    /// # Errors
+    /// As [`SimulatedSource::open`].
+    pub fn from_text(name: &str, text: &str, folder: &Path) -> Result<Self> {
+        let text = Text(text);
+        let opened = text.parse().and_then(|file| {
+            let body = load_body(text, &file, folder)?;
+            Self::new(name, text, &file, body, WrongTouch::Refuse)
+        });
+        opened.map_err(|e| e.at(name))
+    }
+
+    /// The simulation in `text`, called `name` in messages, on `body` instead of the body that the text names.
+    ///
+    /// # Errors
+    /// As [`SimulatedSource::open`].
+    pub fn on_body(name: &str, text: &str, body: Body) -> Result<Self> {
+        let text = Text(text);
+        text.parse().and_then(|file| Self::new(name, text, &file, body, WrongTouch::Refuse)).map_err(|e| e.at(name))
+    }
+
+    /// As [`SimulatedSource::on_body`], without the touches that the body's surface has no place for.
+    ///
+    /// # Errors
+    /// As [`SimulatedSource::open`], but for those touches.
+    pub fn on_body_where_possible(name: &str, text: &str, body: Body) -> Result<Self> {
+        let text = Text(text);
+        text.parse().and_then(|file| Self::new(name, text, &file, body, WrongTouch::LeaveOut)).map_err(|e| e.at(name))
+    }
+
+    fn new(name: &str, text: Text<'_>, file: &File, body: Body, wrong: WrongTouch) -> Result<Self> {
+        let rate_hz = text.positive("rate_hz", &file.rate_hz)?;
+        let duration_s = text.positive("duration_s", &file.duration_s)?;
+        // 0.3 s at 10 Hz are three frames, although 0.3 · 10 is a little over 3.
+        let frames = (duration_s * rate_hz - 1e-6).ceil().max(1.0);
+        if frames > f64::from(u32::MAX) {
+            let what = format!("`duration_s` and `rate_hz` make {frames:e} frames; that is too many");
+            return Err(text.wrong(file.duration_s.span(), what));
+        }
+        let pressure = || body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality == Modality::Pressure);
+        let ids: Vec<u32> = pressure().map(|(_, taxel)| taxel.id).collect();
+        if ids.is_empty() {
+            return Err(failed!("the body `{}` has no pressure taxels", body.name));
+        }
+        let area = file.sensor.area_m2.as_ref().map(|area| text.positive("area_m2", area)).transpose()?;
+        let side = |taxel: &Taxel| match area.unwrap_or(taxel.area) {
+            area if area > 0.0 => Ok(area.sqrt()),
+            _ => Err(failed!("taxel {} has no area in the layout; give all one as [sensor] `area_m2`", taxel.id)),
+        };
+        let taxels = pressure().map(|(index, taxel)| Ok((index, side(taxel)?))).collect::<Result<Vec<_>>>()?;
+        let fields = FieldSet::new(&body)?;
+        let mut setup = Setup { text, body: &body, fields: &fields, surfaces: BTreeMap::new(), duration_s };
+        let layer = setup.layer(file.layer.as_ref())?;
+        let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
+        let mut touches = Vec::with_capacity(file.touch.len());
+        let mut places = BTreeMap::new();
+        let mut body_skin = None;
+        let covers = whole_setup::covers(text, &file.sensor)?;
+        for (index, keys) in file.touch.iter().enumerate() {
+            if whole_setup::is_of_body(keys.get_ref()) {
+                let make = || BodySkin::new(&body, &layer, &taxels, covers);
+                match (setup.body_touch(index, keys.get_ref(), &layer, &mut body_skin, make), wrong) {
+                    (Err(_), WrongTouch::LeaveOut) => {}
+                    (touch, _) => touches.push(Pressing::Body(TouchOfBody::new(touch?))),
+                }
+                continue;
+            }
+            let touch = match (setup.touch(index, keys.get_ref()), wrong) {
+                (Err(_), WrongTouch::LeaveOut) => continue,
+                (touch, _) => touch?,
+            };
+            let in_link = || -> Arc<[(DVec3, DVec3)]> {
+                let place = |&(taxel, _): &(usize, f64)| {
+                    let taxel: &Taxel = &body.taxels[taxel];
+                    let link_from_taxel = body.rest_transform(touch.link, taxel.link);
+                    let normal = link_from_taxel.transform_vector3(taxel.normal_in_link);
+                    (link_from_taxel.transform_point3(taxel.position_in_link), normal)
+                };
+                taxels.iter().map(place).collect()
+            };
+            let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
+            let link = body.links[touch.link].name.clone();
+            touches.push(Pressing::Link(LinkTouch { link, touch, taxels: places }));
+        }
+        let sensors = match &body_skin {
+            Some(_) if covers == Covers::Cell => Sensors::Cell,
+            _ => size_of(&taxels),
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            rate_hz,
+            frames: frames as u64,
+            layer,
+            sensor,
+            sensors,
+            forces_newton: vec![0.0; ids.len()],
+            ids,
+            taxels,
+            touches,
+            body_skin,
+            next: 0,
+            truth: Vec::new(),
+            body,
+        })
+    }
+
+    /// The body that is touched.
+    #[must_use]
+    pub fn body(&self) -> &Body {
+        &self.body
+    }
+
+    /// Frames a second.
+    #[must_use]
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Number of frames from beginning to end.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// The truth of the last frame: one entry per touch that presses, in the file's order.
+    #[must_use]
+    pub fn truth(&self) -> &[Truth] {
+        &self.truth
+    }
+
+    /// The force on each taxel in the frame read last, N, in the order of [`Source::taxels`], before any sensor.
+    #[must_use]
+    pub fn forces_newton(&self) -> &[f64] {
+        &self.forces_newton
+    }
+
+    /// The calibration of these sensors, as `docs/calibration.md` describes such a file: what they read when untouched
+    /// is 0, `ideal` and `linear` ones give newtons (`unit`), `fsr` ones the linear signal, and broken ones are masked. It knows the
+    /// layer, and what the sensors cover.
+    #[must_use]
+    pub fn calibration(&self) -> String {
+        let body = Path::new(&self.body.name).file_name().unwrap_or_default();
+        let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids, self.sensors);
+        text + &self.layer.calibration()
+    }
+
+    /// By how much the gain of each taxel differs from what the calibration says, in the order of [`Source::taxels`]: the
+    /// factors on their forces.
+    #[must_use]
+    pub fn gains(&self) -> &[f64] {
+        &self.sensor.gains
+    }
+
+    /// Goes back to the first frame, with the noise of another seed.
+    pub fn reseed(&mut self, seed: u64) {
+        self.sensor.seed = seed;
+        self.next = 0;
+    }
+
+    /// Makes `frame` (counted from 0) the one that is read next.
+    pub fn seek(&mut self, frame: u64) {
+        self.next = frame.min(self.frames);
+    }
+
+    fn time(&self, frame: u64) -> f64 {
+        frame as f64 / self.rate_hz
+    }
+
+    /// Adds a touch's forces and its truth.
+    fn press(&mut self, index: usize, frame: u64) -> Result<()> {
+        let t_s = self.time(frame);
+        let before_s = frame.checked_sub(1).map(|frame| self.time(frame));
+        let LinkTouch { touch, link, taxels } = match &mut self.touches[index] {
+            Pressing::Link(touch) => touch,
+            Pressing::Body(touch) => {
+                let Some(skin) = &self.body_skin else { return Ok(()) };
+                let moment = Moment { touch: index, frame, t_s, before_s };
+                self.truth.extend(touch.press(&self.body, skin, &moment, &mut self.forces_newton)?);
+                return Ok(());
+            }
+        };
+        let Some(force_newton) = touch.force(t_s) else { return Ok(()) };
+        let Some(place) = touch.path.place(t_s) else { return Err(Error::failed(touch.leaves_surface(t_s))) };
+        let angle = touch.angle.as_ref().map(|angle| angle.held(t_s));
+        let along = touch.path.direction(&place, angle.unwrap_or(0.0));
+        let across = along.cross(place.normal_in_link);
+        let footprint = Footprint::new(&touch.indenter, &self.layer, force_newton);
+        for ((force, (position, normal)), (_, side_m)) in
+            self.forces_newton.iter_mut().zip(taxels.iter()).zip(&self.taxels)
+        {
+            let offset = *position - place.position_in_link;
+            if normal.dot(place.normal_in_link) > 0.0 && offset.dot(place.normal_in_link).abs() <= footprint.depth_m() {
+                *force += force_newton * footprint.share_on(offset.dot(across), offset.dot(along), *side_m);
+            }
+        }
+        let before = before_s.filter(|&t_s| touch.force(t_s).is_some());
+        let before = before.and_then(|before_s| Some((touch.path.place(before_s)?, t_s - before_s)));
+        let velocity_in_link = before.map(|(before, dt_s)| (place.position_in_link - before.position_in_link) / dt_s);
+        let velocity_uv = before.and_then(|(before, dt_s)| {
+            let (now, before) = (place.uv?, before.uv?);
+            Some([(now[0] - before[0]) / dt_s, (now[1] - before[1]) / dt_s])
+        });
+        self.truth.push(Truth {
+            touch: index,
+            name: touch.name.clone(),
+            link: link.clone(),
+            field: touch.field.clone(),
+            position_in_link: place.position_in_link,
+            normal_in_link: place.normal_in_link,
+            uv: place.uv,
+            angle: angle.map(line_angle),
+            velocity_in_link,
+            velocity_uv,
+            speed: velocity_in_link.map(DVec3::length),
+            force_newton,
+            direction_in_link: angle.map(|_| along),
+            principal_axis_in_link: None,
+            depth_m: None,
+        });
+        Ok(())
+    }
+}
+
+impl Source for SimulatedSource {
+    fn taxels(&self) -> &[u32] {
+        &self.ids
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        if self.next >= self.frames {
+            return Ok(false);
+        }
+        let number = self.next;
+        self.next += 1;
+        self.truth.clear();
+        self.forces_newton.fill(0.0);
+        for touch in 0..self.touches.len() {
+            self.press(touch, number).map_err(|e| e.at(&self.name))?;
+        }
+        frame.clear();
+        frame.t_s = self.time(number);
+        frame.values.clear();
+        let readings = self.ids.iter().zip(&self.forces_newton).enumerate().map(|(index, (&id, &force_newton))| {
+            let reading = Reading { index, id, frame: number, t_s: frame.t_s, force_newton };
+            RawValue::new(self.sensor.read(&reading))
+        });
+        frame.values.extend(readings);
+        Ok(true)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        Some(self.next as f64 / self.frames as f64)
+    }
+}
+
+/// What sensors that feel squares with these sides cover: sides that are all one are of sensors of one size, others are those of cells.
+fn size_of(taxels: &[(usize, f64)]) -> Sensors {
+    /// Sides that differ by less than this share are one.
+    const ALIKE: f64 = 0.01;
+    let range = |(low, high): (f64, f64), &(_, side_m): &(usize, f64)| (low.min(side_m), high.max(side_m));
+    let (low, high) = taxels.iter().fold((f64::INFINITY, 0.0), range);
+    if high <= (1.0 + ALIKE) * low { Sensors::Equal } else { Sensors::Cell }
+}
+
+fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
+    let Some(body) = &file.body else {
+        return Err(text.wrong(0..0, "`body` is missing; give a file, or hand, mat or humanoid"));
+    };
+    let bundled = [("hand", bundled::HAND), ("mat", bundled::MAT), ("humanoid", bundled::HUMANOID)];
+    if let Some((name, bytes)) = bundled.iter().find(|(name, _)| name == body.get_ref()) {
+        return Body::from_bytes(name, bytes);
+    }
+    Body::load(folder.join(body.get_ref())).map_err(|e| {
+        if e.is_not_found() {
+            text.unknown(body, "body", bundled.map(|(name, _)| name))
+        } else {
+            text.wrong(body.span(), e.to_string())
+        }
+    })
+}
