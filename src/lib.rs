@@ -56,21 +56,15 @@ extern crate self as somatic;
 extern crate somatic_skin;
 
 pub mod bundled;
-#[cfg(feature = "ros2")]
-mod dds;
 pub mod expected;
 #[cfg(feature = "cli")]
 pub mod figure;
 #[cfg(feature = "cli")]
 mod ink;
-#[cfg(feature = "page")]
-pub mod page;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
 #[cfg(feature = "cli")]
 pub mod plot;
-pub mod robot;
-pub mod sink;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 
@@ -198,6 +192,67 @@ pub mod wire {
         MAX_ENCODED_BYTES, MAX_FIRMWARE_BYTES, MAX_PACKET_BYTES, NO_LAYOUT, Outcome, PacketOrder, RetryPolicy, Status,
         VERSION, Values, layout_hash,
     };
+}
+
+/// The page that shows a run in a browser, and its server.
+#[cfg(feature = "page")]
+pub mod page {
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_page::*;
+    #[doc(inline)]
+    pub use somatic_page::{
+        EventKind, History, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Replies, Request, Series, Server,
+        ViewerId,
+    };
+}
+
+/// Robots: where their links are, and their topics in ROS 2.
+pub mod robot {
+    #[doc(inline)]
+    pub use somatic_robot::robot::messages;
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_robot::robot::*;
+    #[cfg(feature = "mcap")]
+    #[doc(inline)]
+    pub use somatic_robot::robot::{BagSource, DelayEstimate, Transport, joint_states_of_bag};
+    #[cfg(feature = "meshes")]
+    #[doc(inline)]
+    pub use somatic_robot::robot::{
+        JointOptions, JointedSource, Kinematics, LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M, drawn_poses,
+    };
+    #[cfg(feature = "ros2")]
+    #[doc(inline)]
+    pub use somatic_robot::robot::{LiveJoints, Ros2Source, StatesTime};
+}
+
+/// Where percepts go.
+pub mod sink {
+    #[cfg(feature = "page")]
+    #[doc(inline)]
+    pub use somatic_sinks::sink::PageSink;
+    #[cfg(feature = "parquet")]
+    #[doc(inline)]
+    pub use somatic_sinks::sink::ParquetSink;
+    #[cfg(feature = "ros2")]
+    #[doc(inline)]
+    pub use somatic_sinks::sink::Ros2Sink;
+    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    pub(crate) use somatic_sinks::sink::*;
+    #[cfg(feature = "arrow")]
+    #[doc(inline)]
+    pub use somatic_sinks::sink::{ArrowTable, TableKind};
+    #[doc(inline)]
+    pub use somatic_sinks::sink::{
+        CsvSink, FieldNames, Flow, InputFrames, LimbSends, NdjsonSink, News, Pressures, Question, RecordPart, Session,
+        Sink, SinkSpec, SinkTarget, SkinNames, TableColumn, TableName, TableType, TableWish, percept_columns,
+        self_contact_columns, touch_columns,
+    };
+    #[cfg(feature = "mcap")]
+    #[doc(inline)]
+    pub use somatic_sinks::sink::{RecordingSink, Ros2BagSink, RosTime};
+    #[cfg(feature = "zenoh")]
+    #[doc(inline)]
+    pub use somatic_sinks::sink::{ZenohSink, limb_frame_bytes, limb_percept_bytes};
 }
 
 /// Bodies: links, surfaces and taxels, read from glTF and written to it.

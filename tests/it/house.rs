@@ -87,7 +87,7 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// The source folders of the crates, and what their paths begin with in the crate that has all of them under its own name.
-const CRATES: [(&str, &str); 7] = [
+const CRATES: [(&str, &str); 10] = [
     ("src", ""),
     ("crates/skin/src", ""),
     ("crates/engine/src", ""),
@@ -95,11 +95,15 @@ const CRATES: [(&str, &str); 7] = [
     ("crates/wire/src", "wire"),
     ("crates/recording/src", "recording"),
     ("crates/sources/src", ""),
+    ("crates/robot/src", ""),
+    ("crates/page/src", "page"),
+    ("crates/sinks/src", ""),
 ];
 
 /// The rooms of `somatic-skin` that other crates of the house call as if they were their own.
-const GROUND_FLOOR: [&str; 11] =
-    ["body", "error", "field", "keys", "length", "limits", "output", "parallel", "plain", "random", "signal"];
+const GROUND_FLOOR: [&str; 12] = [
+    "body", "colours", "error", "field", "keys", "length", "limits", "output", "parallel", "plain", "random", "signal",
+];
 
 /// Every file of every crate: its path as if all were one crate, and its text, in which the paths are such too.
 fn house() -> Vec<(PathBuf, String)> {
@@ -123,6 +127,10 @@ fn house() -> Vec<(PathBuf, String)> {
                 for ground in GROUND_FLOOR {
                     text = text.replace(&format!("{own}{ground}"), &format!("crate::{ground}"));
                 }
+            }
+            // What a crate names of another is what the house has of it.
+            for room in ["backend", "percept", "scene", "stage", "touch"] {
+                text = text.replace(&format!("somatic_engine::{room}::"), &format!("crate::{room}::"));
             }
             all.push((within, text));
         }

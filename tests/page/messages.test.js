@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { decodeFrame, decodeHistory, decodeMesh, kindOf } from "../../src/page/web/wire.js";
+import { decodeFrame, decodeHistory, decodeMesh, kindOf } from "../../crates/page/src/web/wire.js";
 
 const here = (name) => new URL(name, import.meta.url);
 const bytes = readFileSync(here("messages.bin"));

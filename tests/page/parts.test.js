@@ -1,10 +1,10 @@
 // Parts of the page that need no browser.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Choices, MARKS } from "../../src/page/web/choices.js";
-import { Camera, PRESETS } from "../../src/page/web/camera.js";
-import { addRect, changedRects } from "../../src/page/web/dirty.js";
-import { PALETTE } from "../../src/page/web/dom.js";
+import { Choices, MARKS } from "../../crates/page/src/web/choices.js";
+import { Camera, PRESETS } from "../../crates/page/src/web/camera.js";
+import { addRect, changedRects } from "../../crates/page/src/web/dirty.js";
+import { PALETTE } from "../../crates/page/src/web/dom.js";
 import {
   scaleFor,
   seconds,
@@ -13,12 +13,12 @@ import {
   ticks,
   vectorWithUnit,
   withUnit,
-} from "../../src/page/web/format.js";
-import { poseToRows, toWorld } from "../../src/page/web/math.js";
-import { Model } from "../../src/page/web/model.js";
-import { touchInWorld } from "../../src/page/web/places.js";
-import { byPixel } from "../../src/page/web/plot.js";
-import { colourIndex, fillColours } from "../../src/page/web/taxels.js";
+} from "../../crates/page/src/web/format.js";
+import { poseToRows, toWorld } from "../../crates/page/src/web/math.js";
+import { Model } from "../../crates/page/src/web/model.js";
+import { touchInWorld } from "../../crates/page/src/web/places.js";
+import { byPixel } from "../../crates/page/src/web/plot.js";
+import { colourIndex, fillColours } from "../../crates/page/src/web/taxels.js";
 
 const near = (a, b, bound = 1e-6) => assert.ok(Math.abs(a - b) <= bound, `${a} is not near ${b}`);
 
@@ -102,7 +102,7 @@ test("the camera frames all points and projects them inside", () => {
 test("what is up, forward and left in the world is so in the picture", () => {
   const camera = new Camera();
   camera.resize(900, 600);
-  const from = (/** @type {import("../../src/page/web/camera.js").Preset} */ side) => {
+  const from = (/** @type {import("../../crates/page/src/web/camera.js").Preset} */ side) => {
     [camera.yaw, camera.pitch] = PRESETS[side];
     camera.update();
     const [forward, left, up] = [

@@ -1,7 +1,7 @@
 // The decoders of binary messages, against messages made by hand after the protocol.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "../../src/page/web/wire.js";
+import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "../../crates/page/src/web/wire.js";
 
 /** Writes values one after the other, little-endian. */
 function writer(bytes) {

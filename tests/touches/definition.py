@@ -71,7 +71,7 @@ def dip(skin, frame, a, b):
         way = (end - start) / length
         along = (places - start) @ way
         across = np.linalg.norm(places - start - np.outer(along, way), axis=1)
-        beside = across <= d
+        beside = across <= 1.2 * d
         quarters = length / (0.25 * d)
         for count in {max(5, int(quarters * share) + 1) for share in (1 - CLOSE, 1 + CLOSE)}:
             steps = np.linspace(0, length, count)

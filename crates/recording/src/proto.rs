@@ -1,7 +1,7 @@
 //! Writes Protocol Buffers' wire format field by field, for messages that are only written.
 
 /// Adds fields to a message.
-pub(super) struct Writer<'a>(pub(super) &'a mut Vec<u8>);
+pub(crate) struct Writer<'a>(pub(super) &'a mut Vec<u8>);
 
 const VARINT: u32 = 0;
 const FIXED64: u32 = 1;

@@ -2,7 +2,7 @@
 //!
 //! The line runs in the chart based at the taxel nearest to the middle of the two peaks. The mean at a place of it is over the
 //! taxels of both regions and their neighbours, those without pressure too, with the weights exp(−½(along / 0.35 d)²), of those at
-//! most d across and 3 d along from the place; d is the root of their median cell (of an even number
+//! most 1.2 d across and 3 d along from the place; d is the root of their median cell (of an even number
 //! the larger of the middle two). It is taken at max(5, ⌊L / 0.25 d⌋ + 1)
 //! places from peak to peak, L apart, up to 257; a place without a taxel does not count.
 //!
@@ -15,7 +15,7 @@ use super::skin::Skin;
 /// Spread of the weights along the line, in d.
 const SPREAD: f64 = 0.35;
 /// How far across the line a taxel may be, in d.
-const ACROSS: f64 = 1.0;
+const ACROSS: f64 = 1.2;
 /// How far along the line a taxel may be from a place, in d: there it has e⁻¹⁸ of the weight.
 const ALONG: f64 = 3.0;
 /// Distance of places, in d.

@@ -85,7 +85,7 @@ pub(super) struct Region {
 
 /// A frame for the reference.
 #[derive(Clone, Debug)]
-pub(crate) struct Frame {
+pub struct Frame {
     pub(crate) t_s: f64,
     pub(crate) restarts: bool,
     pub(crate) pressures: Vec<f64>,

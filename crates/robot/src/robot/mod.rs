@@ -3,7 +3,7 @@
 //! [`Kinematics`] turns joint positions into poses of links, [`JointedSource`] does so for every frame of a source:
 //!
 //! ```
-//! use somatic::robot::Kinematics;
+//! use somatic_robot::robot::Kinematics;
 //!
 //! let urdf = r#"<robot name="r"><link name="arm"/><link name="hand"/>
 //!   <joint name="wrist" type="revolute"><parent link="arm"/><child link="hand"/>
@@ -12,7 +12,7 @@
 //! let poses = robot.link_poses(&[std::f64::consts::FRAC_PI_2]);
 //! let (hand, arm_from_hand) = poses.iter().find(|(link, _)| *link == "hand").unwrap();
 //! assert_eq!((*hand, arm_from_hand.translation.x), ("hand", 0.3));
-//! # Ok::<(), somatic::Error>(())
+//! # Ok::<(), somatic_skin::error::Error>(())
 //! ```
 
 #[cfg(feature = "mcap")]

@@ -26,7 +26,10 @@ use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Home, Link, MemberSpec,
 use crate::signal::{BoardHealth, Calibration, Frame, Pose, RawValue, Receptor, Wiring};
 // Before it an engine, as in a run.
 #[cfg(test)]
-use somatic::{BackendKind, Engine, Letter, Options, Outputs, Scene, touch};
+use somatic_engine::percept::Outputs;
+use somatic_engine::scene::Scene;
+use somatic_engine::{BackendKind, Engine, Options, touch};
+use somatic_skin::signal::Letter;
 
 /// Three links, two of them with a triangle and taxels and no common ancestor, and three fields, one of them on both.
 fn body() -> Body {
@@ -284,7 +287,7 @@ fn book() -> Book {
 #[test]
 fn messages_are_those_that_the_page_decodes() {
     let book = book();
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/page");
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/page");
     let entries = Value::from(book.entries);
     if std::env::var("SOMATIC_WRITE_MESSAGES").is_ok_and(|wanted| wanted == "1") {
         std::fs::write(folder.join("messages.bin"), &book.bytes).unwrap();

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use crate::percept::{Percept, SelfContact, TouchFrame, TouchTrails};
-use crate::scene::Plan;
 use crate::signal::{Pose, RawValue};
+use somatic_engine::percept::{Percept, SelfContact, TouchFrame, TouchTrails};
+use somatic_engine::scene::Plan;
 
 /// The newest frame of a call, and the percepts made of it.
 #[derive(Debug)]

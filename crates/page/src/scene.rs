@@ -14,9 +14,9 @@ use super::text::Names;
 use super::touches::TouchPlaces;
 use crate::body::{Body, ChartKind};
 use crate::colours::pressure_colours;
-use crate::percept::{Column, Flags, Outputs, TouchFlags, Unit};
-use crate::scene::{Plan, PlanField};
 use crate::signal::{Quantity, Wiring};
+use somatic_engine::percept::{Column, Flags, Outputs, TouchFlags, Unit};
+use somatic_engine::scene::{Plan, PlanField};
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use super::scale::Scale;
 use super::scene::PageScene;
 use super::snapshot::Snapshot;
 use super::touches::TouchPlaces;
-use crate::percept::{Column, Percept, SelfContact, TouchFrame};
+use somatic_engine::percept::{Column, Percept, SelfContact, TouchFrame};
 
 /// The newest frame, read when the first viewer wants it.
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use super::encode::{FrameHead, IN_WORLD, UNKNOWN, Writer, section, write_series}
 use super::latency::Latencies;
 use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
-use crate::percept::{Column, Outputs, Percept};
+use somatic_engine::percept::{Column, Outputs, Percept};
 
 /// Frames that may be under way.
 const CREDIT: usize = 2;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::clock::RosClock;
 use super::messages::{BOARDS, Messages, Topic, TopicKind, of_boards};
 use super::moment::{Moment, without_frames};
-use crate::dds::{Delivery, Node, Writer};
+pub(super) use crate::dds::{Delivery, Node, Writer};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::robot::messages::{Message as _, PointCloud2};

@@ -4,6 +4,9 @@
 //! [`Listen`] says otherwise; a [`Publisher`] hands it what an engine computes, without ever waiting for a viewer. For a
 //! recording a player reads [`Server::requests`] and answers through [`Replies`].
 
+#![deny(missing_docs)]
+#![warn(unreachable_pub)]
+
 mod answers;
 mod connection;
 mod current;
@@ -44,3 +47,8 @@ pub use publish::{PageInput, Publisher};
 pub use scene::{Mode, PageInfo, PageScene};
 pub use series::Series;
 pub use server::Server;
+#[cfg(test)]
+use somatic_bodies as bundled;
+#[cfg(test)]
+use somatic_skin::field;
+use somatic_skin::{body, colours, error, signal};

@@ -2,10 +2,10 @@
 //! viewer gets.
 
 use super::snapshot::Snapshot;
-use crate::percept::Flags;
-use crate::scene::Plan;
 use crate::signal::RawValue;
-use crate::stage::calibrate::{UNUSABLE, reference};
+use somatic_engine::percept::Flags;
+use somatic_engine::scene::Plan;
+use somatic_engine::stage::calibrate::{UNUSABLE, reference};
 
 /// How a taxel is doing, as frames number it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,9 +142,11 @@ impl Readings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::Body;
+    use crate::bundled;
     use crate::field::FieldSet;
-    use crate::scene::Scene;
-    use crate::{Body, Calibration, bundled};
+    use crate::signal::Calibration;
+    use somatic_engine::scene::Scene;
 
     #[test]
     fn what_is_wrong_with_a_taxel_is_told_from_zero() {

@@ -32,7 +32,7 @@ impl no_key::SerializerAdapter<Message> for AsTheyAre {
 }
 
 /// Writes messages to a topic.
-pub(crate) struct Writer {
+pub struct Writer {
     writer: no_key::DataWriter<Message, AsTheyAre>,
     topic: String,
     /// Messages that were written, and how many of them were written when last all had receipts.
@@ -49,7 +49,7 @@ impl Writer {
     ///
     /// # Errors
     /// It cannot be sent, nor can others.
-    pub(crate) fn write(&self, message: Vec<u8>) -> Result<bool> {
+    pub fn write(&self, message: Vec<u8>) -> Result<bool> {
         self.without_receipt(Duration::ZERO);
         let message = Message(Bytes::from(message).slice(CDR_HEADER_BYTES..));
         match self.writer.write(message, Some(Timestamp::now())) {
@@ -64,7 +64,7 @@ impl Writer {
 
     /// How many messages may still lack the receipt of a reliable reader, after waiting for at most `wait`. It is 0 as soon as
     /// all have theirs, and where nobody gives any; else it counts from the last message before which all had theirs.
-    pub(crate) fn without_receipt(&self, wait: Duration) -> u64 {
+    pub fn without_receipt(&self, wait: Duration) -> u64 {
         if self.writer.wait_for_acknowledgments(wait).unwrap_or(false) {
             self.received.set(self.written.get());
         }

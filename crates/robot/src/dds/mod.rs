@@ -23,7 +23,7 @@ use ros2_client::{MessageTypeName, Name, NodeName, QosProfile};
 use serde::de::DeserializeOwned;
 
 pub(crate) use self::reader::Reader;
-pub(crate) use self::writer::Writer;
+pub use self::writer::Writer;
 use crate::error::{Error, Result, failed};
 
 /// Topics that every node has.
@@ -33,7 +33,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// What is promised about delivery, and how many messages are kept for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Delivery {
+pub enum Delivery {
     /// A message may be lost; the newest `depth` are kept.
     BestEffort {
         /// Messages that are kept.
@@ -58,7 +58,7 @@ impl Delivery {
 }
 
 /// A node, and what it writes and reads.
-pub(crate) struct Node {
+pub struct Node {
     name: NodeName,
     domain: u16,
     /// What the node has, and where it tells of that.
@@ -74,7 +74,7 @@ impl Node {
     ///
     /// # Errors
     /// A variable or a name cannot be used; the network cannot.
-    pub(crate) fn new(namespace: &str, name: &str) -> Result<Self> {
+    pub fn new(namespace: &str, name: &str) -> Result<Self> {
         let namespace = if namespace.is_empty() { "/" } else { namespace };
         let name = NodeName::new(namespace, name).map_err(|e| Error::usage(e.to_string()))?;
         let domain = names::domain()?;
@@ -121,7 +121,7 @@ impl Node {
     ///
     /// # Errors
     /// It cannot be made.
-    pub(crate) fn writer(&mut self, topic: &str, kind: &str, delivery: Delivery) -> Result<Writer> {
+    pub fn writer(&mut self, topic: &str, kind: &str, delivery: Delivery) -> Result<Writer> {
         let qos = delivery.qos();
         let made = self.topic(topic, kind, &qos)?;
         let writer =

@@ -9,9 +9,9 @@ use super::log::{About, Event, EventKind};
 use super::scene::PageScene;
 use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
-use crate::percept::{Flags, Percepts, TouchTrails};
-use crate::scene::Plan;
 use crate::signal::{BoardHealth, Frame, Pose, RawValue};
+use somatic_engine::percept::{Flags, Percepts, TouchTrails};
+use somatic_engine::scene::Plan;
 
 /// Events that wait for their log at most.
 const MAX_WAITING_EVENTS: usize = 4096;

@@ -8,8 +8,8 @@ use super::log::EventLog;
 use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
 use super::wake::Waker;
-use crate::scene::Plan;
 use crate::signal::BoardHealth;
+use somatic_engine::scene::Plan;
 
 /// Replies that wait for the server's thread at most.
 const MAX_REPLIES: usize = 1024;

@@ -10,7 +10,7 @@ pub(super) struct PageFile {
     pub(super) bytes: &'static [u8],
 }
 
-/// Files of `src/page/web`, each at `/` and its name.
+/// Files of `crates/page/src/web`, each at `/` and its name.
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
         &[$(PageFile {
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn every_file_of_the_page_is_served() {
         let mut found = Vec::new();
-        names(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/page/web"), "", &mut found);
+        names(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/web"), "", &mut found);
         for name in &found {
             assert!(file(&format!("/{name}")).is_some(), "add \"{name}\" to FILES");
         }

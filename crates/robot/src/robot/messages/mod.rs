@@ -4,7 +4,7 @@
 //! [`Message`] can be a topic's; it has the hash of its type (RIHS01) as a constant.
 //!
 //! ```
-//! use somatic::robot::messages::{Header, JointState, Message};
+//! use somatic_robot::robot::messages::{Header, JointState, Message};
 //!
 //! let state = JointState { name: vec!["wrist".to_owned()], position: vec![0.5], ..JointState::default() };
 //! assert_eq!(JointState::from_cdr(&state.to_cdr()), Some(state));

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::series::Series;
-use crate::percept::Column;
+use somatic_engine::percept::Column;
 
 /// The version of the protocol.
 pub(super) const VERSION: u32 = 3;
@@ -185,7 +185,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::percept::COLUMNS;
+    use somatic_engine::percept::COLUMNS;
 
     fn counts() -> Counts {
         Counts { taxels: 4, fields: 3, columns: COLUMNS.iter().take(8).collect() }

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::encode::{Writer, no_link};
 use crate::body::{Body, Modality};
-use crate::percept::{Touch, TouchFrame, TouchTrails};
-use crate::scene::Plan;
+use somatic_engine::percept::{Touch, TouchFrame, TouchTrails};
+use somatic_engine::scene::Plan;
 
 /// How a page counts and places what touches name.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 //! The scale of pressures: what the brightest colour stands for, and how that is known.
 
-use crate::scene::Plan;
 use crate::signal::RawValue;
-use crate::stage::calibrate::{UNUSABLE, reference};
+use somatic_engine::scene::Plan;
+use somatic_engine::stage::calibrate::{UNUSABLE, reference};
 
 /// How the end of a scale is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,9 +81,11 @@ fn step_up(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::Body;
+    use crate::bundled;
     use crate::field::FieldSet;
-    use crate::scene::Scene;
-    use crate::{Body, Calibration, bundled};
+    use crate::signal::Calibration;
+    use somatic_engine::scene::Scene;
 
     #[test]
     fn steps_are_one_two_and_five() {

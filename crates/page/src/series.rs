@@ -1,6 +1,6 @@
 //! Values over time that viewers plot: every frame's, or the least and the most of neighbouring frames where many are due.
 
-use crate::percept::{Column, Percepts};
+use somatic_engine::percept::{Column, Percepts};
 
 /// What is plotted: one component of an output of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
