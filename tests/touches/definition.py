@@ -76,7 +76,7 @@ def dip(skin, frame, a, b):
         for count in {max(5, int(quarters * share) + 1) for share in (1 - CLOSE, 1 + CLOSE)}:
             steps = np.linspace(0, length, count)
             away = np.abs(along[beside][None] - steps[:, None])
-            weights = np.where(away <= 3 * d, np.exp(-0.5 * (away / (0.35 * d)) ** 2), 0)
+            weights = np.where(away <= 3 * d, np.exp(-0.5 * (away / (0.4 * d)) ** 2), 0)
             # Places without a taxel as near as that say nothing.
             known = weights.sum(axis=1) > 0
             means = weights[known] @ frame.pressures[nodes[beside]] / weights[known].sum(axis=1)

@@ -13,6 +13,7 @@ pub mod robot;
 #[allow(unused_imports, reason = "which of them are used hangs on features")]
 use somatic_author as author;
 #[cfg(test)]
+#[allow(unused_imports, reason = "which of them are used hangs on features")]
 use somatic_bodies as bundled;
 #[cfg(feature = "mcap")]
 use somatic_recording as recording;

@@ -20,6 +20,7 @@ use self::{
     signal::{Calibration, Frame, RawValue},
 };
 #[cfg(test)]
+#[allow(unused_imports, reason = "which of them are used hangs on features")]
 use somatic_bodies as bundled;
 #[allow(unused_imports, reason = "which of them are used hangs on features")]
 use somatic_engine::{BackendKind, Engine, Options, backend, percept, scene, touch};

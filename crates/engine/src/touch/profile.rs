@@ -1,7 +1,7 @@
 //! Whether there is a dip between two peaks: the mean pressure along the line between them.
 //!
 //! The line runs in the chart based at the taxel nearest to the middle of the two peaks. The mean at a place of it is over the
-//! taxels of both regions and their neighbours, those without pressure too, with the weights exp(−½(along / 0.35 d)²), of those at
+//! taxels of both regions and their neighbours, those without pressure too, with the weights exp(−½(along / 0.4 d)²), of those at
 //! most 1.2 d across and 3 d along from the place; d is the root of their median cell (of an even number
 //! the larger of the middle two). It is taken at max(5, ⌊L / 0.25 d⌋ + 1)
 //! places from peak to peak, L apart, up to 257; a place without a taxel does not count.
@@ -13,7 +13,7 @@ use super::chart;
 use super::skin::Skin;
 
 /// Spread of the weights along the line, in d.
-const SPREAD: f64 = 0.35;
+const SPREAD: f64 = 0.4;
 /// How far across the line a taxel may be, in d.
 const ACROSS: f64 = 1.2;
 /// How far along the line a taxel may be from a place, in d: there it has e⁻¹⁸ of the weight.

@@ -417,6 +417,7 @@ mod tests {
         assert_eq!(parsed("a.ndjson"), SinkSpec::Ndjson("a.ndjson".into()));
         assert_eq!(parsed("mcap:a.mcap"), SinkSpec::Mcap("a.mcap".into()));
         assert_eq!(parsed("ros2-mcap:bag"), SinkSpec::Ros2Mcap("bag".into()));
+        #[cfg(feature = "mcap")]
         assert_eq!(bag_file_name(Path::new("some/bag")), "bag_0.mcap");
         assert_eq!(parsed("ros2"), SinkSpec::Ros2(String::new()));
         assert_eq!(parsed("ros2:/left/arm_2"), SinkSpec::Ros2("/left/arm_2".into()));

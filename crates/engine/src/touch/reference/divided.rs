@@ -161,7 +161,7 @@ impl Scene<'_> {
                 let offset = self.place(base, node) - from;
                 let away = offset.dot(along) - at;
                 if offset.dot(across).abs() <= 1.2 * d && away.abs() <= 3.0 * d {
-                    let weight = (-0.5 * (away / (0.35 * d)).powi(2)).exp();
+                    let weight = (-0.5 * (away / (0.4 * d)).powi(2)).exp();
                     weights += weight;
                     pulls += weight * self.pressure(node);
                 }
