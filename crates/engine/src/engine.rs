@@ -238,14 +238,14 @@ impl Engine {
         Ok(())
     }
 
-    /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`crate::Flags::STALE`] beside
-    /// [`crate::Flags::INCOMPLETE`]. For sources that say so; it costs a look at every value.
+    /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`Flags::STALE`](crate::percept::Flags::STALE) beside
+    /// [`Flags::INCOMPLETE`](crate::percept::Flags::INCOMPLETE). For sources that say so; it costs a look at every value.
     pub fn track_stale(&mut self) {
         self.intake.track_stale();
         self.pick();
     }
 
-    /// From now on [`crate::TouchFrame::taxels`] has the taxels of touches, whatever [`Scene::touches`] asks for, if `are_kept`. For
+    /// From now on [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) has the taxels of touches, whatever [`Scene::touches`] asks for, if `are_kept`. For
     /// pages, which show them.
     pub fn keep_touch_taxels(&mut self, are_kept: bool) {
         self.on_skin.iter_mut().filter(|_| are_kept).for_each(OnSkin::keep_taxels);
@@ -293,7 +293,7 @@ impl Engine {
     }
 
     /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`] asks for them. Its nodes are what
-    /// [`crate::TouchFrame::taxels`] counts.
+    /// [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) counts.
     #[must_use]
     pub fn skin(&self) -> Option<&Skin> {
         self.on_skin.as_ref().map(OnSkin::skin)

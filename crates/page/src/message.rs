@@ -65,7 +65,7 @@ pub enum Request {
     },
     /// Explain the percept of a field.
     Explain {
-        /// The field, as [`crate::Percept::field`] counts.
+        /// The field, as [`Percept::field`](somatic_engine::percept::Percept::field) counts.
         field: usize,
     },
     /// Send the least and most of each series in each of some bins.

@@ -21,7 +21,7 @@ const MAX_WAITING_EVENTS: usize = 4096;
 pub struct PageInput<'a> {
     /// The frame.
     pub frame: &'a Frame,
-    /// The values that its percepts are made of ([`crate::Engine::values_read`]).
+    /// The values that its percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
     pub values_read: Option<&'a [RawValue]>,
     /// The engine's plan as it is after the call.
     pub plan: &'a Plan,

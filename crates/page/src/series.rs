@@ -5,7 +5,7 @@ use somatic_engine::percept::{Column, Percepts};
 /// What is plotted: one component of an output of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Series {
-    /// The field, as [`crate::Percept::field`] counts.
+    /// The field, as [`Percept::field`](somatic_engine::percept::Percept::field) counts.
     pub field: usize,
     /// The output.
     pub column: &'static Column,

@@ -35,7 +35,7 @@ impl Server {
     ///
     /// # Errors
     /// The address is taken, or the system has no random numbers for a token; or places are not in the world
-    /// ([`crate::Scene::relative_to`]).
+    /// ([`Scene::relative_to`](somatic_engine::scene::Scene::relative_to)).
     pub fn start(listen: &Listen, scene: PageScene) -> Result<(Self, Publisher)> {
         if let Some(link) = scene.plan.relative_to() {
             return Err(Error::usage(format!(

@@ -213,7 +213,7 @@ impl Reader {
     }
 
     /// From now on gives what is stale as [`RawValue::STALE`], for engines that track it
-    /// ([`crate::Engine::track_stale`]); else it is missing.
+    /// (`Engine::track_stale`); else it is missing.
     pub fn report_stale(&mut self) {
         self.stale = RawValue::STALE;
     }

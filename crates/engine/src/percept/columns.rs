@@ -127,9 +127,9 @@ macro_rules! columns {
         #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
         #[non_exhaustive]
         pub struct Percept {
-            /// Index of the field, as [`crate::Plan::fields`] counts: once for each letter.
+            /// Index of the field, as [`Plan::fields`](crate::scene::Plan::fields) counts: once for each letter.
             pub field: usize,
-            /// Which of the run's letters it is of, as [`crate::Plan::letters`] counts.
+            /// Which of the run's letters it is of, as [`Plan::letters`](crate::scene::Plan::letters) counts.
             pub letter: usize,
             /// Whether the field is touched.
             pub contact: bool,
@@ -140,7 +140,7 @@ macro_rules! columns {
             )*
             /// Why quantities are absent, or in doubt.
             pub flags: Flags,
-            /// Whether position and normal are in the world (or in [`crate::Scene::relative_to`]), because the frame carried a pose, or
+            /// Whether position and normal are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the frame carried a pose, or
             /// in the field's anchor.
             pub in_world: bool,
         }

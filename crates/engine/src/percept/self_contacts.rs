@@ -34,7 +34,7 @@ impl SelfContact {
 pub struct SelfContactSide {
     /// Index of the link with most of the touch.
     pub link: u32,
-    /// The touch, as [`crate::Touch::id`] has it.
+    /// The touch, as [`Touch::id`](crate::percept::Touch::id) has it.
     pub touch: u64,
     /// ΣP of the touch, in the unit of P.
     pub total: f64,

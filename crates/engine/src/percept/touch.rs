@@ -7,7 +7,7 @@ use super::ContactKind;
 
 bitflags! {
     /// Why a quantity of a touch is absent or in doubt, and what was wrong with the input. Names are those of
-    /// [`crate::Flags`] where both have one.
+    /// [`Flags`](crate::percept::Flags) where both have one.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     pub struct TouchFlags: u32 {
         /// Only one taxel is pressed: no axis, no orientation, no spread.
@@ -113,7 +113,7 @@ pub struct Touch {
     pub position_sigma_m: Option<[f64; 2]>,
     /// Standard deviation of the principal axis, rad.
     pub principal_axis_sigma_rad: Option<f64>,
-    /// Whether its place and directions are in the world (or in [`crate::Scene::relative_to`]), because the frame carried a pose of its
+    /// Whether its place and directions are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the frame carried a pose of its
     /// link.
     pub in_world: bool,
     /// Why quantities are absent or in doubt.

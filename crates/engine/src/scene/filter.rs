@@ -7,7 +7,7 @@ use crate::length::Length;
 use crate::stage::filter::{FilterBy, Settings};
 use crate::stage::layout::Still;
 
-/// Which motion counts, for [`crate::Outputs::FILTERED`].
+/// Which motion counts, for [`Outputs::FILTERED`](crate::percept::Outputs::FILTERED).
 ///
 /// A centroid counts when it has come from the last one that counted as far as a window says: nearer it is held back
 /// until motion has added up, farther it is taken for another touch. The direction of the steps that count is averaged

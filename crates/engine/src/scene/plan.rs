@@ -388,7 +388,7 @@ impl Plan {
         slot % self.channels()
     }
 
-    /// The letters that every field is read in; what [`crate::Percept::letter`] counts.
+    /// The letters that every field is read in; what [`Percept::letter`](crate::percept::Percept::letter) counts.
     #[must_use]
     pub fn letters(&self) -> &[Letter] {
         &self.letters

@@ -6,7 +6,7 @@
 //!
 //! **Bounds.** u = 2⁻²⁴ is the unit roundoff of single precision. WebGPU promises correctly rounded +, −, ×, and ÷ to
 //! 2.5 ulp (5u); a product may be fused into a sum, which only takes a rounding away. Every bound here is first order in
-//! u times [`SLACK`] for the higher orders, and holds for any order of summation. Coordinates are in the field's unit, a
+//! u times `SLACK` for the higher orders, and holds for any order of summation. Coordinates are in the field's unit, a
 //! power of two at least its radius, so that nothing overflows or underflows whatever the body's size.
 
 pub mod angle;

@@ -132,7 +132,7 @@ pub enum Flow {
 
 /// A percept to explain.
 pub struct Question {
-    /// Its field, as [`crate::Percept::field`] counts.
+    /// Its field, as [`Percept::field`](somatic_engine::percept::Percept::field) counts.
     pub field: usize,
     /// Takes the answer: the message `explain` of `docs/page.md`.
     pub answer: Box<dyn FnOnce(String) + Send>,
@@ -186,7 +186,7 @@ pub struct InputFrames<'a> {
     pub pressures: &'a Pressures<'a>,
     /// The plan that they went through, as it is after the last one.
     pub plan: &'a Plan,
-    /// The values that the last frame's percepts are made of ([`crate::Engine::values_read`]).
+    /// The values that the last frame's percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
     pub values_read: Option<&'a [RawValue]>,
     /// When the last frame arrived, if known.
     pub arrived: Option<Instant>,

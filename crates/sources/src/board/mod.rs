@@ -38,7 +38,7 @@ pub struct BoardConfig {
     pub channels: u16,
     /// Bits of a value.
     pub bits: Bits,
-    /// [`layout_hash`](super::layout_hash) of its taxels.
+    /// [`layout_hash`](somatic_wire::layout_hash) of its taxels.
     pub layout: u32,
     /// Frame rate in mHz; 0 is as fast as readings and line allow.
     pub rate_mhz: u32,

@@ -72,7 +72,7 @@ pub trait Source {
     /// Lets the source skip frames before `t_s`, if it can do so without reading them.
     fn skip_to(&mut self, _t_s: f64) {}
 
-    /// From now on delivers stale values as [`crate::RawValue::STALE`] instead of as missing, for engines that track them.
+    /// From now on delivers stale values as [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE) instead of as missing, for engines that track them.
     fn report_stale(&mut self) {}
 
     /// Whether any value so far was stale.

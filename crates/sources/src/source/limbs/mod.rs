@@ -33,7 +33,7 @@ pub struct LimbOptions {
 
 /// Frames of limbs on a network.
 ///
-/// Times count from its opening, s. Values of a silent limb are [`crate::RawValue::STALE`]; those of taxels that no limb has
+/// Times count from its opening, s. Values of a silent limb are [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE); those of taxels that no limb has
 /// sent yet are missing.
 pub struct LimbSource {
     merged: Merged,

@@ -38,7 +38,7 @@ pub struct SerialOptions {
 
 /// Frames of boards on serial lines.
 ///
-/// Times count from its opening, s. Values of a silent board are [`crate::RawValue::STALE`].
+/// Times count from its opening, s. Values of a silent board are [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE).
 pub struct SerialSource {
     merged: Merged,
     taxels: Vec<u32>,
