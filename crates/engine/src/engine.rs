@@ -72,6 +72,7 @@ impl Default for Options {
 /// Turns frames into percepts.
 ///
 /// ```
+/// # mod somatic { pub use somatic_bodies as bundled; pub use somatic_engine::{Engine, Options, percept::TouchFrame, scene::Scene, touch}; pub use somatic_skin::{body::Body, error::Result, signal, signal::RawValue}; }
 /// # fn main() -> somatic::Result<()> {
 /// let body = somatic::Body::from_bytes("hand.glb", somatic::bundled::HAND)?;
 /// let mut engine = somatic::Engine::new(&body, somatic::Options::default())?;
@@ -304,6 +305,7 @@ impl Engine {
     /// Nothing unless [`Scene::touches`] asks for touches.
     ///
     /// ```
+    /// # mod somatic { pub use somatic_bodies as bundled; pub use somatic_engine::{Engine, Options, percept::TouchFrame, scene::Scene, touch}; pub use somatic_skin::{body::Body, error::Result, signal, signal::RawValue}; }
     /// # fn main() -> somatic::Result<()> {
     /// use somatic::{Body, Engine, Options, RawValue, Scene, bundled, touch};
     ///

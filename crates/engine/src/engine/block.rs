@@ -11,6 +11,7 @@ impl Engine {
     /// What [`Engine::process`] does, for frames whose values lie in one slice: they are read where they are.
     ///
     /// ```
+    /// # mod somatic { pub use somatic_bodies as bundled; pub use somatic_engine::{Engine, Options, percept::TouchFrame, scene::Scene, touch}; pub use somatic_skin::{body::Body, error::Result, signal, signal::RawValue}; }
     /// # fn main() -> somatic::Result<()> {
     /// use somatic::signal::FrameBlock;
     /// use somatic::{Body, Engine, Options, RawValue, bundled};

@@ -13,6 +13,7 @@ use crate::stage::layout;
 /// Everything that the next percepts depend on beside the next frames.
 ///
 /// ```
+/// # mod somatic { pub use somatic_bodies as bundled; pub use somatic_engine::{Engine, Options, percept::TouchFrame, scene::Scene, touch}; pub use somatic_skin::{body::Body, error::Result, signal, signal::RawValue}; }
 /// # fn main() -> somatic::Result<()> {
 /// use somatic::{Body, Engine, Options, RawValue, bundled};
 ///

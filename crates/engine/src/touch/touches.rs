@@ -51,6 +51,7 @@ pub struct TouchState(pub(super) Memory);
 /// Finds the touches of a skin, frame after frame.
 ///
 /// ```
+/// # mod somatic { pub use somatic_bodies as bundled; pub use somatic_engine::{Engine, Options, percept::TouchFrame, scene::Scene, touch}; pub use somatic_skin::{body::Body, error::Result, signal, signal::RawValue}; }
 /// use somatic::TouchFrame;
 /// use somatic::touch::{Input, Skin, SkinParts, Touches};
 /// use std::sync::Arc;
