@@ -194,12 +194,12 @@ def test_what_belongs_together_is_pickled(hand: st.Body) -> None:
 
 
 def test_flags_are_the_library_s(somatic) -> None:
-    source = (__import__("conftest").ROOT / "src" / "percept" / "flags.rs").read_text()
+    source = (__import__("conftest").ROOT / "crates" / "engine" / "src" / "percept" / "flags.rs").read_text()
     import re
 
     known = {name: 1 << int(bit) for name, bit in re.findall(r"const (\w+) = 1 << (\d+);", source)}
     assert {flag.name: flag.value for flag in st.Flags} == known
-    source = (__import__("conftest").ROOT / "src" / "percept" / "touch.rs").read_text()
+    source = (__import__("conftest").ROOT / "crates" / "engine" / "src" / "percept" / "touch.rs").read_text()
     known = {name: 1 << int(bit) for name, bit in re.findall(r"const (\w+) = 1 << (\d+);", source)}
     assert {flag.name: flag.value for flag in st.TouchFlags} == known
 
