@@ -36,4 +36,4 @@ pub use engine::{Engine, EngineState, Options};
 #[cfg(test)]
 use somatic_bodies as bundled;
 #[allow(unused_imports, reason = "which of them are used hangs on features")]
-use somatic_skin::{body, error, field, keys, length, limits, parallel, plain, random, renamed, signal};
+use somatic_skin::{body, error, field, length, limits, parallel, random, signal};

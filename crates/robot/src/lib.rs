@@ -18,6 +18,6 @@ use somatic_bodies as bundled;
 #[cfg(feature = "mcap")]
 use somatic_recording as recording;
 #[allow(unused_imports, reason = "which of them are used hangs on features")]
-use somatic_skin::{body, error, field, limits, output, plain, signal};
+use somatic_skin::{body, error, output, signal};
 #[allow(unused_imports, reason = "which of them are used hangs on features")]
 use somatic_sources::source;

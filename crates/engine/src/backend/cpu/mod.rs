@@ -17,7 +17,7 @@ mod motion;
 mod orientation;
 mod pipeline;
 mod principal_axis;
-#[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the GPU's frames go up side by side"))]
+#[cfg_attr(not(any(feature = "gpu", test)), expect(dead_code, reason = "the GPU's frames go up side by side"))]
 pub(super) mod read;
 mod recording;
 #[cfg(test)]
