@@ -9,7 +9,7 @@ const CUTOFF_SIGMAS: f64 = 5.0;
 const CUTOFF_DEPTHS: f64 = 10.0;
 /// A layer counts as spreading at least this much, m.
 const MIN_SIGMA_M: f64 = 5e-4;
-/// Pieces of the surface are at most this large, m, or this share of the smallest cell, whichever is more: a robot of six metres with
+/// Pieces of the surface are at most this large, m, or this share of the smallest cell, whichever is more: a body of four metres with
 /// taxels 120 mm apart needs no pieces of 2 mm.
 const MAX_PIECE_M: f64 = 2e-3;
 const MAX_PIECE_SHARE: f64 = 0.1;
