@@ -56,19 +56,24 @@ extern crate self as somatic;
 extern crate somatic_skin;
 
 pub mod bundled;
+#[doc(hidden)]
 pub mod expected;
 #[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod figure;
 #[cfg(feature = "cli")]
 mod ink;
 #[cfg(all(feature = "cli", feature = "gpu"))]
 pub mod picture;
 #[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod plot;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 
-pub use somatic_skin::{error, limits, plain, renamed};
+pub use somatic_skin::error;
+#[doc(hidden)]
+pub use somatic_skin::{limits, plain, renamed};
 // The same paths in this crate as if they were its own.
 #[allow(unused_imports, reason = "which of them are used hangs on features")]
 use somatic_skin::{colours, keys, length, parallel, random};
@@ -82,11 +87,14 @@ pub mod author {
     pub(crate) use somatic_author::*;
     #[doc(inline)]
     pub use somatic_author::{
-        Authored, Coverage, DrawnPoses, Finding, FindingKind, GridOrder, Hole, LinkCoverage, LinkShare, PlaceReport,
-        Placed, Progress, Recipe, Sheet, SheetCell, SheetGrid, SurfacePoint, author, author_csv_skin, author_icub,
-        author_sheets, author_while, blend_skinning, cell_spread, coverage, group, heaviest_four, icub, lint,
-        lint_in_poses, lint_with_progress, place_apart, place_by_density, place_evenly, recipe_values, refresh, sheets,
-        widest_radius,
+        Authored, Coverage, Finding, FindingKind, PlaceReport, Progress, Recipe, author, author_csv_skin, author_icub,
+        coverage, lint, lint_in_poses,
+    };
+    #[doc(hidden)]
+    pub use somatic_author::{
+        DrawnPoses, GridOrder, Hole, LinkCoverage, LinkShare, Placed, Sheet, SheetCell, SheetGrid, SurfacePoint,
+        author_sheets, author_while, blend_skinning, cell_spread, group, heaviest_four, icub, lint_with_progress,
+        place_apart, place_by_density, place_evenly, recipe_values, refresh, sheets, widest_radius,
     };
 }
 
@@ -105,7 +113,7 @@ pub mod backend {
 pub mod gains {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_engine::gains::*;
-    #[doc(inline)]
+    #[doc(hidden)]
     pub use somatic_engine::gains::{GainsEstimate, GainsSurvey};
 }
 
@@ -127,19 +135,20 @@ pub mod scene {
     pub(crate) use somatic_engine::scene::*;
     #[doc(inline)]
     pub use somatic_engine::scene::{
-        Arithmetic, AskedOutputs, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy,
-        Plan, PlannedStage, Scene, choose_fields,
+        Arithmetic, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy, Plan, Scene,
     };
+    #[doc(hidden)]
+    pub use somatic_engine::scene::{AskedOutputs, PlannedStage, choose_fields};
 }
 
 /// Touches of the whole body, found on its skin.
 pub mod touch {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_engine::touch::*;
+    #[doc(hidden)]
+    pub use somatic_engine::touch::{Input, Reading, Skin, SkinParts, SkinTaxel, Splits, Touches, Unrolled};
     #[doc(inline)]
-    pub use somatic_engine::touch::{
-        Input, Options, Reading, Skin, SkinParts, SkinTaxel, Splits, TouchState, Touches, Unrolled,
-    };
+    pub use somatic_engine::touch::{Options, TouchState};
 }
 
 /// Recordings in MCAP, and bags of ROS 2.
@@ -147,37 +156,42 @@ pub mod touch {
 pub mod recording {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_recording::*;
-    #[doc(inline)]
+    #[doc(hidden)]
     pub use somatic_recording::{
-        Attached, BODY, BagSurvey, CALIBRATION, FIELDS, FRAMES, LINKS, PERCEPTS, Reader, Recorder, Rhythm, SCENE,
-        SURFACE, Survey, SurveyedTopic, TAXELS, TOUCHES, Topic,
+        Attached, BODY, BagSurvey, CALIBRATION, FIELDS, FRAMES, LINKS, PERCEPTS, Rhythm, SCENE, SURFACE, Survey,
+        SurveyedTopic, TAXELS, TOUCHES, Topic,
     };
+    #[doc(inline)]
+    pub use somatic_recording::{Reader, Recorder};
 }
 
 /// Where frames come from.
 pub mod source {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_sources::source::*;
-    #[doc(inline)]
-    pub use somatic_sources::source::{
-        BagName, Cell, CsvFile, CsvSource, Cut, JointPosition, JointStates, Layout, NdjsonSource, Panel, Replay,
-        SimulatedSource, Source, SourceSpec, Truth, VendorFormat, VendorOptions, VendorSource, write_recording,
-        write_recording_with_progress,
-    };
+    #[doc(hidden)]
+    pub use somatic_sources::source::{BagName, Cell, CsvFile, Layout, Panel, write_recording_with_progress};
     #[cfg(any(feature = "serial", feature = "zenoh"))]
+    #[doc(hidden)]
+    pub use somatic_sources::source::{BoardAccount, BoardState, ChannelWiper, LimbPercepts, WiperTrouble};
     #[doc(inline)]
     pub use somatic_sources::source::{
-        BoardAccount, BoardState, ChannelWiper, LimbPercepts, Lines, Notice, WiperTrouble,
+        CsvSource, Cut, JointPosition, JointStates, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, Truth,
+        VendorFormat, VendorOptions, VendorSource, write_recording,
     };
     #[cfg(feature = "zenoh")]
     #[doc(inline)]
     pub use somatic_sources::source::{LimbOptions, LimbSource};
+    #[cfg(any(feature = "serial", feature = "zenoh"))]
+    #[doc(inline)]
+    pub use somatic_sources::source::{Lines, Notice};
     #[cfg(feature = "serial")]
     #[doc(inline)]
     pub use somatic_sources::source::{PortSummary, SerialOptions, SerialSource, serial_ports};
 }
 
 /// The serial protocol between sensor boards and the host.
+#[doc(hidden)]
 pub mod wire {
     #[doc(inline)]
     pub use somatic_sources::board;
@@ -199,11 +213,12 @@ pub mod wire {
 pub mod page {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_page::*;
-    #[doc(inline)]
+    #[doc(hidden)]
     pub use somatic_page::{
-        EventKind, History, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Replies, Request, Series, Server,
-        ViewerId,
+        EventKind, History, Mode, PageInfo, PageInput, PageScene, Publisher, Replies, Request, Series, ViewerId,
     };
+    #[doc(inline)]
+    pub use somatic_page::{Listen, Server};
 }
 
 /// Robots: where their links are, and their topics in ROS 2.
@@ -214,12 +229,16 @@ pub mod robot {
     pub(crate) use somatic_robot::robot::*;
     #[cfg(feature = "mcap")]
     #[doc(inline)]
-    pub use somatic_robot::robot::{BagSource, DelayEstimate, Transport, joint_states_of_bag};
+    pub use somatic_robot::robot::{BagSource, joint_states_of_bag};
+    #[cfg(feature = "mcap")]
+    #[doc(hidden)]
+    pub use somatic_robot::robot::{DelayEstimate, Transport};
     #[cfg(feature = "meshes")]
     #[doc(inline)]
-    pub use somatic_robot::robot::{
-        JointOptions, JointedSource, Kinematics, LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M, drawn_poses,
-    };
+    pub use somatic_robot::robot::{JointOptions, JointedSource, Kinematics};
+    #[cfg(feature = "meshes")]
+    #[doc(hidden)]
+    pub use somatic_robot::robot::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M, drawn_poses};
     #[cfg(feature = "ros2")]
     #[doc(inline)]
     pub use somatic_robot::robot::{LiveJoints, Ros2Source, StatesTime};
@@ -236,6 +255,9 @@ pub mod sink {
     #[cfg(feature = "ros2")]
     #[doc(inline)]
     pub use somatic_sinks::sink::Ros2Sink;
+    #[cfg(feature = "zenoh")]
+    #[doc(inline)]
+    pub use somatic_sinks::sink::ZenohSink;
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_sinks::sink::*;
     #[cfg(feature = "arrow")]
@@ -243,27 +265,33 @@ pub mod sink {
     pub use somatic_sinks::sink::{ArrowTable, TableKind};
     #[doc(inline)]
     pub use somatic_sinks::sink::{
-        CsvSink, FieldNames, Flow, InputFrames, LimbSends, NdjsonSink, News, Pressures, Question, RecordPart, Session,
-        Sink, SinkSpec, SinkTarget, SkinNames, TableColumn, TableName, TableType, TableWish, percept_columns,
-        self_contact_columns, touch_columns,
+        CsvSink, FieldNames, Flow, InputFrames, NdjsonSink, Session, Sink, SinkSpec, SinkTarget,
+    };
+    #[doc(hidden)]
+    pub use somatic_sinks::sink::{
+        LimbSends, News, Pressures, Question, RecordPart, SkinNames, TableColumn, TableName, TableType, TableWish,
+        percept_columns, self_contact_columns, touch_columns,
     };
     #[cfg(feature = "mcap")]
     #[doc(inline)]
     pub use somatic_sinks::sink::{RecordingSink, Ros2BagSink, RosTime};
     #[cfg(feature = "zenoh")]
-    #[doc(inline)]
-    pub use somatic_sinks::sink::{ZenohSink, limb_frame_bytes, limb_percept_bytes};
+    #[doc(hidden)]
+    pub use somatic_sinks::sink::{limb_frame_bytes, limb_percept_bytes};
 }
 
 /// Bodies: links, surfaces and taxels, read from glTF and written to it.
 pub mod body {
+    #[doc(hidden)]
+    pub use somatic_skin::body::{
+        BODY_FROM_WORLD, Details, EdgeRow, Flaws, Glb, Hit, Home, LinkMimic, LinkMotion, Mark, MeshData, NONE,
+        Original, Paint, Part, Sheet, SheetCell, Skinning, StoredEdges, SurfaceIndex, TaxelRow, TaxelSource, Topology,
+        WORLD_FROM_BODY, WORLD_FROM_BODY_ROTATION, blend_skinning, heaviest_four, read_taxel_table, sheets,
+        taxel_table,
+    };
     #[doc(inline)]
     pub use somatic_skin::body::{
-        BODY_FROM_WORLD, Body, ChartKind, ChartSpec, Details, EdgeRow, FieldSpec, Flaws, Glb, Hit, Home, Link,
-        LinkJoint, LinkMimic, LinkMotion, MAX_TAXEL_ID, Mark, MemberSpec, MeshData, Modality, NONE, Original, Paint,
-        Part, Sheet, SheetCell, Skinning, StoredEdges, Surface, SurfaceIndex, Taxel, TaxelRow, TaxelSource, Topology,
-        Up, WORLD_FROM_BODY, WORLD_FROM_BODY_ROTATION, blend_skinning, heaviest_four, read_taxel_table, sheets,
-        taxel_table,
+        Body, ChartKind, ChartSpec, FieldSpec, Link, LinkJoint, MAX_TAXEL_ID, MemberSpec, Modality, Surface, Taxel, Up,
     };
     // For this crate alone.
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
@@ -275,9 +303,11 @@ pub mod field {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_skin::field::*;
     #[doc(inline)]
+    pub use somatic_skin::field::{Chart, Field, FieldSet, Member, NoChart, TaxelGraph, WORLD};
+    #[doc(hidden)]
     pub use somatic_skin::field::{
-        Chart, ContactTolerance, Distortion, Field, FieldSet, Lift, Member, NoChart, RestOverlap, TaxelGraph, Unroller,
-        WORLD, geodesic, mean_normals, neighbours, rest_overlaps, unions,
+        ContactTolerance, Distortion, Lift, RestOverlap, Unroller, geodesic, mean_normals, neighbours, rest_overlaps,
+        unions,
     };
 }
 
@@ -285,31 +315,33 @@ pub mod field {
 pub mod signal {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_skin::signal::*;
+    #[doc(hidden)]
+    pub use somatic_skin::signal::{
+        BoardHealth, Checks, ContactThresholds, DriftKeys, FARTHEST_POSE_M, FrameBlock, LaidOver, Mark, Onset, UnitOfP,
+    };
     #[doc(inline)]
     pub use somatic_skin::signal::{
-        BoardHealth, Calibration, ChangeCalibration, Checks, ContactThresholds, Curve, DriftKeys, FARTHEST_POSE_M,
-        Frame, FrameBlock, FrameTime, FsrCircuit, FsrResponse, FsrSignal, LaidOver, LayerResponse, Letter, Mark, Onset,
-        Pose, Quantity, RawValue, Receptor, Response, Sensors, TaxelCalibration, Unfit, UnitOfP, WiredBoard, Wiring,
+        Calibration, ChangeCalibration, Curve, Frame, FrameTime, FsrCircuit, FsrResponse, FsrSignal, LayerResponse,
+        Letter, Pose, Quantity, RawValue, Receptor, Response, Sensors, TaxelCalibration, Unfit, WiredBoard, Wiring,
     };
 }
 
 /// Outputs: the only code that writes files, and the checks of where it may write.
 pub mod output {
     #[cfg(unix)]
-    #[doc(inline)]
+    #[doc(hidden)]
     pub use somatic_skin::output::OutputLink;
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_skin::output::*;
+    #[doc(hidden)]
+    pub use somatic_skin::output::{GrowingFile, OutputFolder, PrivateFile, abandon_outputs, refuse_standard_output};
     #[doc(inline)]
-    pub use somatic_skin::output::{
-        GrowingFile, OutputFile, OutputFolder, OutputPath, OutputPaths, PrivateFile, abandon_outputs,
-        refuse_standard_output,
-    };
+    pub use somatic_skin::output::{OutputFile, OutputPath, OutputPaths};
 }
 
 pub use backend::BackendKind;
 pub use body::Body;
-pub use error::{Error, Result};
+pub use error::{Error, ErrorKind, Result};
 pub use output::OutputPath;
 pub use percept::{
     COLUMNS, Column, ContactKind, FitSigma, Flags, Outputs, Percept, Percepts, Precision, SelfContact, SelfContactSide,

@@ -150,12 +150,21 @@ fn shell(command: &str, folder: &Path) -> Output {
 }
 
 #[test]
-fn the_percept_that_is_shown_is_what_the_command_above_it_prints() {
-    let page = std::fs::read_to_string(root().join("README.md")).unwrap();
-    let (above, rest) = page.split_once("```json\n").unwrap();
-    let shown: String = rest.split("```").next().unwrap().lines().collect();
-    let output = shell(&commands(above).pop().unwrap(), workplace().path());
-    assert_eq!(String::from_utf8_lossy(&output.stdout).trim_end(), shown, "{output:?}");
+fn the_lines_that_are_shown_are_what_the_commands_above_them_print() {
+    for page in ["README.md", "docs/percepts.md"] {
+        let text = std::fs::read_to_string(root().join(page)).unwrap();
+        let (above, rest) = text.split_once("```json\n").unwrap();
+        let shown: String = rest.split("```").next().unwrap().lines().collect();
+        let output = shell(&commands(above).pop().unwrap(), workplace().path());
+        assert_eq!(String::from_utf8_lossy(&output.stdout).trim_end(), shown, "{page}: {output:?}");
+    }
+}
+
+/// README is read by people who have just come: what grows over this belongs on a page of its own.
+#[test]
+fn the_readme_is_short() {
+    let lines = std::fs::read_to_string(root().join("README.md")).unwrap().lines().count();
+    assert!(lines <= 120, "{lines} lines");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
+use somatic::ErrorKind;
 
 /// A class of `somatic_touch._errors`.
 struct Class {
@@ -55,7 +56,7 @@ pub(crate) fn raised(py: Python<'_>, error: &somatic::Error, file: Option<&Path>
     });
     let class = match () {
         () if error.is_usage() => &USAGE,
-        () if error.is_no_adapter() || error.is_gpu_lost() => &FAILED,
+        () if matches!(error.kind(), ErrorKind::NoAdapter | ErrorKind::DeviceLost) => &FAILED,
         () => &INPUT,
     };
     let raised = class.error(py, error.to_string(), file, place.map(str::to_owned));

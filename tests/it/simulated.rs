@@ -635,7 +635,7 @@ fn a_body_named_in_the_file_is_found_from_the_files_folder() {
     std::fs::write(folder.path().join("my.glb"), b"no glb").unwrap();
     let line = SimulatedSource::open(&path).err().unwrap().to_string();
     assert!(line.contains("a.toml: line 1, column 8: ") && line.contains("my.glb"), "{line}");
-    assert!(SimulatedSource::open(folder.path().join("b.toml")).err().unwrap().is_not_found());
+    assert!(SimulatedSource::open(folder.path().join("b.toml")).err().unwrap().kind() == somatic::ErrorKind::NotFound);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::icub::{IcubFile, IcubTaxel};
-use super::skin::{Authored, PlaceReport, store_edges};
+use super::report::PlaceReport;
+use super::skin::{Authored, store_edges};
 use crate::body::{Glb, Original, Taxel};
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_TABLE_BYTES};

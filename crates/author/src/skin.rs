@@ -4,21 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::cell_spread::cell_spread;
-use super::fill::{Fill, Filled, without_area};
 use super::group::{FilePaint, Grouper, Grouping};
-use super::link_pairs::LinkPairs;
-use super::lint::{DrawnPoses, Touchable};
-use super::origin::Origin;
-use super::place::nearest_on_its_side;
-use super::placed::{Placed, Progress, SurfacePoint, report_progress};
-use super::points::Snapped;
-use super::recipe::{PlaceSpec, Recipe};
+use super::placed::{Progress, report_progress};
+use super::recipe::Recipe;
 use super::refresh::refresh;
-use super::region::Regions;
+use super::report::PlaceReport;
 use super::rest_surface::{MeshTaxel, RestSurface};
-use crate::body::{Body, Details, FieldSpec, Glb, MAX_TAXEL_ID, Modality, Original, Skinning, Taxel, listed};
-use crate::error::{Error, Result, failed};
+use super::seat::{Seated, seat};
+use crate::body::{Body, Details, FieldSpec, Glb, Original, Skinning, Taxel, listed};
+use crate::error::{Error, Result};
 use crate::field::{Divided, TaxelGraph, unions};
 
 /// Progress before and after placing taxels, and when they are in fields.
@@ -37,27 +31,6 @@ pub struct Authored {
     pub places: Vec<PlaceReport>,
     /// Further notes for the user.
     pub notes: Vec<String>,
-}
-
-/// The result of a place of a recipe.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PlaceReport {
-    /// Its name.
-    pub name: String,
-    /// The taxels' ids, in the order in which they were placed.
-    pub ids: Vec<u32>,
-    /// Number of taxels by name of the link.
-    pub links: BTreeMap<String, usize>,
-    /// The smallest distance between two neighbours on the same side, m; `None` if there are no two.
-    pub least_spacing_m: Option<f64>,
-    /// The mean distance to the nearest neighbour, m.
-    pub mean_spacing_m: Option<f64>,
-    /// For given places: the id, and how far the taxel was moved to the surface, m.
-    pub moved_m: Vec<(u32, f64)>,
-    /// The 5th and the 95th percentile of the taxels' areas over their median; `None` if these are unknown.
-    pub cell_spread: Option<[f64; 2]>,
-    /// Surface of the place that nothing can touch, by name of the link, m².
-    pub hidden_m2: BTreeMap<String, f64>,
 }
 
 /// Adds the taxels and fields of `recipe` to `file` and replaces its layout. Its taxels stay if the recipe has no place or
@@ -89,21 +62,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         file.clear_layout(keeps_taxels)?;
     }
     let (mut body, mut details) = file.read()?;
-    if recipe.places.is_empty() && body.taxels.is_empty() {
-        if let Some(finding) = body.findings.first() {
-            return Err(Error::failed(finding).at(file.name()));
-        }
-        let what = "it has no taxels; give a number of taxels (`--taxels 500`), or a recipe with a [[place]]";
-        return Err(Error::usage(what).at(file.name()));
-    }
-    if body.surfaces.is_empty() && !recipe.places.is_empty() {
-        return Err(Error::failed("it has no triangles to place taxels on; export a mesh").at(file.name()));
-    }
-    if recipe.is_mirrored && recipe.places.is_empty() {
-        return Err(
-            Error::usage("`mirror` is for taxels to be placed; give a number of them, or leave it out").at(file.name())
-        );
-    }
+    check(&file, &body, recipe)?;
     report_progress(&mut go_on, PROGRESS_OPENED)?;
     let mut notes = std::mem::take(&mut file.notes);
     if !body.taxels.is_empty() {
@@ -119,79 +78,11 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
         return Ok(Authored { file, body, places: Vec::new(), notes });
     }
     let rest_surface = RestSurface::new(&body, &details);
-    let mut regions = Regions::new(&rest_surface, &recipe.regions);
-    let mut bare = vec![false; rest_surface.triangles.len()];
-    for (name, at) in &recipe.bare {
-        let own = regions.union(std::slice::from_ref(name), at)?;
-        bare.iter_mut().zip(own).for_each(|(bare, own)| *bare |= own);
-    }
-    let mut ids = UsedIds::default();
-    ids.take(body.taxels.iter().map(|taxel| taxel.id), "the file", &Origin::default())?;
-    let drawn = DrawnPoses::of(&body);
-    let looks = !recipe.keeps_hidden && recipe.places.iter().any(|place| place.how.samples());
-    let touchable = looks.then(|| Touchable::new(&body, &drawn));
-    let (mut reports, mut seated) = (Vec::new(), Vec::new());
-    let mut pairs = Vec::new();
-    // What a place over all of the surface divides it into is what the edges of its taxels are made of.
-    let is_alone = body.taxels.is_empty() && recipe.places.len() == 1;
-    let mut divided = None;
-    for (index, place) in recipe.places.iter().enumerate() {
-        let mut region = match &place.regions[..] {
-            [] => vec![true; rest_surface.triangles.len()],
-            names => regions.union(names, &place.at)?,
-        };
-        if place.how.samples() {
-            region.iter_mut().zip(&bare).for_each(|(own, bare)| *own &= !bare);
-        }
-        if !region.contains(&true) {
-            let what = format!("place `{}` has no surface left: all of its regions are `bare`", place.name);
-            return Err(place.at.wrong(what));
-        }
-        let share = (PROGRESS_PLACED - PROGRESS_OPENED) / recipe.places.len() as f64;
-        let tick = &mut |done: f64| go_on(PROGRESS_OPENED + share * (index as f64 + done));
-        let fill = Fill {
-            rest_surface: &rest_surface,
-            place,
-            seed: recipe.seed_of(place),
-            is_scattered: recipe.is_scattered,
-            touchable: touchable.as_ref(),
-            clear_m: recipe.clear_m,
-            is_mirrored: recipe.is_mirrored,
-        };
-        let Filled { taxels: filled, cells, hidden_m2, notes: more, is_mirrored } =
-            fill.place(&region, tick).map_err(|e| place.at.put(e))?;
-        notes.extend(more);
-        let last = u64::from(place.first_id) + filled.len() as u64;
-        if last > u64::from(MAX_TAXEL_ID) + 1 {
-            let what =
-                format!("its ids would reach {last}, over the {MAX_TAXEL_ID} that a file can hold; lower `first_id`");
-            return Err(place.at.wrong(what));
-        }
-        let own: Vec<u32> = filled.iter().zip(place.first_id..).map(|(one, next)| one.id.unwrap_or(next)).collect();
-        ids.take(own.iter().copied(), &format!("place `{}`", place.name), &place.at)?;
-        notes.extend(without_area(place, &filled, &own));
-        let is_whole = is_alone && place.modality == Modality::Pressure && !region.contains(&false);
-        divided = cells.filter(|_| is_whole).map(|cells| (own.clone(), cells));
-        let first = seated.len();
-        let links = rest_surface.link.iter().zip(&region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();
-        let seat = |(one, &id): (&Snapped, &u32)| rest_surface.mesh_taxel(&one.placed, id, place.modality, &links);
-        seated.extend(filled.iter().zip(&own).map(seat));
-        if is_mirrored {
-            let images = filled.iter().map(|one| &one.placed).skip(1).step_by(2);
-            seat_images(&rest_surface, images, &mut seated[first..]).map_err(|e| place.at.put(e))?;
-            pairs.extend(own.chunks_exact(2).map(|ids| [ids[0], ids[1]]));
-            notes.push(format!(
-                "place `{}`: {} pairs; id {} and every second one from there is on the left, and its mirror image has the next id",
-                place.name,
-                filled.len() / 2,
-                place.first_id
-            ));
-        }
-        reports.push(report(&rest_surface, place, own, &filled, (&seated[first..], hidden_m2)));
-    }
+    let tick = &mut |done: f64| go_on(PROGRESS_OPENED + (PROGRESS_PLACED - PROGRESS_OPENED) * done);
+    let Seated { taxels, reports, pairs, divided, notes: more } = seat(&rest_surface, recipe, tick)?;
+    notes.extend(more);
     report_progress(&mut go_on, PROGRESS_PLACED)?;
-    let addition = taxel_nodes(&file, &rest_surface, seated);
-    drop(regions);
+    let addition = taxel_nodes(&file, &rest_surface, taxels);
     file.add(&addition);
     let (body, details) = file.read()?;
     let tick = &mut |done: f64| go_on(PROGRESS_PLACED + (PROGRESS_GROUPED - PROGRESS_PLACED) * done);
@@ -203,6 +94,25 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     let (mut body, _) = file.read()?;
     store_edges(&mut file, &mut body, &mut notes, divided.as_ref());
     Ok(Authored { file, body, places: reports, notes })
+}
+
+/// Refuses a recipe that the body in `file` has nothing for.
+fn check(file: &Original, body: &Body, recipe: &Recipe) -> Result<()> {
+    if recipe.places.is_empty() && body.taxels.is_empty() {
+        if let Some(finding) = body.findings.first() {
+            return Err(Error::failed(finding).at(file.name()));
+        }
+        let what = "it has no taxels; give a number of taxels (`--taxels 500`), or a recipe with a [[place]]";
+        return Err(Error::usage(what).at(file.name()));
+    }
+    if body.surfaces.is_empty() && !recipe.places.is_empty() {
+        return Err(Error::failed("it has no triangles to place taxels on; export a mesh").at(file.name()));
+    }
+    if recipe.is_mirrored && recipe.places.is_empty() {
+        let what = "`mirror` is for taxels to be placed; give a number of them, or leave it out";
+        return Err(Error::usage(what).at(file.name()));
+    }
+    Ok(())
 }
 
 /// Writes the edges between the taxels of `body`, which is in `file`, unless the file has current ones. `divided` has all of the
@@ -225,51 +135,6 @@ pub(super) fn store_edges(
     let edges = graph.to_stored(body);
     file.set_edges(&edges);
     body.edges = Some(edges);
-}
-
-#[derive(Default)]
-struct UsedIds(BTreeMap<u32, String>);
-
-impl UsedIds {
-    fn take(&mut self, ids: impl IntoIterator<Item = u32>, who: &str, at: &Origin) -> Result<()> {
-        for id in ids {
-            if let Some(other) = self.0.insert(id, who.to_owned()) {
-                let free = self.0.keys().last().map_or(0, |last| u64::from(*last) + 1).next_multiple_of(100);
-                return Err(at.wrong(format!(
-                    "id {id} is used twice, by {other} and by {who}; give ids of their own, as from {free} up"
-                )));
-            }
-        }
-        Ok(())
-    }
-}
-
-fn report(
-    rest_surface: &RestSurface<'_>,
-    place: &PlaceSpec,
-    ids: Vec<u32>,
-    filled: &[Snapped],
-    (seated, hidden_m2): (&[MeshTaxel], BTreeMap<usize, f64>),
-) -> PlaceReport {
-    let points: Vec<SurfacePoint> = filled.iter().map(|one| one.placed.point).collect();
-    let near: Vec<f64> = nearest_on_its_side(&points).into_iter().flatten().collect();
-    let mut links = BTreeMap::new();
-    for one in seated {
-        *links.entry(rest_surface.body.links[one.taxel.link].name.clone()).or_insert(0) += 1;
-    }
-    let moved = |(one, &id): (&Snapped, &u32)| (id, one.moved_m);
-    let moved_m = if place.how.samples() { Vec::new() } else { filled.iter().zip(&ids).map(moved).collect() };
-    let hidden = |(link, area): (usize, f64)| (rest_surface.body.links[link].name.clone(), area);
-    PlaceReport {
-        name: place.name.clone(),
-        links,
-        cell_spread: cell_spread(filled.iter().map(|one| one.placed.point.area)),
-        hidden_m2: hidden_m2.into_iter().map(hidden).collect(),
-        least_spacing_m: near.iter().copied().reduce(f64::min),
-        mean_spacing_m: (!near.is_empty()).then(|| near.iter().sum::<f64>() / near.len() as f64),
-        moved_m,
-        ids,
-    }
 }
 
 /// The taxels as nodes: one per mesh, below the node of that mesh; for a skinned mesh at the root, where no transform applies.
@@ -311,30 +176,6 @@ fn without_field(body: &Body, fields: &[FieldSpec]) -> Option<String> {
             listed(&loose)
         )
     })
-}
-
-/// Puts each second one of `seated`, which are at `images`, on the link that mirrors that of the one before it.
-fn seat_images<'p>(
-    rest_surface: &RestSurface<'_>,
-    images: impl Iterator<Item = &'p Placed>,
-    seated: &mut [MeshTaxel],
-) -> Result<()> {
-    let pairs = LinkPairs::new(rest_surface.body);
-    for (pair, image) in seated.chunks_exact_mut(2).zip(images) {
-        let [one, other] = pair else { continue };
-        let link = pairs.image(one.taxel.link);
-        *other = rest_surface.mesh_taxel(image, other.taxel.id, other.taxel.modality, &BTreeSet::from([link as u32]));
-        if other.taxel.link != link {
-            let name = |link: usize| &rest_surface.body.links[link].name;
-            return Err(failed!(
-                "`mirror`: taxel {} is on link `{}`, but its mirror image is not on `{}`: the mesh is bound to the two unlike; leave                  `mirror` out",
-                one.taxel.id,
-                name(one.taxel.link),
-                name(link)
-            ));
-        }
-    }
-    Ok(())
 }
 
 /// The fields of `recipe` over the taxels of `body`, with notes; `pairs` has the ids of taxels that are mirror images.

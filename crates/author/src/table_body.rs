@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::recipe::Recipe;
-use super::skin::{Authored, PlaceReport, author};
+use super::report::PlaceReport;
+use super::skin::{Authored, author};
 use crate::body::{Glb, Original, Taxel, TaxelRow, read_taxel_table};
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_TABLE_BYTES};

@@ -127,7 +127,7 @@ impl Engine {
     ///
     /// # Errors
     /// The body has no taxels or no fields, a field is empty, the scene asks for what is not there, or the backend that
-    /// was asked for cannot run here ([`Error::is_no_adapter`]).
+    /// was asked for cannot run here ([`ErrorKind::NoAdapter`](crate::error::ErrorKind::NoAdapter)).
     pub fn new(body: &Body, options: Options) -> Result<Self> {
         let scene = &options.scene;
         let recharted = scene.knobs.charts.applied(body, FieldSet::new(body)?, &scene.fields)?;

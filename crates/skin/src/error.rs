@@ -1,7 +1,7 @@
 //! The one error of this crate.
 //!
-//! An [`Error`] is one line a person can act on: which file, where in it, what is wrong, what to do. Programs ask it
-//! questions ([`Error::is_usage`], [`Error::is_not_found`]) instead of matching on its insides.
+//! An [`Error`] is one line a person can act on: which file, where in it, what is wrong, what to do. Programs match its
+//! [`Error::kind`].
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// What went wrong, in one line.
 #[derive(Clone)]
 pub struct Error {
-    kind: Kind,
+    kind: ErrorKind,
     place: Option<String>,
     what: String,
     cause: Option<Arc<io::Error>>,
@@ -34,53 +34,63 @@ impl PartialEq for Error {
 
 impl Eq for Error {}
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Failed,
+/// What a program can do about an [`Error`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// What was read cannot be used: a damaged file, a value that makes no sense.
+    Input,
+    /// What was asked for makes no sense, or not together.
     Usage,
+    /// A file that was named is not there.
     NotFound,
+    /// The operating system refused: no permission, a full disk, a line that was unplugged. [`std::error::Error::source`] has its error.
+    Io,
+    /// The machine has no adapter that the GPU backend can run on.
     NoAdapter,
-    GpuLost,
+    /// The GPU that computed stopped answering: its driver was reset or replaced, or it was taken away. Another engine may be made,
+    /// and go on from the last `EngineState`.
+    DeviceLost,
 }
 
 impl Error {
     /// Something that was read cannot be used, or something that was tried did not succeed.
     #[must_use]
     pub fn failed(what: impl Into<String>) -> Self {
-        Self::new(Kind::Failed, what.into())
+        Self::new(ErrorKind::Input, what.into())
     }
 
     /// The caller asked for something that makes no sense, or not together.
     #[must_use]
     pub fn usage(what: impl Into<String>) -> Self {
-        Self::new(Kind::Usage, what.into())
+        Self::new(ErrorKind::Usage, what.into())
     }
 
     /// The machine has no adapter that the GPU backend can run on.
     #[must_use]
     pub fn no_adapter(what: impl Into<String>) -> Self {
-        Self::new(Kind::NoAdapter, what.into())
+        Self::new(ErrorKind::NoAdapter, what.into())
     }
 
     /// The same as a usage error: where a file says what is asked for, its mistakes are those of who asks.
     #[must_use]
     pub fn into_usage(self) -> Self {
-        Self { kind: Kind::Usage, ..self }
+        Self { kind: ErrorKind::Usage, ..self }
     }
 
     /// The GPU that computed stopped answering.
     #[must_use]
     pub fn gpu_lost(what: impl Into<String>) -> Self {
-        Self::new(Kind::GpuLost, what.into())
+        Self::new(ErrorKind::DeviceLost, what.into())
     }
 
     /// An operation on the file at `path` failed in the operating system.
     #[must_use]
     pub fn io(path: impl AsRef<Path>, error: &io::Error) -> Self {
         let (kind, what) = match error.kind() {
-            io::ErrorKind::NotFound => (Kind::NotFound, "no such file or directory".to_owned()),
-            io::ErrorKind::IsADirectory => (Kind::Failed, "this is a folder; name a file".to_owned()),
-            _ => (Kind::Failed, error.to_string()),
+            io::ErrorKind::NotFound => (ErrorKind::NotFound, "no such file or directory".to_owned()),
+            io::ErrorKind::IsADirectory => (ErrorKind::Input, "this is a folder; name a file".to_owned()),
+            _ => (ErrorKind::Io, error.to_string()),
         };
         // It cannot be copied, but what it says can.
         let cause = error
@@ -89,7 +99,7 @@ impl Error {
         Self { cause: Some(Arc::new(cause)), ..Self::new(kind, what) }.at(path.as_ref().display().to_string())
     }
 
-    fn new(kind: Kind, what: String) -> Self {
+    fn new(kind: ErrorKind, what: String) -> Self {
         Self { kind, place: None, what, cause: None }
     }
 
@@ -109,29 +119,16 @@ impl Error {
         self.place.as_deref()
     }
 
+    /// What a program can do about it.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
     /// True when the request itself was wrong: arguments that do not exist or do not go together.
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        self.kind == Kind::Usage
-    }
-
-    /// True when a file that was named is not there.
-    #[must_use]
-    pub fn is_not_found(&self) -> bool {
-        self.kind == Kind::NotFound
-    }
-
-    /// True when the GPU backend was asked for and no adapter can run it.
-    #[must_use]
-    pub fn is_no_adapter(&self) -> bool {
-        self.kind == Kind::NoAdapter
-    }
-
-    /// True when the GPU that computed stopped answering: its driver was reset or replaced, or it was taken away. Another engine may
-    /// be made, and go on from the last `EngineState`.
-    #[must_use]
-    pub fn is_gpu_lost(&self) -> bool {
-        self.kind == Kind::GpuLost
+        self.kind == ErrorKind::Usage
     }
 
     /// The exit code that a command ends with on this error: 2 for usage, else 1.

@@ -34,4 +34,4 @@ pub mod random;
 pub mod renamed;
 pub mod signal;
 
-pub use error::{Error, Result};
+pub use error::{Error, ErrorKind, Result};

@@ -11,7 +11,8 @@ use super::urdf_file::Robot;
 use crate::body::{MAX_TAXEL_ID, Modality, Original, Taxel};
 use crate::error::{Error, Result, failed};
 use crate::recipe::Recipe;
-use crate::skin::{Authored, PlaceReport, author};
+use crate::report::PlaceReport;
+use crate::skin::{Authored, author};
 
 /// The body of the URDF at `path` with the taxels of its `<sensor><tactile>`, grouped into fields as without rules. An id is
 /// the index in the sensor's data vector, plus the number of those before it: sensors with one `channel` share a vector.

@@ -6,7 +6,8 @@ use crate::body::{Body, Original, Sheet, sheets};
 use crate::error::Result;
 use crate::place::nearest_on_its_side;
 use crate::placed::SurfacePoint;
-use crate::skin::{Authored, PlaceReport, store_edges};
+use crate::report::PlaceReport;
+use crate::skin::{Authored, store_edges};
 
 /// The body of `sheets_of` as a file called `name` in messages, with a report for each sheet.
 ///

@@ -27,23 +27,23 @@ pub struct Agreement {
     pub failures: Vec<String>,
 }
 
-/// What came of comparing one quantity. Every value that the backend or the reference has is counted once: compared, too
-/// close to call, or not compared.
+/// The result of comparing one quantity. Every value of the backend or the reference is counted once: compared, too close to
+/// call, or not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Comparison {
     /// Values compared.
     pub compared: u64,
-    /// Those of them that agree: within their bounds, or equal where there is none.
+    /// Values that agree: within their bounds, or equal if they have no bound.
     pub agreeing: u64,
-    /// Values not compared, as the reference's own margin to a choice they hang on is below the bound of that choice. Of flags
-    /// these are the sets that have such a flag; the others in them are compared.
+    /// Values that are not compared, because they depend on a choice that is too close to call: the reference's margin is smaller
+    /// than the choice's bound. For flags it counts the sets with such a flag; the other flags of a set are compared.
     pub too_close: u64,
-    /// Values not compared, as they hang on what the frame before left, which was too close to call, and which is not among
-    /// the outputs: motion from a centroid that is not asked for.
+    /// Values that are not compared, because they depend on a value of the frame before that was too close to call and is not an
+    /// output: motion from a centroid that nobody asked for.
     pub not_compared: u64,
     /// Largest error, in the quantity's unit.
     pub worst_error: f64,
-    /// Largest share of its bound that an error took: over 1 is a disagreement.
+    /// Largest error, as a share of its bound: over 1 is a disagreement.
     pub worst_share: f64,
 }
 

@@ -9,6 +9,8 @@ use super::gpu;
 use super::{Backend, BackendKind, BackendState, RawBatch, Rows, Step, cpu, reference};
 #[cfg(not(feature = "gpu"))]
 use crate::error::Error;
+#[cfg(feature = "gpu")]
+use crate::error::ErrorKind;
 use crate::error::Result;
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::Plan;
@@ -41,7 +43,9 @@ pub(crate) fn choose(kind: BackendKind, plan: &Plan, batch: usize) -> Result<Cho
             let mut cpu: Box<dyn Backend> = Box::new(cpu::Cpu::new(plan));
             let mut gpu = match hardware(plan, batch) {
                 Ok(gpu) => gpu,
-                Err(e) if e.is_no_adapter() => return chosen(cpu, format!("no GPU to compare with: {e}")),
+                Err(e) if e.kind() == ErrorKind::NoAdapter => {
+                    return chosen(cpu, format!("no GPU to compare with: {e}"));
+                }
                 Err(e) => return chosen(cpu, format!("the GPU cannot run this plan: {e}")),
             };
             let [on_cpu, on_gpu] = least_times([&mut *cpu, &mut *gpu], plan, batch)?;

@@ -129,13 +129,13 @@ impl Engine {
         if self.plan.stages().hysteresis {
             for index in range.clone() {
                 if self.steps[index].restarts() {
-                    self.stretch(input, start..index, kept.as_deref(), check.as_deref_mut())?;
+                    self.run_without_restart(input, start..index, kept.as_deref(), check.as_deref_mut())?;
                     start = index;
                     kept = Some(self.end_contacts(check.as_deref_mut())?);
                 }
             }
         }
-        self.stretch(input, start..range.end, kept.as_deref(), check)
+        self.run_without_restart(input, start..range.end, kept.as_deref(), check)
     }
 
     /// Ends all contacts in the backend's state; which fields had one.
@@ -150,9 +150,9 @@ impl Engine {
         Ok(kept)
     }
 
-    /// Frames with the same calibration: through the backend, then through post-processing. `kept` are the fields in contact
-    /// before the first, if time starts again there.
-    fn stretch(
+    /// Takes frames that have the same calibration, and in which contacts go on, through the backend, then through post-processing.
+    /// `kept` are the fields in contact before the first, if time starts again there.
+    fn run_without_restart(
         &mut self,
         input: Input<'_>,
         range: Range<usize>,
@@ -195,7 +195,7 @@ impl Engine {
             on_skin.find(about, frames, &raw, self.intake.stale(), &mut self.percepts, of_touches);
             if let Some(check) = &mut check {
                 check.take_several(&raw, &self.percepts);
-                check.touches.iter_mut().for_each(TouchCheck::end_of_stretch);
+                check.touches.iter_mut().for_each(TouchCheck::end_of_run);
             }
         }
         if let Some(check) = &mut check {

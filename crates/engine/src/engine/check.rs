@@ -178,7 +178,7 @@ mod tests {
             let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
             let options = Options { backend, scene, calibration, batch: 64, ..Options::default() };
             let mut engine = match Engine::new(&body, options) {
-                Err(error) if error.is_no_adapter() => return None,
+                Err(error) if error.kind() == crate::error::ErrorKind::NoAdapter => return None,
                 made => made.unwrap(),
             };
             let root = body.links[0].name.clone();

@@ -55,7 +55,7 @@ impl TouchCheck {
     }
 
     /// Forgets pressures of frames that were looked at.
-    pub(super) fn end_of_stretch(&mut self) {
+    pub(super) fn end_of_run(&mut self) {
         self.right.clear();
     }
 
@@ -64,7 +64,7 @@ impl TouchCheck {
         std::mem::take(&mut self.agreement)
     }
 
-    /// Compares `found`, which `touches` found in frame `offset` of the stretch, frame `number` of all, after `before`.
+    /// Compares `found`, which `touches` found in frame `offset` of the run, frame `number` of all, after `before`.
     pub(super) fn compare(
         &mut self,
         (offset, number): (usize, u64),
@@ -344,7 +344,7 @@ mod tests {
             }
             check.take(&all);
             check.compare((0, index.into()), &input, (&before, &touches), &found);
-            check.end_of_stretch();
+            check.end_of_run();
         }
         check.found()
     }

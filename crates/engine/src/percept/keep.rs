@@ -1,18 +1,18 @@
-//! Percepts that stay what they were.
+//! Percepts copied from frame to frame.
 
 use super::Percepts;
 use super::batch::{Components, Values};
 use super::columns::{Component, Host};
 
 impl Percepts {
-    /// Makes the percept of field `field` in frame `to` that of frame `from` of `of`, or of these where that is `None`.
-    pub(crate) fn keep(&mut self, of: Option<&Self>, from: usize, to: usize, field: usize) {
+    /// Copies the percept of field `field` into frame `to`, from frame `from` of `source`, or of `self` if `source` is `None`.
+    pub(crate) fn keep(&mut self, source: Option<&Self>, from: usize, to: usize, field: usize) {
         let fields = self.fields();
         let (from_cell, cell) = (from * fields + field, to * fields + field);
         macro_rules! keep {
             ($($column:ident),* $(,)?) => {
                 $(if cell < self.$column.len() {
-                    self.$column[cell] = of.map_or_else(|| self.$column[from_cell], |of| of.$column[from_cell]);
+                    self.$column[cell] = source.map_or_else(|| self.$column[from_cell], |source| source.$column[from_cell]);
                 })*
             };
         }
@@ -21,24 +21,24 @@ impl Percepts {
             let components = host.column().components;
             if self.has_host(host) {
                 let mut kept = [0.0; 3];
-                kept[..components].copy_from_slice(of.unwrap_or(self).host(host, from_cell));
+                kept[..components].copy_from_slice(source.unwrap_or(self).host(host, from_cell));
                 self.set_host(host, cell, &kept[..components]);
             }
         }
-        match (&mut self.values, of.map(|of| &of.values)) {
-            (Values::F32(columns), Some(Values::F32(of))) => columns.keep(Some(of), from_cell, cell),
-            (Values::F64(columns), Some(Values::F64(of))) => columns.keep(Some(of), from_cell, cell),
-            (Values::F64(columns), Some(Values::F32(of))) => columns.widen(of, from_cell, cell),
+        match (&mut self.values, source.map(|source| &source.values)) {
+            (Values::F32(columns), Some(Values::F32(source))) => columns.keep(Some(source), from_cell, cell),
+            (Values::F64(columns), Some(Values::F64(source))) => columns.keep(Some(source), from_cell, cell),
+            (Values::F64(columns), Some(Values::F32(source))) => columns.widen(source, from_cell, cell),
             (Values::F32(columns), _) => columns.keep(None, from_cell, cell),
             (Values::F64(columns), _) => columns.keep(None, from_cell, cell),
         }
     }
 
-    /// Makes these percepts one frame: frame `from` of `of`, which may be less precise.
-    pub(crate) fn take_frame(&mut self, of: &Self, from: usize) {
+    /// Makes these percepts a single frame: a copy of frame `from` of `source`, which may be less precise.
+    pub(crate) fn take_frame(&mut self, source: &Self, from: usize) {
         self.reset(1);
         for field in 0..self.fields() {
-            self.keep(Some(of), from, 0, field);
+            self.keep(Some(source), from, 0, field);
         }
     }
 
@@ -58,20 +58,20 @@ impl Percepts {
 }
 
 impl Components<f64> {
-    fn widen(&mut self, of: &Components<f32>, from: usize, to: usize) {
+    fn widen(&mut self, source: &Components<f32>, from: usize, to: usize) {
         for &part in Component::ALL {
             if to < self[part].len() {
-                self[part][to] = of[part][from].into();
+                self[part][to] = source[part][from].into();
             }
         }
     }
 }
 
 impl<T: Copy> Components<T> {
-    fn keep(&mut self, of: Option<&Self>, from: usize, to: usize) {
+    fn keep(&mut self, source: Option<&Self>, from: usize, to: usize) {
         for &part in Component::ALL {
             if to < self[part].len() {
-                self[part][to] = of.unwrap_or(self)[part][from];
+                self[part][to] = source.unwrap_or(self)[part][from];
             }
         }
     }

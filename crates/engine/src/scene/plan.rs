@@ -1,23 +1,21 @@
 //! The plan: the least work that gives a scene what it asks for, as plain data that a backend runs.
 
 mod lookups;
+mod make;
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::Knobs;
 use super::curves::Curves;
-use super::left_out::{LeftOut, is_pressure, pressed_members};
-use super::members::{LinkPart, parts, quantity_of, surface, thresholds, unit_of, weights};
-use super::onset::{SoftOnset, softened};
+use super::left_out::LeftOut;
+use super::members::LinkPart;
+use super::onset::SoftOnset;
 use super::stages::Stages;
-use super::{Coordinates, Knobs, Scene, choose_fields};
-use crate::body::{Body, Nearest};
-use crate::error::{Error, Result, nearest};
-use crate::field::{Chart, FieldSet, NoChart, WORLD};
+use crate::field::{Chart, NoChart, WORLD};
 use crate::percept::{Outputs, TouchOutputs};
-use crate::signal::{Calibration, Letter, Mark, Quantity, Receptor, Response, TaxelCalibration};
+use crate::signal::{Letter, Mark, Quantity, Receptor, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
 use crate::stage::{filter, layout};
@@ -131,163 +129,6 @@ impl PlanField {
 }
 
 impl Plan {
-    /// The plan for `scene` on `body`, whose fields are `fields`, with one robot's `calibration`.
-    ///
-    /// # Errors
-    /// The body has no taxels or no fields; a glob is malformed or matches nothing; the calibration is for another body
-    /// or has a curve that cannot be computed with; a field mixes quantities; the scene asks for a signal that no sensor has, for no letter, for one
-    /// twice, or for a filter of motion that lets nothing pass.
-    pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
-        if body.taxels.is_empty() {
-            let what = "the body has no taxels: add some, as with `somatic author --taxels 500`";
-            return Err(Error::failed(what).at(&body.name));
-        }
-        if fields.fields.is_empty() {
-            return Err(Error::failed("the body has no fields: add some with `somatic author`").at(&body.name));
-        }
-        calibration.check_body(&body.name)?;
-        let is_fsr = |taxel: &TaxelCalibration| matches!(taxel.response, Response::Fsr(_));
-        Letter::check(&scene.letters)?;
-        let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
-        scene.knobs.check(scene.outputs, has_changes, scene.touches.is_some())?;
-        scene.check_world()?;
-        let signal = scene.letters.iter().find_map(|letter| letter.signal);
-        if let Some(signal) = signal.filter(|_| !calibration.taxels.iter().any(is_fsr)) {
-            return Err(Error::usage(format!(
-                "signal `{signal}` is for sensors of kind `fsr`, and the calibration has none; give it `sensor = \"fsr\"` under [all] or [taxel.ID]"
-            )));
-        }
-        if let Some(name) = calibration.fields.keys().find(|name| !fields.fields.iter().any(|f| f.name == **name)) {
-            let near = nearest(name, fields.fields.iter().map(|field| field.name.as_str()));
-            let hint =
-                near.map_or("`somatic inspect` lists the fields".into(), |near| format!("did you mean `{near}`?"));
-            return Err(Error::failed(format!(
-                "the calibration has thresholds for field `{name}`, which the body does not have: {hint}"
-            ))
-            .at(&body.name));
-        }
-        let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
-        let left_out = LeftOut::of(body, &chosen, fields);
-        let chosen = left_out.feeling(body, chosen, fields)?;
-        let touches = scene.asked_touches();
-        let read: BTreeSet<usize> = chosen
-            .iter()
-            .flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel))
-            .chain((0..body.taxels.len()).filter(|_| touches.is_some()))
-            .filter(|&taxel| is_pressure(body, taxel))
-            .collect();
-        let body_taxels: Vec<usize> = read.into_iter().collect();
-        let channel_of = |taxel: usize| body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
-        let outputs = scene.knobs.orientation_by.applied(scene.outputs);
-        let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibration.taxels[taxel]));
-        let mut plan = Self {
-            outputs,
-            stages: Stages::of(outputs),
-            columns: outputs,
-            letters: scene.letters.clone(),
-            knobs: scene.knobs,
-            relative_to: scene.checked_link(body)?,
-            change_dead_band: calibration.change.dead_band,
-            calibrations,
-            onsets,
-            calibration_changes: 0,
-            areas: body_taxels.iter().map(|&taxel| body.taxels[taxel].area).collect(),
-            calibrated: 0,
-            taxels: Vec::new(),
-            curves: Curves::default(),
-            feels_from: Vec::new(),
-            touched_from: None,
-            touch_outputs: touches.map(|touches| touches.outputs),
-            spread_slots: Vec::new(),
-            heaviest: Vec::new(),
-            left_out,
-            fields: Arc::default(),
-            members: Arc::default(),
-            body_taxels: Vec::new(),
-        };
-        let first_slots = plan.lay_out_slots(calibration)?;
-        if touches.is_some() {
-            plan.find_touches(&first_slots)?;
-        }
-        plan.note_what_is_felt();
-        let nearest = Nearest::new(body);
-        let parents: BTreeSet<usize> = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
-        let (mut plan_fields, mut members) =
-            (Vec::<PlanField>::with_capacity(chosen.len()), Vec::<layout::Member>::new());
-        for (index, field) in chosen.into_iter().map(|index| (index, pressed_members(body, &fields.fields[index]))) {
-            let field = &*field;
-            let (count, unit_m) = (field.members.len(), unit_of(field.radius_m()));
-            let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
-            let first = plan_fields.len();
-            let still = layout::Still::new(plan.sums(count), count, field.radius_m() / f64::from(unit_m));
-            plan_fields.push(PlanField {
-                name: field.name.clone(),
-                letter: 0,
-                link: field.anchor.map_or(WORLD, |anchor| &body.links[anchor].name).to_owned(),
-                anchor: field.anchor,
-                first: members.len(),
-                count,
-                charted: field.chart.is_ok(),
-                divided: parents.contains(&index),
-                quantity: quantity_of(body, field, calibration)?,
-                area_known: field.members.iter().all(|member| body.taxels[member.taxel].area > 0.0),
-                weights: weights(field),
-                unweighted: field.members.iter().all(|member| member.weight as f32 == 1.0),
-                unit_m,
-                thresholds: Thresholds::default(),
-                still,
-                filter: scene.filter.settings(field.spacing_m(), still, f64::from(unit_m))?,
-                parts: if plan.stages().position && scene.coordinates == Coordinates::World {
-                    parts(body, field)
-                } else {
-                    Arc::default()
-                },
-                depths: places.iter().map(|place| place.z as f32).collect(),
-                origin_in_anchor: field.origin_in_anchor,
-                chart: field.chart.as_ref().ok().cloned(),
-                no_chart: field.chart.as_ref().err().cloned(),
-                surface: plan.stages().position.then(|| surface(&nearest, field)).flatten(),
-                spacing: field.spacing_m() / f64::from(unit_m),
-                places,
-            });
-            // The same in every letter, but for what it reads and when it counts as touched.
-            for letter in 1..plan.letters.len() {
-                plan_fields.push(PlanField { letter, ..plan_fields[first].clone() });
-            }
-            for (letter, &first_slot) in first_slots.iter().enumerate() {
-                let in_letter = &mut plan_fields[first + letter];
-                in_letter.first = members.len();
-                in_letter.thresholds = thresholds(calibration, &field.name, plan.letters[letter].receptor);
-                members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
-                    slot: first_slot + channel_of(member.taxel),
-                    weight: member.weight as f32,
-                    u: place.x as f32,
-                    v: place.y as f32,
-                }));
-            }
-        }
-        let weights = |field: &PlanField| members[field.first..][..field.count].iter().map(|member| member.weight);
-        plan.heaviest = plan_fields.iter().map(|field| weights(field).fold(0.0, f32::max)).collect();
-        let spread = plan_fields.iter().filter(|field| !field.parts.is_empty());
-        let slots = spread.flat_map(|field| members[field.first..][..field.count].iter().map(|member| member.slot));
-        plan.spread_slots = slots.collect::<BTreeSet<u32>>().into_iter().collect();
-        plan.body_taxels = body_taxels;
-        plan.fields = plan_fields.into();
-        plan.members = members.into();
-        plan.stages.hysteresis = plan.fields.iter().any(|field| field.thresholds != Thresholds::default());
-        if plan.stages.hysteresis {
-            plan.columns |= Outputs::TOTAL;
-        }
-        if plan.stages().position || plan.stages().filter {
-            plan.columns |= Outputs::CENTROID;
-        }
-        plan.columns |= plan.read_back();
-        if plan.stages().motion || plan.stages().filter {
-            plan.columns |= Outputs::ACTIVE;
-        }
-        Ok(plan)
-    }
-
     /// What places in the world are said to be in: `world`, or the link of [`Scene::relative_to`].
     #[must_use]
     pub fn world(&self) -> &str {

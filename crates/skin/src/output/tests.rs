@@ -2,7 +2,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::error::Result;
+use crate::error::{ErrorKind, Result};
 
 /// A folder with a file `in.csv` that holds `mine`.
 fn with_input() -> (tempfile::TempDir, PathBuf) {
@@ -117,7 +117,7 @@ fn a_part_takes_nobodys_name() {
 #[test]
 fn what_cannot_be_written_is_told_before() {
     let (folder, file) = with_input();
-    assert!(OutputPath::new(folder.path().join("no/such"), false, &[]).unwrap_err().is_not_found());
+    assert_eq!(OutputPath::new(folder.path().join("no/such"), false, &[]).unwrap_err().kind(), ErrorKind::NotFound);
     for is_folder in [folder.path().to_owned(), folder.path().join("new/"), folder.path().join(".."), "".into()] {
         let why = OutputPath::new(is_folder, true, &[]).unwrap_err().to_string();
         assert!(why.contains("this is a folder"), "{why}");

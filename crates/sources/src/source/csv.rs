@@ -559,7 +559,7 @@ mod tests {
 
     #[test]
     fn a_file_that_is_not_there_is_not_found() {
-        assert!(CsvSource::open("no/such.csv", None).err().unwrap().is_not_found());
+        assert!(CsvSource::open("no/such.csv", None).err().unwrap().kind() == crate::error::ErrorKind::NotFound);
         assert!(CsvSource::open(".", None).err().unwrap().to_string().contains("folder"));
     }
 }

@@ -309,7 +309,8 @@ mod tests {
     fn what_is_not_there_says_so() {
         assert!(SourceSpec::Mcap("no/such.mcap".into()).open(&[1], &VendorOptions::default()).is_err());
         assert!(
-            SourceSpec::Sim("no/such.toml".into()).open(&[1], &VendorOptions::default()).err().unwrap().is_not_found()
+            SourceSpec::Sim("no/such.toml".into()).open(&[1], &VendorOptions::default()).err().unwrap().kind()
+                == crate::error::ErrorKind::NotFound
         );
         assert!(
             SourceSpec::Stdin
@@ -319,7 +320,8 @@ mod tests {
                 .is_usage()
         );
         assert!(
-            SourceSpec::Csv("no/such.csv".into()).open(&[1], &VendorOptions::default()).err().unwrap().is_not_found()
+            SourceSpec::Csv("no/such.csv".into()).open(&[1], &VendorOptions::default()).err().unwrap().kind()
+                == crate::error::ErrorKind::NotFound
         );
     }
 }

@@ -28,7 +28,8 @@ use crate::body::{Glb, MAX_TAXEL_ID, Modality, Original, Taxel};
 use crate::error::{Error, Result, failed};
 use crate::limits::{MAX_RAY_TESTS, MAX_TAXELS};
 use crate::recipe::Recipe;
-use crate::skin::{Authored, PlaceReport, author};
+use crate::report::PlaceReport;
+use crate::skin::{Authored, author};
 
 /// A ray that meets a surface flatter than this tells no area of it.
 const MIN_COSINE: f64 = 0.2;

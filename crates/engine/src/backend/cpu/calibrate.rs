@@ -142,10 +142,10 @@ pub(super) fn tile<S: Simd>(
     any
 }
 
-/// As [`tile`], for a row of raw bits a frame, if nothing is to be said of any value: whether any taxel is pressed. Without
-/// a word `pressures` has nothing of use.
+/// Calibrates a tile as [`tile`] does, for rows of raw bits, one a frame, if no value needs a flag. Returns whether any taxel is
+/// pressed, and `None` if a value needs a flag: `pressures` is then of no use.
 ///
-/// What has to hold for every value is asked once, of the largest and smallest of each taxel. `sort` is the tile's.
+/// Conditions on every value are tested on each taxel's largest and smallest value only. `sort` is the tile's.
 #[inline(always)]
 pub(super) fn plain<S: Simd>(
     simd: S,

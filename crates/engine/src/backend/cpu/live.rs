@@ -216,7 +216,7 @@ impl Frame<'_> {
     ) {
         let threads = 1 + others.len();
         let wide = wide.iter().zip(wide_answers).zip(stale_wide).filter(|(_, stale)| **stale);
-        // Several at a time, and yet enough to choose from.
+        // A task is several sets of fields, so that taking one costs little, but each thread has about 16 tasks, so that all end together.
         let some = (narrow.len() / (16 * threads)).next_multiple_of(together).max(together);
         let narrow = narrow.chunks(some).zip(narrow_answers.chunks_mut(some)).zip(stale_narrow.chunks(some));
         let (wide, narrow) = (Tasks::new(wide), Tasks::new(narrow));

@@ -127,7 +127,7 @@ pub(super) fn all_stages<S: Simd, P: Sweep<S>, K: Kind<S>>(
     answers: &mut [Answers],
 ) {
     let Wanted { stages, compensated, .. } = wanted;
-    // Runs a stage on every vector of lanes of all sets.
+    // Runs a stage on all sets of fields, one vector of lanes after the other.
     macro_rules! for_each_vector {
         (|$members:pat_param, $kind:ident, $at:ident, $between:ident, $answers:ident| $stage:expr) => {
             for (index, ($answers, $between)) in answers.iter_mut().zip(&mut *between).enumerate() {

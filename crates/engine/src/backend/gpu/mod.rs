@@ -69,14 +69,14 @@ pub(crate) struct Gpu {
     results: wgpu::Buffer,
     /// Per taxel and frame, where they are read back.
     pressures: Option<wgpu::Buffer>,
-    /// Per field, the power of two that its lengths are counted in, m.
+    /// Per field, the unit of its lengths, m: a power of two, so that dividing by it is exact.
     units_m: Vec<f32>,
-    /// By field, contact and centroid of the last frame, as hysteresis and motion keep them.
+    /// Per field, contact and centroid of the last frame, which hysteresis and motion start from.
     memory: [wgpu::Buffer; 2],
 }
 
 impl Gpu {
-    /// The backend for `plan` on the process's device, for calls of about `batch` frames.
+    /// Makes the backend for `plan` on the process's device. Buffers have room for `batch` frames, and grow where a call has more.
     pub(crate) fn new(plan: &Plan, batch: usize) -> Result<Self> {
         Self::on(adapter::shared()?, plan, batch)
     }

@@ -1,12 +1,12 @@
-//! A plan's fields on the device: those of very many members in parts, and all of them in shares, as a device binds only so
-//! many members at once.
+//! How a plan's fields are laid out for the device. A field with very many members is cut into **parts**. Fields and parts are
+//! grouped into **shares**: a device can bind a limited number of members at once, and a share fits.
 
 use std::ops::Range;
 
 use crate::scene::Plan;
 use crate::stage::layout::{self, AREA_KNOWN, CHARTED, WIDE};
 
-/// All fields.
+/// All fields of a plan.
 pub(super) struct Shares {
     pub(super) shares: Vec<Share>,
     /// The first part of each field that is in parts.
@@ -18,38 +18,39 @@ pub(super) struct Shares {
 /// Fields, and parts of wide ones, whose members fit into one table.
 #[derive(Default)]
 pub(super) struct Share {
-    /// Of the plan's members.
+    /// Its members, as indices into those of the plan.
     pub(super) members: Range<usize>,
     pub(super) narrow: Vec<layout::Field>,
-    /// Wide ones that are not in parts.
+    /// Wide fields that are not cut into parts.
     pub(super) wide: Vec<layout::Field>,
     pub(super) parts: Vec<layout::Part>,
 }
 
-/// Parts of a field at most: what each has found is read once for each of the others.
+/// The most parts of a field: each part reads the results of all others, so the work grows with their square.
 const MOST_PARTS: usize = 256;
 
-/// How many parts of at most `of_part` members a field of `count` is cut into, or as few members more as it takes.
-pub(super) fn parts(count: usize, of_part: usize) -> usize {
-    match count.div_ceil(of_part) {
+/// How many parts a field of `count` members is cut into: parts have at most `most_of_part` members, or as few more as keep
+/// their number within [`MOST_PARTS`]. 0 leaves the field whole.
+pub(super) fn parts(count: usize, most_of_part: usize) -> usize {
+    match count.div_ceil(most_of_part) {
         0 | 1 => 0,
         parts => parts.min(MOST_PARTS),
     }
 }
 
 impl Shares {
-    /// The fields of `plan`, those of more than `of_part` members in [`parts`], which have 64 members or more, and all in shares
-    /// of at most `most`, or a part's.
-    pub(super) fn new(plan: &Plan, of_part: usize, most: usize) -> Self {
+    /// Lays out the fields of `plan`. Fields with more than `most_of_part` members are cut into [`parts`] of at least 64 members.
+    /// A share has at most `most_of_share` members; a field or part that has more is a share of its own.
+    pub(super) fn new(plan: &Plan, most_of_part: usize, most_of_share: usize) -> Self {
         let mut all = Self { shares: Vec::new(), firsts: Vec::new(), parts: 0 };
         for (index, field) in plan.fields.iter().enumerate() {
             let known = if field.charted { CHARTED } else { 0 } | if field.area_known { AREA_KNOWN } else { 0 };
-            let (count, first) = (parts(field.count, of_part), all.parts);
-            // About of one size, so that each of a group's invocations has members.
+            let (count, first) = (parts(field.count, most_of_part), all.parts);
+            // Parts are about equally large, so that every invocation of a group has members.
             let cut = |part: usize| field.count * part / count.max(1);
             for part in 0..count.max(1) {
                 let (before, end) = (cut(part), cut(part + 1));
-                let share = all.with_room(field.first + before..field.first + end, most.max(end - before));
+                let share = all.with_room(field.first + before..field.first + end, most_of_share.max(end - before));
                 let first_member = (field.first + before - share.members.start) as u32;
                 let members =
                     layout::Field { first: first_member, count: (end - before) as u32, known, index: index as u32 };

@@ -1,7 +1,8 @@
 //! Edges by places alone, between taxels of one link that no surface connects.
 //!
 //! Two taxels have an edge if no other is strictly inside the ball that has the line between them as its diameter (Gabriel and
-//! Sokal 1969), if they are at most 2 √(the larger cell) apart, and if their normals are within 90°.
+//! Sokal 1969), if they are at most 2 √(the larger cell) apart, and if their normals are within 120°. Those of two faces at a box's
+//! edge are, and at the sharper edges of covers; those of the two sides of a plate are not.
 
 use glam::DVec3;
 
@@ -12,6 +13,9 @@ const INSIDE_SHARE: f64 = 1e-5;
 
 /// Limit of an edge's length over the root of the larger cell.
 pub(super) const LENGTH_PER_ROOT: f64 = 2.0;
+
+/// cos 120°. Within 90° half of the presses over an edge of Go2's covers were two touches.
+const MIN_NORMAL_COSINE: f64 = -0.5;
 
 /// A taxel of a link.
 pub(super) struct LinkPoint {
@@ -41,7 +45,7 @@ pub(super) fn edges(points: &[LinkPoint]) -> Vec<(u32, u32)> {
             let beyond = &points[other];
             if is_own
                 && are_apart(point, beyond)
-                && point.normal.dot(beyond.normal) > 0.0
+                && point.normal.dot(beyond.normal) > MIN_NORMAL_COSINE
                 && is_free(&tree, points, index, other)
             {
                 found.push((point.taxel.min(beyond.taxel), point.taxel.max(beyond.taxel)));

@@ -103,6 +103,39 @@ fn shells_of_one_link_are_stitched_and_links_are_not() {
     assert!(pairs(&apart).iter().all(|&(a, b)| a / 25 == b / 25));
 }
 
+/// Two faces whose taxels meet at an edge along y; their normals are `between` apart, and all of it is turned by `turn`.
+fn edge_of_two_faces(between: f64, turn: glam::DQuat) -> TaxelGraph {
+    let top: Vec<Taxel> = grid(0, 3, 3, DVec3::new(0.005, 0.005, 0.0));
+    let tilt = glam::DQuat::from_rotation_y(-between);
+    let side = top.iter().map(|one| {
+        let DVec3 { x, y, .. } = one.position_in_link;
+        let position_in_link = tilt * DVec3::new(-x, y, 0.0);
+        Taxel { id: one.id + 9, position_in_link, normal_in_link: tilt * DVec3::Z, ..one.clone() }
+    });
+    let turned = |one: Taxel| Taxel {
+        position_in_link: turn * one.position_in_link,
+        normal_in_link: (turn * one.normal_in_link).as_vec3().as_dvec3(),
+        ..one
+    };
+    let all: Vec<Taxel> = top.iter().cloned().chain(side).map(turned).collect();
+    TaxelGraph::made(&body(&[], &all, &[]))
+}
+
+#[test]
+fn faces_at_an_edge_are_stitched_and_the_sides_of_a_plate_are_not() {
+    // The meshes of robots are often faces that share no vertices.
+    for (degrees, is_edge) in [(0.0_f64, true), (90.0, true), (115.0, true), (125.0, false), (170.0, false)] {
+        for step in 0..8 {
+            let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3 * f64::from(step), 0.7 * f64::from(step), 0.2);
+            let graph = edge_of_two_faces(degrees.to_radians(), turn);
+            for row in 0..3 {
+                let is_stitched = graph.neighbours(3 * row).contains(&(9 + 3 * row as u32));
+                assert_eq!(is_stitched, is_edge, "{degrees}°, turn {step}, row {row}");
+            }
+        }
+    }
+}
+
 #[test]
 fn what_is_no_pressure_taxel_is_no_node_and_one_place_is_one_node() {
     let mut taxels = grid(0, 4, 4, DVec3::ZERO);

@@ -39,7 +39,7 @@ use self::whole_truth::{Moment, TouchOfBody};
 use super::Source;
 use crate::body::{Body, Modality, Taxel};
 use crate::bundled;
-use crate::error::{Error, Result, failed};
+use crate::error::{Error, ErrorKind, Result, failed};
 use crate::field::FieldSet;
 use crate::keys::Text;
 use crate::limits::{self, MAX_TOML_BYTES};
@@ -395,7 +395,7 @@ fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
         return Body::from_bytes(name, bytes);
     }
     Body::load(folder.join(body.get_ref())).map_err(|e| {
-        if e.is_not_found() {
+        if e.kind() == ErrorKind::NotFound {
             text.unknown(body, "body", bundled.map(|(name, _)| name))
         } else {
             text.wrong(body.span(), e.to_string())
