@@ -6,11 +6,9 @@ mod survey;
 
 use std::process::ExitCode;
 
-use clap::Parser as _;
-
 fn main() -> ExitCode {
     quieten_mesa();
-    let arguments = match cli::Arguments::try_parse() {
+    let arguments = match cli::arguments() {
         Ok(arguments) => arguments,
         Err(answer) => return cli::answer(&answer),
     };

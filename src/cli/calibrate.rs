@@ -47,7 +47,7 @@ The file is TOML; its keys may be edited:
   noise = 0.8                   # standard deviation of a raw value
   mask = false                  # true leaves the sensor out";
 
-/// Find baselines, noise, direction and range of a robot's sensors, and write them down as its calibration.
+/// Find baselines, noise, range and gains of sensors, and write a calibration.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

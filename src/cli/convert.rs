@@ -35,7 +35,9 @@ Frames come through bit for bit. A CSV has no place for poses, body and calibrat
 no percepts: make them with `somatic run`. Of a skin, taxels come back by `somatic author --csv-skin`
 and `--urdf-skin`: id, link, place, normal and area; fields are made anew, meshes stay behind.";
 
-/// Turn a recording into one of another kind, CSV and MCAP, either way; or the skin of a body into a table or a URDF.
+/// Turn a recording or a skin into another format.
+///
+/// Recordings are CSV or MCAP, either way; the skin of a body becomes a table or a URDF.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

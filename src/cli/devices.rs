@@ -19,7 +19,7 @@ Examples:
 Ports are looked at and not opened. Pseudo-terminals are not listed; a source can name them all
 the same.";
 
-/// Say which GPUs and serial ports there are, what each can do, and what it lacks.
+/// List GPUs and serial ports, and what each can do.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

@@ -27,7 +27,7 @@ Examples:
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording could not be read.";
 
-/// Say how long a recording is, how fast and how evenly its frames came, and what else it holds.
+/// Describe a recording: length, rate, gaps, and what else it holds.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

@@ -29,7 +29,7 @@ Examples:
   somatic inspect arm.glb --joints arm.urdf
   somatic inspect robot.glb --strict > /dev/null || echo 'look at the findings'";
 
-/// Say what links, taxels and fields a body has, and what is odd about it.
+/// List a body's links, taxels and fields, and what is wrong with them.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

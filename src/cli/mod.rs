@@ -23,6 +23,7 @@ mod exports;
 mod feed;
 mod files;
 mod first_source;
+mod help;
 mod info;
 mod input;
 mod inspect;
@@ -33,6 +34,7 @@ mod latency;
 mod lines;
 mod live;
 mod old_names;
+mod outputs;
 mod overlaid;
 mod paper;
 mod plan;
@@ -59,7 +61,7 @@ mod words;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use somatic::{Error, Result};
 
 pub(crate) use self::stdio::say;
@@ -83,32 +85,19 @@ All commands: somatic --help. First flags of one: somatic run -h
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic run                                   watch a recorded touch on the bundled hand
-  somatic run | jq -c '.fields[] | [.field, .total]'
-  somatic run --body robot.glb --source touch.csv --sink percepts.ndjson   or percepts.csv, a table
+  somatic run                                             watch a touch on the bundled hand
+  somatic view touch.mcap --open                          see a recording on the body, in a browser
+  somatic author robot.urdf --taxels 500 -o robot.glb     a skin for a robot, or for a mesh
+  somatic run --body robot.glb --source touch.csv --sink percepts.csv
+  somatic run --source serial:/dev/ttyUSB0 --wiring hand.toml
   robot-driver | somatic run --body robot.glb --source - | controller
-  somatic run --source serial:/dev/ttyUSB0 --wiring hand.toml     live, from a board on a serial line
-  somatic view touch.mcap --open                see a recording on the body, in a browser
-  somatic inspect robot.glb                     what taxels and fields a body has
-  somatic author mesh.glb --taxels 500 -o robot.glb   a skin for a mesh
-  somatic author --grid 64x32 --pitch 25.4mm -o mat.glb   a flat sheet of sensors
-  somatic render robot.glb -o robot.png         a picture of them
-  somatic plan --outputs centroid               what is computed, what is not, and the cost
-  somatic tradeoff --within '0.5 mm, 2 deg'     the fastest knobs within a tolerance, here
-  somatic simulate touch.toml -o touch.csv      a simulated touch, with the truth
-  somatic tune --source serial:/dev/ttyUSB0 -o hand.toml   set the sensors' potentiometers
-  somatic board --link /tmp/hand                a simulated hand on a serial line
-  somatic plot touch.mcap -o touch.svg          load over time, highest pressures, their centre's path
-  somatic info touch.mcap                       how long a recording is, and what is in it
-  somatic bench --sensors 1000 --fields 100     the speed of this machine
-  somatic devices                               which GPUs and serial ports it has
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never processed.";
 
-/// A sense of touch for whole robots: touch frames in, percepts out.
+/// A sense of touch for whole robots: raw values of sensors in, touches out.
 ///
-/// It reads where the sensors sit from a glTF body, groups them into receptive fields, and says for every field and
-/// frame where the touch is, how strong, and how it is oriented.
+/// A glTF body says where the sensors are. For every touch on it, and for every receptive field, somatic tells where it
+/// is, how hard it presses, how it lies and how it moves.
 #[derive(Parser)]
 #[command(name = "somatic", version, after_help = EXAMPLES, max_term_width = 100)]
 pub(crate) struct Arguments {
@@ -138,12 +127,25 @@ enum Command {
     Calibrate(calibrate::Arguments),
     Tune(tune::Arguments),
     Devices(devices::Arguments),
+    Outputs(outputs::Arguments),
     Completions(completions::Arguments),
+}
+
+/// The command as clap has it.
+fn command() -> clap::Command {
+    help::in_groups(Arguments::command())
+}
+
+/// The arguments of this process, or what to answer instead: help, or what is wrong.
+pub(crate) fn arguments() -> Result<Arguments, clap::Error> {
+    let mut command = command();
+    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
 /// Prints what the arguments are answered with, help or what is wrong with them, and gives the exit code.
 pub(crate) fn answer(answer: &clap::Error) -> ExitCode {
-    match old_names::told(answer, &Arguments::command()) {
+    match old_names::told(answer, &command()) {
         Some(what) => {
             let error = Error::usage(what);
             say(&format!("{}: {error}", console::style("error").red().bold().for_stderr()));
@@ -157,11 +159,11 @@ pub(crate) fn answer(answer: &clap::Error) -> ExitCode {
 pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
     stdio::refuse_closed_output();
     interrupt::heed_signals()?;
-    let Some(command) = &arguments.command else {
+    let Some(subcommand) = &arguments.command else {
         print(GREETING)?;
         return Ok(DONE);
     };
-    match command {
+    match subcommand {
         Command::Run(arguments) => run::run(arguments),
         #[cfg(feature = "page")]
         Command::View(arguments) => view::view(arguments),
@@ -182,6 +184,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Calibrate(arguments) => calibrate::calibrate(arguments),
         Command::Tune(arguments) => tune::tune(arguments),
         Command::Devices(arguments) => devices::devices(arguments),
-        Command::Completions(arguments) => completions::completions(arguments, &mut Arguments::command()),
+        Command::Completions(arguments) => completions::completions(arguments, &mut command()),
+        Command::Outputs(arguments) => outputs::outputs(arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_is_in_one_group_of_the_help_and_its_line_fits_a_terminal() {
+        let command = command();
+        for subcommand in command.get_subcommands() {
+            let groups = help::GROUPS.iter().filter(|(_, names)| names.contains(&subcommand.get_name()));
+            assert_eq!(groups.count(), 1, "{}", subcommand.get_name());
+        }
+        let text = help::groups(&command);
+        assert!(text.lines().all(|line| line.chars().count() <= 90), "{text}");
     }
 }

@@ -20,7 +20,9 @@ Examples:
 table.json and table.md have the errors of place and direction for each indenter, signal, speed and
 noise; the figures are drawn as the paper has them.";
 
-/// Do the paper's experiments in simulation: its Figs. 3, 6 and 7, and a table of errors against the truth.
+/// Repeat the paper's experiments in simulation.
+///
+/// These are its Figs. 3, 6 and 7, with a table of errors against the truth.
 ///
 /// Writes fig3, fig6 and fig7 as .svg and .png, and the table as table.md and table.json, and prints their names.
 #[derive(Args)]

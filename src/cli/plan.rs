@@ -28,7 +28,7 @@ Examples:
 Times are measured now, on this machine: on the first frames of a recording, else with every
 taxel pressed. A stage's time is what a plan with it takes more than a plan without.";
 
-/// Say what a scene computes and what not, why, and what each stage costs.
+/// Show what a scene computes, what it leaves out, and what it costs.
 #[derive(Args)]
 #[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {

@@ -35,7 +35,9 @@ same scales. Without --fields, it shows the topmost fields, or those below a sin
 /// Most recordings of a plot.
 const MAX_RECORDINGS: usize = 8;
 
-/// Draw recordings: load and area over time, highest pressures with the path of their centre, pressure–time integrals.
+/// Draw recordings: load over time, highest pressures, path of the centre.
+///
+/// Also the area in contact and pressure–time integrals.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

@@ -34,7 +34,9 @@ and spread, an arrow its motion of a quarter of a second, and a fading line wher
 last second. Without a recording a taxel in several fields shows a slice of each. Up to twelve
 fields are named; of more, those side by side differ in colour.";
 
-/// Draw a body, its taxels coloured by field, or by their pressures in a recording.
+/// Draw a body with its taxels, or a touch.
+///
+/// Taxels are coloured by field, or by their pressures in a recording.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

@@ -66,7 +66,7 @@ under t,<taxel id>,...
 At a terminal a table of the touched fields is shown until q or Ctrl-C; into a pipe goes a line
 of JSON a frame.";
 
-/// Turn touch frames into percepts, live or from a recording.
+/// Turn frames into touches and percepts, live or from a recording.
 #[derive(Args)]
 #[command(after_help = FIRST_EXAMPLES, after_long_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {

@@ -47,7 +47,9 @@ A simulation is TOML: the body, the rate, and touches, which move along paths in
 
 The truth has a row per frame and touch: its place, normal, angle, velocity, speed and force.";
 
-/// Write a simulated touch down as a recording, with what is true in it and its sensors' calibration beside it.
+/// Write a simulated touch as a recording, with its truth.
+///
+/// Beside the recording come a table of the truth and the sensors' calibration.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

@@ -47,7 +47,9 @@ const FRAMES: usize = 512;
 /// Values that these hold at most, about.
 const VALUES: usize = 1 << 24;
 
-/// Measure speed against accuracy, knob by knob, on your own body, recording and machine.
+/// Measure speed against accuracy on your body and machine.
+///
+/// It goes knob by knob, on touches simulated on your body, or on a recording.
 #[derive(Args)]
 #[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped), mut_arg("within", first), mut_arg("budget", first))]
 pub(super) struct Arguments {

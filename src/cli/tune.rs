@@ -34,7 +34,7 @@ five rounds.
 What stands in the file written by -o is set again by every command that has it as its --wiring,
 whenever a board starts. Ctrl-C puts all wipers back.";
 
-/// Set the boards' potentiometers so that their sensors use the converters' range.
+/// Set boards' potentiometers so that sensors use the converters' range.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

@@ -57,7 +57,9 @@ Whatever else the file holds stays as it is. A layout that it has is replaced; a
 is brought up to date, as after editing it in Blender:
   somatic author edited.glb -o skin.glb";
 
-/// Put a skin on a mesh: taxels placed as asked, in fields, in a file that Blender and every glTF viewer open.
+/// Put a skin on a mesh or a robot.
+///
+/// Taxels are placed as asked, in fields, in a file that Blender and every glTF viewer open.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {

@@ -65,7 +65,7 @@ enum Wipers {
     Ignored,
 }
 
-/// Play boards on pseudo-terminals: the live path without hardware.
+/// Play boards on pseudo-terminals, without hardware.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
