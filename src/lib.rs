@@ -65,6 +65,7 @@ mod ink;
 pub mod picture;
 #[cfg(feature = "cli")]
 pub mod plot;
+mod scene_file;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 
@@ -130,6 +131,14 @@ pub mod scene {
         Arithmetic, AskedOutputs, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy,
         Plan, PlannedStage, Scene, choose_fields,
     };
+
+    /// Scene files: all that a run is asked to do, as a person writes it down.
+    pub mod file {
+        #[doc(inline)]
+        pub use crate::scene_file::{
+            Accuracy, JointsDelay, LineKeys, SceneFile, StatesSpec, Target, TouchKeys, angle, length, time,
+        };
+    }
 }
 
 /// Touches of the whole body, found on its skin.
@@ -243,13 +252,13 @@ pub mod sink {
     pub use somatic_sinks::sink::{ArrowTable, TableKind};
     #[doc(inline)]
     pub use somatic_sinks::sink::{
-        CsvSink, FieldNames, Flow, InputFrames, LimbSends, NdjsonSink, News, Pressures, Question, RecordPart, Session,
-        Sink, SinkSpec, SinkTarget, SkinNames, TableColumn, TableName, TableType, TableWish, percept_columns,
+        CsvSink, FieldNames, Flow, InputFrames, LimbSends, NdjsonSink, News, Pressures, Question, RecordPart, RosTime,
+        Session, Sink, SinkSpec, SinkTarget, SkinNames, TableColumn, TableName, TableType, TableWish, percept_columns,
         self_contact_columns, touch_columns,
     };
     #[cfg(feature = "mcap")]
     #[doc(inline)]
-    pub use somatic_sinks::sink::{RecordingSink, Ros2BagSink, RosTime};
+    pub use somatic_sinks::sink::{RecordingSink, Ros2BagSink};
     #[cfg(feature = "zenoh")]
     #[doc(inline)]
     pub use somatic_sinks::sink::{ZenohSink, limb_frame_bytes, limb_percept_bytes};

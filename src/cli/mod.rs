@@ -46,7 +46,6 @@ mod run;
 mod scene;
 mod screen;
 mod simulate;
-mod states_from;
 mod stdio;
 mod table;
 mod tradeoff;
