@@ -68,6 +68,7 @@ pub mod picture;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod plot;
+mod scene_file;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 
@@ -139,6 +140,14 @@ pub mod scene {
     };
     #[doc(hidden)]
     pub use somatic_engine::scene::{AskedOutputs, PlannedStage, choose_fields};
+
+    /// Scene files: all that a run is asked to do, as a person writes it down.
+    pub mod file {
+        #[doc(inline)]
+        pub use crate::scene_file::{
+            Accuracy, JointsDelay, LineKeys, SceneFile, StatesSpec, Target, TouchKeys, angle, length, time,
+        };
+    }
 }
 
 /// Touches of the whole body, found on its skin.
@@ -265,7 +274,7 @@ pub mod sink {
     pub use somatic_sinks::sink::{ArrowTable, TableKind};
     #[doc(inline)]
     pub use somatic_sinks::sink::{
-        CsvSink, FieldNames, Flow, InputFrames, NdjsonSink, Session, Sink, SinkSpec, SinkTarget,
+        CsvSink, FieldNames, Flow, InputFrames, NdjsonSink, RosTime, Session, Sink, SinkSpec, SinkTarget,
     };
     #[doc(hidden)]
     pub use somatic_sinks::sink::{
@@ -274,7 +283,7 @@ pub mod sink {
     };
     #[cfg(feature = "mcap")]
     #[doc(inline)]
-    pub use somatic_sinks::sink::{RecordingSink, Ros2BagSink, RosTime};
+    pub use somatic_sinks::sink::{RecordingSink, Ros2BagSink};
     #[cfg(feature = "zenoh")]
     #[doc(hidden)]
     pub use somatic_sinks::sink::{limb_frame_bytes, limb_percept_bytes};

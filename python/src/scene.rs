@@ -1,148 +1,12 @@
 //! `Scene`: what is asked for, with the keys of scene files.
 
-use std::fmt;
-use std::str::FromStr;
-
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyDictMethods, PyFloat, PyInt, PyString};
-use serde::de::{Error as _, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer};
 use somatic::error::parse_toml;
-use somatic::renamed::new_name;
-use somatic::scene::{
-    Arithmetic, AskedOutputs, Cadence, Charts, Coordinates, Coverage, FilterBy, Knobs, MotionFilter, OrientationBy,
-};
-use somatic::signal::{FsrSignal, Quantity};
-use somatic::{BackendKind, Calibration, Error, Letter, Options, Outputs, Receptor, Scene, TouchOutputs, touch};
+use somatic::scene::file::SceneFile;
+use somatic::{BackendKind, Calibration, Error, Options};
 
 use crate::error::{OrRaise, usage};
-
-/// Keys of scene files that say where frames come from and go to, and how a run is shown: the command's.
-const OF_THE_COMMAND: [&str; 31] = [
-    "accuracy",
-    "all_fields",
-    "allow_host",
-    "board_rate_hz",
-    "body",
-    "budget",
-    "calibration",
-    "centroid",
-    "format",
-    "from_s",
-    "grid",
-    "header",
-    "layout",
-    "live_rate_hz",
-    "loop",
-    "orientation",
-    "overwrite",
-    "pitch",
-    "playback_speed",
-    "quiet",
-    "rate_hz",
-    "record",
-    "sink",
-    "source",
-    "strict",
-    "to_s",
-    "unit",
-    "verify",
-    "wiring",
-    "within",
-    "zenoh_config",
-];
-
-/// When touches of the whole body begin and end.
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct TouchKeys {
-    on: f64,
-    off: f64,
-}
-
-impl TouchKeys {
-    fn options(self, outputs: TouchOutputs) -> touch::Options {
-        touch::Options { on: self.on, off: self.off, outputs, ..touch::Options::default() }
-    }
-}
-
-/// The keys of a scene that say what is computed.
-#[derive(Clone, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub(crate) struct Keys {
-    #[serde(deserialize_with = "list")]
-    outputs: Vec<AskedOutputs>,
-    touch: Option<TouchKeys>,
-    #[serde(deserialize_with = "list")]
-    fields: Vec<String>,
-    #[serde(deserialize_with = "list")]
-    letters: Vec<Receptor>,
-    #[serde(deserialize_with = "list")]
-    signal: Vec<FsrSignal>,
-    #[serde(deserialize_with = "word")]
-    backend: Option<BackendKind>,
-    batch: Option<u16>,
-    tare: bool,
-    #[serde(deserialize_with = "word")]
-    coordinates: Option<Coordinates>,
-    relative_to: Option<String>,
-    max_gap_s: Option<f64>,
-    contact_tolerance_m: Option<f64>,
-    max_age_s: Option<f64>,
-    filter_window: Option<String>,
-    #[serde(deserialize_with = "word")]
-    filter_by: Option<FilterBy>,
-    filter_time_s: Option<f64>,
-    filter_over_s: Option<f64>,
-    accuracy: KnobKeys,
-}
-
-/// The knobs of a scene.
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct KnobKeys {
-    #[serde(deserialize_with = "word")]
-    arithmetic: Option<Arithmetic>,
-    #[serde(deserialize_with = "word")]
-    charts: Option<Charts>,
-    #[serde(deserialize_with = "word")]
-    orientation_by: Option<OrientationBy>,
-    #[serde(deserialize_with = "word")]
-    coverage: Option<Coverage>,
-    #[serde(deserialize_with = "word")]
-    cadence: Option<Cadence>,
-}
-
-/// One text or a list of them.
-struct Texts<T>(std::marker::PhantomData<T>);
-
-impl<'de, T: FromStr<Err: fmt::Display>> Visitor<'de> for Texts<T> {
-    type Value = Vec<T>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a text, or a list of texts")
-    }
-
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Vec<T>, E> {
-        text.parse().map(|one| vec![one]).map_err(E::custom)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<T>, A::Error> {
-        let mut all = Vec::new();
-        while let Some(one) = list.next_element::<String>()? {
-            all.push(one.parse().map_err(A::Error::custom)?);
-        }
-        Ok(all)
-    }
-}
-
-fn list<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(from: D) -> Result<Vec<T>, D::Error> {
-    from.deserialize_any(Texts(std::marker::PhantomData))
-}
-
-fn word<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
-    String::deserialize(from)?.parse().map(Some).map_err(D::Error::custom)
-}
 
 /// What is asked of a body: which fields, which outputs, with which knobs.
 ///
@@ -160,7 +24,7 @@ fn word<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(from: D) -> Re
 /// somatic_touch.UsageError: `sink` is for the command; leave it out of this scene
 #[pyclass(module = "somatic_touch", name = "Scene", frozen)]
 pub(crate) struct PyScene {
-    keys: Keys,
+    file: SceneFile,
     /// As TOML.
     pub(crate) text: String,
 }
@@ -203,18 +67,18 @@ impl PyScene {
     /// The scene in `text`, or an error that has the line.
     fn of_text(py: Python<'_>, text: &str) -> PyResult<Self> {
         let table: toml::Table = parse_toml(text).or_raise(py)?;
-        refuse_the_commands(py, &table)?;
-        let keys: Keys = parse_toml(text).map_err(|error| error.at("scene")).or_raise(py)?;
-        keys.check().or_raise(py)?;
-        Ok(Self { keys, text: text.to_owned() })
+        if let Some(why) = table.iter().find_map(|(key, value)| why_not(key, value)) {
+            return Err(usage(py, why));
+        }
+        let file = SceneFile::parse(text).map_err(|error| error.at("scene")).or_raise(py)?;
+        file.check().or_raise(py)?;
+        Ok(Self { file, text: text.to_owned() })
     }
 
     /// The same of keys, where an error has the key.
     fn of_table(py: Python<'_>, table: &toml::Table) -> PyResult<Self> {
-        refuse_the_commands(py, table)?;
         for (key, value) in table {
-            let alone = toml::to_string(&toml::Table::from_iter([(key.clone(), value.clone())])).unwrap_or_default();
-            if let Err(error) = parse_toml::<Keys>(&alone) {
+            if let Err(error) = alone(key, value) {
                 // The line of a text that nobody wrote says nothing.
                 let text = error.to_string();
                 let what =
@@ -256,94 +120,33 @@ impl PyScene {
         backend: Option<BackendKind>,
         batch: usize,
     ) -> somatic::Result<Options> {
-        let Keys { letters, signal, accuracy, .. } = &self.keys;
-        let has_unit =
-            |calibration: &Calibration| calibration.taxels.iter().any(|taxel| taxel.quantity != Quantity::Count);
-        let asked = AskedOutputs::all_of(&self.keys.outputs);
-        let are_usual = self.keys.outputs.is_empty();
-        let force = if are_usual && calibration.is_some_and(has_unit) { Outputs::FORCE } else { Outputs::empty() };
-        let outputs = asked.of_fields | force;
-        // Nobody has asked for touches, and there are no pressures to find them in.
-        let in_vain = are_usual && !letters.is_empty() && !letters.contains(&Receptor::Sustained);
-        let touches = asked.of_touches.filter(|_| !in_vain);
-        let letters = if letters.is_empty() { &[Receptor::Sustained][..] } else { letters };
-        let usual = Scene::default();
-        let knobs = Knobs::default()
-            .arithmetic(accuracy.arithmetic)
-            .charts(accuracy.charts.unwrap_or_default())
-            .orientation_by(accuracy.orientation_by.unwrap_or_default())
-            .coverage(accuracy.coverage.unwrap_or_default())
-            .cadence(accuracy.cadence.unwrap_or_default());
-        let scene = Scene::default()
-            .outputs(outputs)
-            .fields(self.keys.fields.clone())
-            .max_age_s(self.keys.max_age_s.unwrap_or(usual.max_age_s))
-            .max_gap_s(self.keys.max_gap_s.unwrap_or(usual.max_gap_s))
-            .letters(Letter::all_of(letters, signal))
-            .filter(self.keys.filter()?)
-            .knobs(knobs)
-            .contact_tolerance_m(self.keys.contact_tolerance_m)
-            .touches(touches.map(|outputs| self.keys.touch.unwrap_or_default().options(outputs)))
-            .relative_to(self.keys.relative_to.clone())
-            .coordinates(self.keys.coordinates.unwrap_or(usual.coordinates));
-        Ok(Options::default()
-            .scene(scene)
-            .calibration(calibration.cloned())
-            .backend(backend.or(self.keys.backend).unwrap_or_default())
-            .tare(self.keys.tare)
-            .batch(self.keys.batch.map_or(batch, usize::from)))
+        let batch = self.file.batch.map_or(batch, |frames| frames as usize);
+        let options = self.file.engine_options(calibration.cloned(), true, batch)?;
+        Ok(match backend {
+            Some(backend) => options.backend(backend),
+            None => options,
+        })
     }
 }
 
-fn refuse_the_commands(py: Python<'_>, table: &toml::Table) -> PyResult<()> {
-    let knobs = table.get("accuracy").and_then(toml::Value::as_table);
-    let wishes = ["budget", "centroid", "orientation", "within"];
-    if let Some(wish) = knobs.and_then(|knobs| wishes.into_iter().find(|wish| knobs.contains_key(*wish))) {
-        let what =
-            format!("accuracy: `{wish}` is measured by the command: `somatic tradeoff --write`; give knobs here");
-        return Err(usage(py, what));
-    }
-    if let Some((key, new)) = table.keys().find_map(|key| Some((key, new_name(key, OF_THE_COMMAND)?))) {
-        return Err(usage(py, format!("`{key}` is `{new}` now, and for the command; leave it out of this scene")));
-    }
-    match table.keys().find(|key| *key != "accuracy" && OF_THE_COMMAND.contains(&key.as_str())) {
-        Some(key) => Err(usage(py, format!("`{key}` is for the command; leave it out of this scene"))),
-        None => Ok(()),
-    }
+/// A scene with this key alone.
+fn alone(key: &str, value: &toml::Value) -> somatic::Result<SceneFile> {
+    let table = toml::Table::from_iter([(key.to_owned(), value.clone())]);
+    SceneFile::parse(&toml::to_string(&table).unwrap_or_default())
 }
 
-impl Keys {
-    fn check(&self) -> somatic::Result<()> {
-        if let Some(age) = self.max_age_s.filter(|age| !(age.is_finite() && *age >= 0.0)) {
-            return Err(Error::usage(format!("max_age_s: {age} is not a time span; give seconds from 0")));
-        }
-        if let Some(gap) = self.max_gap_s.filter(|gap| gap.is_nan() || *gap <= 0.0) {
-            return Err(Error::usage(format!("max_gap_s: {gap} is not a time span; give seconds over 0")));
-        }
-        if let Some(tolerance) = self.contact_tolerance_m.filter(|it| !(it.is_finite() && *it > 0.0)) {
-            return Err(Error::usage(format!("contact_tolerance_m: {tolerance} is no distance; give metres over 0")));
-        }
-        if let Some(TouchKeys { on, off }) = self.touch
-            && !([on, off].iter().all(|p| p.is_finite() && *p >= 0.0) && off <= on)
-        {
-            return Err(Error::usage(format!(
-                "touch: on = {on} and off = {off}: give numbers from 0 on, off no larger than on"
-            )));
-        }
-        if self.batch == Some(0) {
-            return Err(Error::usage("batch: 0 is no number of frames; give one from 1 on"));
-        }
-        self.filter().map(drop)
+/// Why this key is not for an engine, if it is one of scenes: it says where frames come from or go to, or how a run is shown.
+fn why_not(key: &str, value: &toml::Value) -> Option<String> {
+    let asked = alone(key, value).ok()?;
+    if asked == asked.of_engine() {
+        return None;
     }
-
-    fn filter(&self) -> somatic::Result<MotionFilter> {
-        let usual = MotionFilter::default();
-        let filter = usual
-            .over_s(self.filter_over_s)
-            .by(self.filter_by.unwrap_or(usual.by))
-            .time_constant_s(self.filter_time_s.unwrap_or(usual.time_constant_s));
-        self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))
-    }
+    Some(match asked.accuracy.target().is_empty() {
+        true => format!("`{key}` is for the command; leave it out of this scene"),
+        false => {
+            format!("`{key}` has a wish, which the command measures: `somatic tradeoff --write`; give knobs here")
+        }
+    })
 }
 
 #[pymethods]
@@ -376,7 +179,7 @@ impl PyScene {
     fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
         let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, &e)).or_raise_of(py, &path)?;
         let mut table: toml::Table = parse_toml(&text).map_err(|e| e.at(path.display())).or_raise_of(py, &path)?;
-        table.retain(|key, _| key == "accuracy" || !OF_THE_COMMAND.contains(&key));
+        table.retain(|key, value| key == "accuracy" || why_not(key, value).is_none());
         Self::of_table(py, &table)
     }
 

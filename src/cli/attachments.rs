@@ -7,17 +7,13 @@ use somatic::recording::{BODY, CALIBRATION, SCENE};
 use somatic::{Body, Error, Result};
 
 use super::attached::{self, body_bytes, file_name};
-use super::scene::RunOptions;
+use super::scene::Asked;
 
 /// The files to attach to a recording of this run: name, media type, bytes.
-pub(super) fn attachments(
-    asked: &RunOptions,
-    body: &Body,
-    scene: Option<&Path>,
-) -> Result<Vec<(String, String, Vec<u8>)>> {
+pub(super) fn attachments(asked: &Asked, body: &Body, scene: Option<&Path>) -> Result<Vec<(String, String, Vec<u8>)>> {
     let text = |path: &Path| limits::read(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e));
-    let recording = asked.recording()?;
-    let inherited = match recording.as_deref() {
+    let recording = asked.recording();
+    let inherited = match recording {
         Some(recording) => attached::body(recording)?,
         None => asked.export_body()?,
     };

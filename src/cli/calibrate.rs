@@ -125,7 +125,7 @@ pub(super) struct Arguments {
 pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let output = &arguments.output;
     let sources: Vec<String> = arguments.sources.iter().chain(&arguments.gains_from).cloned().collect();
-    let read = FilesRead::default().bodies([&arguments.body]).sources(&sources).files(&arguments.lines.wiring);
+    let read = FilesRead::default().bodies([&arguments.body]).named(&sources).files(&arguments.lines.wiring);
     let read = read.files(&arguments.calibration);
     let mut outputs = read.outputs(arguments.force);
     let to = outputs.add(output)?;
@@ -152,7 +152,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     } else if arguments.rate.is_some() {
         return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
     } else {
-        let source = arguments.lines.open(&ports, &ids, None)?;
+        let source = arguments.lines.keys().open(&ports, &ids, None)?;
         let lines = source.lines();
         (Box::new(source), Some(lines))
     };

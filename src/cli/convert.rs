@@ -89,7 +89,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
             .at(&arguments.from));
     }
     let options = arguments.export.options()?;
-    let from = source_of(&arguments.from, Some(&["csv", "mcap", "export", "sim"]), &options);
+    let from = source_of(&arguments.from, &["csv", "mcap", "export", "sim"], &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
     let to = match to_name {
         // As a source it is another kind.
@@ -99,7 +99,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let (SourceSpec::Csv(to_path) | SourceSpec::Mcap(to_path)) = &to else {
         unreachable!("it is of one of these kinds");
     };
-    let read = FilesRead::default().sources(slice::from_ref(&arguments.from)).files(&arguments.calibration);
+    let read = FilesRead::default().named(slice::from_ref(&arguments.from)).files(&arguments.calibration);
     let read = read.files(&arguments.export.layout);
     let output = read.bodies(&arguments.body).outputs(arguments.force).add(to_path)?;
     let (mut source, attached): (Box<dyn Source + Send>, _) = match &from {

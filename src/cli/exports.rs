@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use somatic::Result;
-use somatic::signal::UnitOfP;
+use somatic::scene::file::SceneFile;
 use somatic::source::{SourceSpec, VendorFormat, VendorOptions, VendorSource};
 
 use super::first_source::{Export, Found};
-use super::scene::{RunOptions, one_of};
+use super::scene::{Asked, in_flags, one_of};
 
 /// What is said of a recording beside what its file says.
 #[derive(Args, Clone, Debug, Default)]
@@ -41,29 +41,26 @@ pub(super) struct ExportFlags {
 }
 
 impl ExportFlags {
+    /// What a scene would say of it.
+    pub(super) fn keys(&self) -> SceneFile {
+        let Self { rate, format, grid, pitch, unit, layout } = self.clone();
+        let mut keys = SceneFile::default();
+        (keys.rate_hz, keys.format, keys.grid, keys.pitch) = (rate, format, grid, pitch);
+        (keys.unit, keys.layout) = (unit, layout);
+        keys
+    }
+
     pub(super) fn options(&self) -> Result<VendorOptions> {
-        Ok(VendorOptions {
-            format: self.format,
-            rate_hz: self.rate,
-            grid: self.grid.as_deref().map(VendorOptions::grid_of).transpose()?,
-            pitch_m: self.pitch.as_deref().map(VendorOptions::pitch_of).transpose()?,
-            unit: self.unit.as_deref().map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("--unit"))?,
-            layout: self.layout.clone(),
-        })
+        self.keys().export_options().map_err(in_flags)
     }
 }
 
-impl RunOptions {
-    pub(super) fn export_options(&self) -> Result<VendorOptions> {
-        let Self { rate, format, grid, pitch, unit, layout, .. } = self.clone();
-        ExportFlags { rate, format, grid, pitch, unit, layout }.options()
-    }
-
+impl Asked {
     /// What `look` sees of the first source, which is found out once.
     fn found<T>(&self, look: impl FnOnce(&mut Found) -> Result<T>) -> Result<Option<T>> {
-        let Some(text) = self.sources.first() else { return Ok(None) };
-        let options = self.export_options()?;
-        self.first.look(text, options, look).map(Some)
+        let Some(source) = self.sources.first() else { return Ok(None) };
+        let options = self.export_options().map_err(in_flags)?;
+        self.first.look(source, options, look).map(Some)
     }
 
     /// What `look` sees of the export that is read, if it is one.

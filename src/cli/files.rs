@@ -4,10 +4,8 @@ use std::path::{Path, PathBuf};
 
 use somatic::Body;
 use somatic::output::OutputPaths;
+use somatic::scene::file::{SceneFile, StatesSpec};
 use somatic::source::{BagName, SimulatedSource, SourceSpec};
-
-use super::scene::RunOptions;
-use super::states_from::StatesFrom;
 
 /// Files that a command reads, whether they are there or not.
 #[derive(Default)]
@@ -15,14 +13,14 @@ pub(super) struct FilesRead(Vec<PathBuf>);
 
 impl FilesRead {
     /// Those of `asked`, by flags or by the scene file at `scene`.
-    pub(super) fn of(asked: &RunOptions, scene: Option<&Path>) -> Self {
+    pub(super) fn of(asked: &SceneFile, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
         let named = named.chain(asked.layout.as_deref());
         let named = named.chain(asked.joints.as_deref()).chain(asked.zenoh_config.as_deref());
         let files = Self::default().files(named).bodies(&asked.body).sources(&asked.sources);
-        match asked.joint_states.as_deref().map(StatesFrom::named) {
-            Some(Ok(StatesFrom::File(file))) => files.files([file]),
-            Some(Ok(StatesFrom::Bag(bag))) => files.bag(&bag),
+        match asked.joint_states.as_deref().map(StatesSpec::named) {
+            Some(Ok(StatesSpec::File(file))) => files.files([file]),
+            Some(Ok(StatesSpec::Bag(bag))) => files.bag(&bag),
             _ => files,
         }
     }
@@ -42,11 +40,17 @@ impl FilesRead {
         self.files(within).files([&bag.path])
     }
 
-    /// The files of `sources`; an invalid source is reported when it is opened.
-    pub(super) fn sources(self, sources: &[String]) -> Self {
-        sources.iter().filter_map(|source| source.parse().ok()).fold(self, |files, source| match source {
+    /// The files of sources that are named so; an invalid one is reported when it is opened.
+    pub(super) fn named(self, sources: &[String]) -> Self {
+        let sources: Vec<SourceSpec> = sources.iter().filter_map(|source| source.parse().ok()).collect();
+        self.sources(&sources)
+    }
+
+    /// The files of `sources`.
+    pub(super) fn sources(self, sources: &[SourceSpec]) -> Self {
+        sources.iter().fold(self, |files, source| match source {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => files.files([path]),
-            SourceSpec::Ros2Mcap(bag) => files.bag(&bag),
+            SourceSpec::Ros2Mcap(bag) => files.bag(bag),
             SourceSpec::Sim(path) => files.files(SimulatedSource::files(path)),
             SourceSpec::Stdin | SourceSpec::CsvStdin => files.files(["/dev/stdin"]),
             _ => files,

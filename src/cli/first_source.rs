@@ -8,12 +8,13 @@ use somatic::source::{SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Result};
 
 /// The source `text` as one of `kinds`, and what its content says that it is.
-pub(super) fn source_of(text: &str, kinds: Option<&[&str]>, options: &VendorOptions) -> Result<SourceSpec> {
-    let spec = match kinds {
-        Some(kinds) => SourceSpec::one_of(text, kinds),
-        None => text.parse(),
-    };
-    let spec = spec?.with_content(options);
+pub(super) fn source_of(text: &str, kinds: &[&str], options: &VendorOptions) -> Result<SourceSpec> {
+    with_content(SourceSpec::one_of(text, kinds)?, options)
+}
+
+/// `source` as what its content says that it is.
+fn with_content(source: SourceSpec, options: &VendorOptions) -> Result<SourceSpec> {
+    let spec = source.with_content(options);
     if let SourceSpec::Vendor(path) = &spec
         && path.exists()
         && !path.is_file()
@@ -32,7 +33,7 @@ pub(super) struct FirstSource(Arc<Mutex<Option<Found>>>);
 /// A source, and the export that it is.
 pub(super) struct Found {
     /// What was asked for.
-    text: String,
+    asked: SourceSpec,
     options: VendorOptions,
     pub(super) spec: SourceSpec,
     export: Option<Export>,
@@ -50,19 +51,19 @@ pub(super) struct Export {
 }
 
 impl FirstSource {
-    /// What `look` sees of the source `text`, which is found out once.
+    /// What `look` sees of the source `asked`, which is found out once.
     pub(super) fn look<T>(
         &self,
-        text: &str,
+        asked: &SourceSpec,
         options: VendorOptions,
         look: impl FnOnce(&mut Found) -> Result<T>,
     ) -> Result<T> {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let found = match known.take() {
-            Some(found) if found.text == text && found.options == options => found,
+            Some(found) if found.asked == *asked && found.options == options => found,
             _ => {
-                let spec = source_of(text, None, &options)?;
-                Found { text: text.to_owned(), options, spec, export: None }
+                let spec = with_content(asked.clone(), &options)?;
+                Found { asked: asked.clone(), options, spec, export: None }
             }
         };
         look(known.insert(found))

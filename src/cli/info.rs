@@ -62,7 +62,7 @@ struct Known {
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("reading");
     let options = arguments.export.options()?;
-    let recording = source_of(&arguments.recording, Some(&["csv", "mcap", "ros2-mcap", "export"]), &options);
+    let recording = source_of(&arguments.recording, &["csv", "mcap", "ros2-mcap", "export"], &options);
     let known = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
         SourceSpec::Mcap(path) => {
             if arguments.export.rate.is_some() {

@@ -9,7 +9,7 @@ use somatic::{Body, Error, Result, bundled};
 
 use super::attached;
 use super::bodies::{check_body_name, load_body};
-use super::scene::RunOptions;
+use super::scene::{Asked, in_flags};
 use super::stdio::check_input;
 
 /// Frames a call for recordings, unless told otherwise.
@@ -37,13 +37,13 @@ pub(super) struct OpenedLines {
 
 impl Input {
     /// The input for `asked`, if any: a plan needs none.
-    pub(super) fn named_or_none(asked: &RunOptions) -> Result<Option<Self>> {
+    pub(super) fn named_or_none(asked: &Asked) -> Result<Option<Self>> {
         let nothing = asked.sources.is_empty() && !matches!(asked.body.as_deref(), None | Some("hand"));
         if nothing { Ok(None) } else { Self::named(asked).map(Some) }
     }
 
-    pub(super) fn named(asked: &RunOptions) -> Result<Self> {
-        let Some(text) = asked.sources.first() else {
+    pub(super) fn named(asked: &Asked) -> Result<Self> {
+        let Some(named) = asked.sources.first() else {
             return match asked.body.as_deref() {
                 None | Some("hand") => {
                     Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new(), limbs: Vec::new() })
@@ -67,12 +67,11 @@ impl Input {
             SourceSpec::Ros2 { topic, .. } => format!("ros2:{topic}"),
             SourceSpec::Zenoh(_) if asked.sources.len() > 1 => format!("{} limbs", asked.sources.len()),
             _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
-            _ => text.clone(),
+            _ => named.to_string(),
         };
-        let lines = asked.line_flags().lines(&asked.sources)?;
-        let keys = asked.sources.iter().map(|source| source.parse());
-        let keys = keys.map(|spec| spec.map(|spec| if let SourceSpec::Zenoh(key) = spec { Some(key) } else { None }));
-        let limbs = keys.collect::<Result<Vec<Option<String>>>>()?.into_iter().flatten().collect();
+        let lines = asked.line_keys().lines(&asked.sources).map_err(in_flags)?;
+        let key_of = |source: &SourceSpec| if let SourceSpec::Zenoh(key) = source { Some(key.clone()) } else { None };
+        let limbs = asked.sources.iter().filter_map(key_of).collect();
         let input = Self { name, spec: Some(spec), lines, limbs };
         if input.spec == Some(SourceSpec::CsvStdin) {
             return match asked.repeat {
@@ -80,17 +79,17 @@ impl Input {
                 None => Ok(input),
             };
         }
-        if asked.speed.is_some() && !input.is_recording() {
+        if asked.playback_speed.is_some() && !input.is_recording() {
             return Err(Error::usage("--speed is for recordings; live frames come when they come"));
         }
-        if (asked.from.is_some() || asked.to.is_some() || asked.repeat.is_some()) && !input.is_recording() {
+        if (asked.from_s.is_some() || asked.to_s.is_some() || asked.repeat.is_some()) && !input.is_recording() {
             return Err(Error::usage("--from, --to and --loop are for recordings; live frames come when they come"));
         }
         Ok(input)
     }
 
     /// The body that `asked` names, or that of the input.
-    pub(super) fn body(&self, asked: &RunOptions) -> Result<Body> {
+    pub(super) fn body(&self, asked: &Asked) -> Result<Body> {
         match (&asked.body, &self.spec) {
             (Some(body), _) => load_body(body),
             (None, Some(SourceSpec::Sim(path))) => Ok(SimulatedSource::open(path)?.body().clone()),
@@ -148,13 +147,13 @@ impl Input {
     }
 
     /// Opens the boards or limbs that are merged.
-    pub(super) fn open_lines(&self, ids: &[u32], asked: &RunOptions) -> Result<OpenedLines> {
+    pub(super) fn open_lines(&self, ids: &[u32], asked: &Asked) -> Result<OpenedLines> {
         #[cfg(feature = "zenoh")]
         if !self.limbs.is_empty() {
             let options = somatic::source::LimbOptions {
                 zenoh_config: asked.zenoh_config.clone(),
-                live_rate_hz: asked.live_rate,
-                max_age_s: asked.max_age,
+                live_rate_hz: asked.live_rate_hz,
+                max_age_s: asked.max_age_s,
             };
             let source = somatic::source::LimbSource::open(&self.limbs, ids, &options)?;
             return Ok(OpenedLines { lines: source.lines(), wiring: None, source: Box::new(source) });
@@ -162,30 +161,30 @@ impl Input {
         if let Some(key) = self.limbs.first() {
             SourceSpec::Zenoh(key.clone()).open(ids, &VendorOptions::default())?;
         }
-        let source = asked.line_flags().open(&self.lines, ids, asked.max_age)?;
+        let source = asked.line_keys().open(&self.lines, ids, asked.max_age_s)?;
         let (lines, wiring) = (source.lines(), Some(source.wiring().clone()));
         Ok(OpenedLines { source: Box::new(source), lines, wiring })
     }
 
     /// Opens it, or the requested part, for `body`, with poses of its links where joints are asked for.
-    pub(super) fn open_posed(&self, body: &Body, asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
+    pub(super) fn open_posed(&self, body: &Body, asked: &Asked) -> Result<Box<dyn Source + Send>> {
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         asked.jointed(self.open(&ids, asked)?, body)
     }
 
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
-    pub(super) fn open(&self, ids: &[u32], asked: &RunOptions) -> Result<Box<dyn Source + Send>> {
+    pub(super) fn open(&self, ids: &[u32], asked: &Asked) -> Result<Box<dyn Source + Send>> {
         #[cfg(feature = "ros2")]
         if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
             return Ok(Box::new(somatic::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(asked)?)?));
         }
         let cut = Cut {
-            from_s: asked.from.unwrap_or(Cut::WHOLE.from_s),
-            to_s: asked.to.unwrap_or(Cut::WHOLE.to_s),
+            from_s: asked.from_s.unwrap_or(Cut::WHOLE.from_s),
+            to_s: asked.to_s.unwrap_or(Cut::WHOLE.to_s),
             times: asked.repeat.unwrap_or(Cut::WHOLE.times),
         };
-        let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), asked.rate);
-        let options = asked.export_options()?;
+        let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), asked.rate_hz);
+        let options = asked.export_options().map_err(in_flags)?;
         let strict = asked.strict;
         let of_bag = matches!(spec, Some(SourceSpec::Ros2Mcap(_))).then(|| self.body(asked)).transpose()?;
         // It was opened for its sensors; what comes after its first frame is still to be read.

@@ -48,7 +48,6 @@ mod run;
 mod scene;
 mod screen;
 mod simulate;
-mod states_from;
 mod stdio;
 mod table;
 mod tradeoff;

@@ -9,13 +9,14 @@ mod timed;
 use std::path::PathBuf;
 
 use clap::Args;
+use somatic::scene::file::SceneFile;
 use somatic::{Error, Result};
 
 use self::bill::Bill;
 pub(super) use self::timed::pressed;
 use super::bodies::load_body;
 use super::input::Input;
-use super::scene::{RunOptions, grouped};
+use super::scene::{RunFlags, grouped};
 use super::stdio::{DONE, print};
 
 const EXAMPLES: &str = "\
@@ -37,7 +38,7 @@ pub(super) struct Arguments {
     scene: Option<PathBuf>,
 
     #[command(flatten)]
-    asked: RunOptions,
+    asked: RunFlags,
 
     /// Print JSON: bytes of a frame, times of a frame in µs.
     #[arg(long)]
@@ -50,7 +51,7 @@ pub(super) struct Arguments {
 
 pub(super) fn plan(arguments: &Arguments) -> Result<u8> {
     if arguments.schema {
-        let schema = serde_json::to_string_pretty(&schemars::schema_for!(RunOptions));
+        let schema = serde_json::to_string_pretty(&schemars::schema_for!(SceneFile));
         print(&(schema.map_err(|e| Error::failed(e.to_string()))? + "\n"))?;
         return Ok(DONE);
     }

@@ -16,7 +16,7 @@ use super::files::FilesRead;
 use super::input::{Input, RECORDED_BATCH};
 use super::interrupt::{left_out, stop_soon_on_signal};
 use super::plot_file::PlotFile;
-use super::scene::{RunOptions, output};
+use super::scene::{Asked, output};
 use super::stdio::{DONE, say, tell_losses};
 
 const EXAMPLES: &str = "\
@@ -92,9 +92,9 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
     if arguments.sources.len() > MAX_RECORDINGS {
         return Err(Error::usage(format!("at most {MAX_RECORDINGS} recordings have room side by side")));
     }
-    let runs: Vec<RunOptions> = match &arguments.sources[..] {
-        [] => vec![asked(arguments, None, wanted)],
-        sources => sources.iter().map(|source| asked(arguments, Some(source), wanted)).collect(),
+    let runs: Vec<Asked> = match &arguments.sources[..] {
+        [] => vec![asked(arguments, None, wanted)?],
+        sources => sources.iter().map(|source| asked(arguments, Some(source), wanted)).collect::<Result<_>>()?,
     };
     let read = runs.iter().fold(FilesRead::default(), |read, asked| {
         read.files(asked.calibration.iter().chain(&asked.layout)).bodies(&asked.body).sources(&asked.sources)
@@ -117,35 +117,21 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
 }
 
 /// What is run for the recording `source`.
-fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> RunOptions {
-    let ExportFlags { rate, format, grid, pitch, unit, layout } = arguments.export.clone();
-    RunOptions {
-        rate,
-        format,
-        grid,
-        pitch,
-        unit,
-        layout,
-        body: arguments.body.clone(),
-        sources: source.cloned().into_iter().collect(),
-        fields: arguments.fields.clone(),
-        outputs: vec![AskedOutputs::from(outputs_for(wanted))],
-        calibration: arguments.calibration.clone(),
-        backend: Some(BackendKind::Cpu),
-        from: arguments.from,
-        to: arguments.to,
-        ..RunOptions::default()
-    }
+fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> Result<Asked> {
+    let mut scene = arguments.export.keys();
+    scene.body.clone_from(&arguments.body);
+    scene.sources = source.map(|source| source.parse()).transpose()?.into_iter().collect();
+    scene.fields.clone_from(&arguments.fields);
+    scene.outputs = vec![AskedOutputs::from(outputs_for(wanted))];
+    scene.calibration.clone_from(&arguments.calibration);
+    scene.backend = Some(BackendKind::Cpu);
+    (scene.from_s, scene.to_s) = (arguments.from, arguments.to);
+    Ok(scene.into())
 }
 
 /// Runs a recording and keeps what is plotted of it, unless it was interrupted and the plot `to` is not drawn; also gives what of
 /// the source was never processed.
-fn gather(
-    asked: &RunOptions,
-    wanted: Outputs,
-    stop: &AtomicBool,
-    to: &Path,
-) -> Result<(Option<Gathered>, Vec<String>)> {
+fn gather(asked: &Asked, wanted: Outputs, stop: &AtomicBool, to: &Path) -> Result<(Option<Gathered>, Vec<String>)> {
     let input = Input::named(asked)?;
     if !input.is_recording() {
         return Err(Error::usage("only recordings are plotted; record what is live with `somatic run`").at(&input.name));

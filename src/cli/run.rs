@@ -25,7 +25,7 @@ use super::interrupt::{left_out, stop_on_signal};
 use super::keys::Keys;
 use super::lines::LineReport;
 use super::live::{RunInfo, View};
-use super::scene::{LIVE, RunOptions, grouped};
+use super::scene::{LIVE, RunFlags, grouped};
 use super::stdio::{DONE, FAILED, print, say, say_lines, tell_losses};
 use super::tradeoff::{say_kept, settled};
 use super::unfit::UnfitReport;
@@ -75,7 +75,7 @@ pub(super) struct Arguments {
     scene: Option<PathBuf>,
 
     #[command(flatten)]
-    asked: RunOptions,
+    asked: RunFlags,
 
     /// In csv: one row per frame, with columns of their own for each field, instead of a row per field in contact.
     #[arg(long, help_heading = "Output")]
@@ -101,7 +101,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
-    let sinks = asked.sinks.iter().map(|text| text.parse()).collect::<Result<Vec<SinkSpec>>>()?;
+    let sinks = &asked.sinks;
     let input = Input::named(&asked)?;
     let table = asked.tables(arguments.wide).on_stdout(arguments.table)?;
     if arguments.table.is_some() && !sinks.iter().any(SinkSpec::is_table_on_stdout) {
@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     if arguments.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !arguments.describe {
         return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
     }
-    let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
+    let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.overwrite);
     // A description makes no file.
     let targets = sinks
         .iter()
@@ -142,14 +142,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let has_page = sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_)));
     let is_watched =
         (input.is_bundled() && at_terminal) || (input.is_recording() && sinks.iter().any(SinkSpec::is_watched));
-    let speed = asked.speed.or(is_watched.then_some(1.0));
+    let speed = asked.playback_speed.or(is_watched.then_some(1.0));
     let gather = input.is_recording() && speed.is_none();
     // What is played until somebody ends it is never a part.
     let ends = input.is_recording() && asked.repeat != Some(0);
     let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
     let settled = settled(&asked, Some(&input), &body, batch)?;
     let is_raw = settled.options.calibration.is_none() && !settled.options.tare;
-    asked.line_flags().check_wipers(settled.options.calibration.as_ref(), &ids)?;
+    asked.line_keys().check_wipers(settled.options.calibration.as_ref(), &ids)?;
     #[cfg(feature = "page")]
     let options = settled.options.clone();
     let mut engine = Engine::new(&body, settled.options)?;
@@ -210,7 +210,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         ros_time: asked.ros_time.unwrap_or_default(),
     };
     if arguments.describe {
-        print(&describe(&sinks, &session, arguments.wide)?)?;
+        print(&describe(sinks, &session, arguments.wide)?)?;
         return Ok(DONE);
     }
     let sinks = opened(targets, &session, asked.quiet)?;

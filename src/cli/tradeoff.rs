@@ -21,7 +21,7 @@ use super::files::FilesRead;
 use super::input::Input;
 use super::interrupt::stop_soon_on_signal;
 use super::plot_file::PlotFile;
-use super::scene::{RunOptions, first, grouped};
+use super::scene::{RunFlags, first, grouped};
 use super::stdio::{DONE, FAILED, print, say};
 use super::table::{plain, shown};
 use super::words::{count, number, one_line, title};
@@ -58,7 +58,7 @@ pub(super) struct Arguments {
     scene: Option<PathBuf>,
 
     #[command(flatten)]
-    asked: RunOptions,
+    asked: RunFlags,
 
     /// How long to measure, in seconds; more is steadier.
     #[arg(long, value_name = "S", default_value_t = 10.0)]
@@ -91,7 +91,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
         return Err(Error::usage(format!("--seconds {} is not a time span; give seconds over 0", arguments.seconds)));
     }
-    let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.force);
+    let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.overwrite);
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),

@@ -99,14 +99,14 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     }
     let body = load_body(&arguments.body)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let wiring = match arguments.lines.wiring()? {
+    let wiring = match arguments.lines.keys().wiring()? {
         Some(wiring) => wiring,
         None => Wiring::in_order(&ids, 1, ports.len()).map_err(|e| e.at("no --wiring is given"))?,
     };
     let own = |board: u16, channel: u16| wiring.board(board)?.wipers.get(usize::from(channel)).copied()?;
     let start = wiring.with_wipers(|board, channel| Some(own(board, channel).unwrap_or(arguments.wiper)));
     let stop = stop_on_signal()?;
-    let source = arguments.lines.open_as(Some(start.clone()), &ports, &ids, None)?;
+    let source = arguments.lines.keys().open_as(Some(start.clone()), &ports, &ids, None)?;
     let mut session = TuningSession::new(source, &start, stop);
 
     let press = press.flatten().map_or(PhaseLimit::Enter, PhaseLimit::After);

@@ -25,12 +25,13 @@ pub use ladder::{Rung, ladder};
 pub use measure::{MeasureOptions, measure};
 pub use plot::{plot_png, plot_svg};
 pub use store::{Found, Store, Stored, day};
-pub use target::{Pick, Target, angle, length, time};
+pub use target::Pick;
 pub use touches::SimulatedTouches;
 
 use crate::backend::BackendKind;
 use crate::percept::Outputs;
 use crate::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy, Scene};
+pub use crate::scene_file::{Target, angle, length, time};
 use crate::signal::Receptor;
 
 /// How frames come to an engine.

@@ -1,20 +1,6 @@
 //! Requested accuracy and time, and the combination that meets them.
 
-use serde::{Deserialize, Serialize};
-
-use super::{CallMode, Measurement, Report};
-use crate::error::{Error, Result};
-
-/// A tolerance, a time budget, or both.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Target {
-    /// Tolerance of centroids, m.
-    pub centroid_m: Option<f64>,
-    /// Tolerance of orientations, rad.
-    pub orientation_rad: Option<f64>,
-    /// Time budget of a frame, s.
-    pub budget_s: Option<f64>,
-}
+use super::{CallMode, Measurement, Report, Target};
 
 /// The selected combination.
 #[derive(Clone, Debug)]
@@ -25,105 +11,7 @@ pub struct Pick<'a> {
     pub missed: Vec<String>,
 }
 
-/// Splits `text` into a number and its unit.
-fn number(text: &str) -> Option<(f64, &str)> {
-    let text = text.trim();
-    let end = text.find(|c: char| !(c.is_ascii_digit() || ".eE+-".contains(c))).unwrap_or(text.len());
-    // No unit begins with an e.
-    let value = text[..end].parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)?;
-    Some((value, text[end..].trim()))
-}
-
-fn quantity(text: &str, what: &str, example: &str, units: &[(&str, f64)]) -> Result<f64> {
-    let names: Vec<&str> = units.iter().map(|(name, _)| *name).collect();
-    let found = number(text).and_then(|(value, unit)| {
-        let (_, factor) = units.iter().find(|(name, _)| *name == unit)?;
-        Some(value * factor)
-    });
-    found.ok_or_else(|| {
-        let units = names.join(", ");
-        Error::usage(format!("`{text}` is not a {what}; write a number over 0 and one of {units}, such as {example}"))
-    })
-}
-
-/// Parses a length, m.
-///
-/// # Errors
-/// It says none over 0.
-pub fn length(text: &str) -> Result<f64> {
-    quantity(text, "length", "0.5 mm", &[("mm", 1e-3), ("um", 1e-6), ("µm", 1e-6), ("cm", 1e-2), ("m", 1.0)])
-}
-
-/// Parses an angle, rad.
-///
-/// # Errors
-/// It says none over 0.
-pub fn angle(text: &str) -> Result<f64> {
-    let degree = std::f64::consts::PI / 180.0;
-    quantity(text, "angle", "2 deg", &[("deg", degree), ("°", degree), ("rad", 1.0)])
-}
-
-/// Parses a time, s.
-///
-/// # Errors
-/// It says none over 0.
-pub fn time(text: &str) -> Result<f64> {
-    quantity(text, "time", "100 us", &[("us", 1e-6), ("µs", 1e-6), ("ms", 1e-3), ("ns", 1e-9), ("s", 1.0)])
-}
-
 impl Target {
-    /// Parses a tolerance: a length for centroids, an angle for orientations, or both separated by a comma.
-    ///
-    /// # Errors
-    /// It is something else, or has one of them twice.
-    pub fn within(text: &str) -> Result<Self> {
-        let mut target = Self::default();
-        for part in text.split(',') {
-            let place = match (length(part), angle(part)) {
-                (Ok(length), _) => target.centroid_m.replace(length),
-                (_, Ok(angle)) => target.orientation_rad.replace(angle),
-                _ => {
-                    let what = "is neither a length nor an angle";
-                    return Err(Error::usage(format!("`{}` {what}; write such as \"0.5 mm, 2 deg\"", part.trim())));
-                }
-            };
-            if place.is_some() {
-                return Err(Error::usage(format!(
-                    "`{text}` gives one quantity twice; write such as \"0.5 mm, 2 deg\""
-                )));
-            }
-        }
-        Ok(target)
-    }
-
-    /// Whether nothing is requested.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// This, with missing values from `other`.
-    #[must_use]
-    pub fn or(self, other: Self) -> Self {
-        Self {
-            centroid_m: self.centroid_m.or(other.centroid_m),
-            orientation_rad: self.orientation_rad.or(other.orientation_rad),
-            budget_s: self.budget_s.or(other.budget_s),
-        }
-    }
-
-    /// It as text.
-    #[must_use]
-    pub fn words(&self) -> String {
-        let number = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
-        let parts = [
-            self.centroid_m.map(|m| format!("{} mm", number(m * 1e3))),
-            self.orientation_rad.map(|rad| format!("{} deg", number(rad.to_degrees()))),
-            self.budget_s.map(|s| format!("{} us", number(s * 1e6))),
-        ];
-        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
-    }
-
     /// Ratios of `row`'s values to the limits.
     fn misses(&self, row: &Measurement) -> [f64; 3] {
         let [centroid, orientation] = row.judged();
@@ -189,21 +77,6 @@ impl Target {
 mod tests {
     use super::super::tests::{report, row};
     use super::*;
-
-    #[test]
-    fn wishes_are_read_with_their_units() {
-        let near = |got: Option<f64>, right: f64| (got.unwrap() - right).abs() <= 1e-12 * right;
-        let target = Target::within("0.5 mm, 2 deg").unwrap();
-        assert!(near(target.centroid_m, 5e-4) && near(target.orientation_rad, 2_f64.to_radians()));
-        let target = Target::within("0.1rad,20um").unwrap();
-        assert!(near(target.centroid_m, 2e-5) && near(target.orientation_rad, 0.1));
-        assert_eq!(Target::within("1e-3 m").unwrap().orientation_rad, None);
-        assert!(near(time("100us").ok(), 1e-4) && near(time("2 ms").ok(), 2e-3));
-        assert_eq!(Target::within("0.5 mm, 2 deg").unwrap().words(), "0.5 mm, 2 deg");
-        for wrong in ["", "0.5", "0 mm", "-1 mm", "2 degrees", "1 mm, 2 mm", "nan mm", "1mm,"] {
-            assert!(Target::within(wrong).unwrap_err().is_usage(), "{wrong}");
-        }
-    }
 
     #[test]
     fn the_pick_is_the_fastest_within_a_tolerance_and_the_truest_within_a_budget() {

@@ -69,6 +69,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("picture", vec!["error", "percept", "signal", "body", "field", "backend", "engine", "ink", "colours"]),
         ("figure", vec!["error", "ink"]),
         ("plot", vec!["error", "percept", "signal", "body", "field", "engine", "ink", "colours"]),
+        ("scene_file", [&below_backend[..], &["backend", "bundled", "engine", "touch", "source", "sink"]].concat()),
     ])
 }
 
@@ -243,7 +244,7 @@ fn each_heavy_dependency_has_one_door() {
         ("comfy_table", "cli"),
         (
             "toml",
-            "error.rs|keys.rs|signal|source/simulated|source/time_column.rs|source/vendor|author/recipe|cli/scene/accuracy.rs",
+            "error.rs|keys.rs|signal|source/simulated|source/time_column.rs|source/vendor|author/recipe|scene_file/accuracy.rs",
         ),
         ("rayon", "parallel.rs|backend/cpu/tests.rs|experiments|author/sample_neighbours.rs"),
         ("globset", "scene|author/recipe_values.rs"),

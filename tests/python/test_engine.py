@@ -215,7 +215,7 @@ def test_scenes(tmp_path) -> None:
     for keys, why in [
         ({"output": "total"}, "did you mean `outputs`"),
         ({"outputs": "totl"}, "outputs: .*did you mean `total`"),
-        ({"max_gap_s": -1}, "max_gap_s: -1"),
+        ({"max_gap_s": -1}, "max_gap_s = -1"),
         ({"source": "a.csv"}, "for the command"),
         ({"accuracy": {"centroid": "1 mm"}}, "tradeoff"),
         ({"outputs": object()}, "no value of a scene"),

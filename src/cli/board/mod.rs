@@ -289,8 +289,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, LineSettings, Play)> {
         Some(hz) if (0.001..=1e6).contains(&hz) => (hz * 1e3).round() as u32,
         Some(hz) => return Err(Error::usage(format!("--rate {hz} is not a rate; give 0.001 to 1000000 Hz"))),
     };
-    let read =
-        FilesRead::default().sources(arguments.source.as_slice()).files(&arguments.wiring).bodies(&arguments.body);
+    let read = FilesRead::default().named(arguments.source.as_slice()).files(&arguments.wiring).bodies(&arguments.body);
     let mut outputs = read.outputs(false);
     let mut stations = Vec::new();
     let mut most = 0;

@@ -7,7 +7,7 @@ use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result, Touc
 
 use super::timed::{Played, measured, pressed};
 use crate::cli::input::{Input, RECORDED_BATCH};
-use crate::cli::scene::RunOptions;
+use crate::cli::scene::Asked;
 use crate::cli::tradeoff::{Settled, settled};
 use crate::cli::words::count;
 
@@ -50,9 +50,9 @@ pub(super) struct Measured {
 }
 
 impl Bill {
-    pub(super) fn of(asked: &RunOptions, input: Option<&Input>, body: &Body) -> Result<Self> {
+    pub(super) fn of(asked: &Asked, input: Option<&Input>, body: &Body) -> Result<Self> {
         let recorded = input.filter(|input| input.is_recording());
-        let gather = recorded.is_some() && asked.speed.is_none();
+        let gather = recorded.is_some() && asked.playback_speed.is_none();
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
         let Settled { options, why: picked, measured: kept } = settled(asked, input, body, batch)?;
         let engine = Engine::new(body, options.clone())?;
@@ -115,7 +115,7 @@ impl Bill {
 
 /// The frames that `engines` are measured on, and what they are, in words.
 fn played(
-    asked: &RunOptions,
+    asked: &Asked,
     recorded: Option<&Input>,
     body: &Body,
     batch: usize,

@@ -1,10 +1,10 @@
 //! What a limb would send: its frames, or its percepts.
 
 use serde_json::{Value, json};
-use somatic::sink::{FieldNames, SkinNames, limb_frame_bytes, limb_percept_bytes};
+use somatic::sink::{FieldNames, SinkSpec, SkinNames, limb_frame_bytes, limb_percept_bytes};
 use somatic::{Body, Engine, Frame, Result};
 
-use crate::cli::scene::RunOptions;
+use crate::cli::scene::Asked;
 
 /// Bytes that a limb sends, without those of Zenoh and of the network.
 pub(super) struct Network {
@@ -17,12 +17,12 @@ pub(super) struct Network {
 impl Network {
     /// On `body`, of `calls`, which `engine` makes percepts of, if they go over a network. Whether their times are real is `is_recorded`.
     pub(super) fn of(
-        (asked, body): (&RunOptions, &Body),
+        (asked, body): (&Asked, &Body),
         engine: &mut Engine,
         calls: &[Vec<Frame>],
         is_recorded: bool,
     ) -> Result<Option<Self>> {
-        if !asked.sinks.iter().any(|sink| sink.starts_with("zenoh:") || sink.starts_with("zenoh-percepts:")) {
+        if !asked.sinks.iter().any(|sink| matches!(sink, SinkSpec::Zenoh { .. })) {
             return Ok(None);
         }
         let names = FieldNames::all_of(engine.plan());

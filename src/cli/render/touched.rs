@@ -6,11 +6,12 @@ use clap::Args;
 use somatic::field::Field;
 use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture};
 use somatic::scene::Coordinates;
+use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
 
 use super::super::bar::Bar;
 use super::super::input::Input;
-use super::super::scene::RunOptions;
+use super::super::scene::Asked;
 use super::super::stdio::say;
 
 /// Endings of recordings, which bodies do not have.
@@ -46,7 +47,7 @@ pub(super) struct Flags {
 
 impl Flags {
     /// What is shown: the body `named`, with the source if there is one; or a recording of that name with its own body.
-    pub(super) fn asked(&self, named: Option<&str>) -> Result<RunOptions> {
+    pub(super) fn asked(&self, named: Option<&str>) -> Result<Asked> {
         let is_recording = |name: &&str| {
             let ending = Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
             name.starts_with("sim:") || ending.is_some_and(|ending| RECORDINGS.contains(&&*ending))
@@ -66,13 +67,16 @@ impl Flags {
             return Err(Error::usage("it is about a touch: give its recording with --source").at(flag));
         }
         let body = named.filter(|_| recording.is_none()).map(str::to_owned);
-        Ok(RunOptions { sources, body, calibration: self.calibration.clone(), ..RunOptions::default() })
+        let mut scene = SceneFile::default();
+        scene.sources = sources.iter().map(|source| source.parse()).collect::<Result<_>>()?;
+        (scene.body, scene.calibration) = (body, self.calibration.clone());
+        Ok(scene.into())
     }
 
     /// A PNG of `body` with the touch that is `asked` for.
     pub(super) fn draw(
         &self,
-        asked: &RunOptions,
+        asked: &Asked,
         body: &Body,
         fields: &[Field],
         options: &Options,

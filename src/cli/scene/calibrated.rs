@@ -1,49 +1,16 @@
-//! The calibration of a run, and the outputs that it can give.
+//! The calibration of a run: the one that is named, or that comes with what is read.
 
 use std::path::{Path, PathBuf};
 
 use somatic::limits::{self, MAX_TOML_BYTES};
-use somatic::scene::AskedOutputs;
-use somatic::signal::Quantity;
-use somatic::sink::TableWish;
 use somatic::source::{SimulatedSource, SourceSpec};
-use somatic::{Body, Calibration, Error, Outputs, Receptor, Result, touch};
+use somatic::{Body, Calibration, Error, Result};
 
-use super::RunOptions;
+use super::Asked;
 use crate::cli::attached;
 use crate::cli::overlaid::{How, overlaid};
 
-impl RunOptions {
-    /// The outputs that are asked for; if none are, those that `calibration` and what is read can give.
-    pub(super) fn outputs_with(&self, calibration: Option<&Calibration>) -> Result<Outputs> {
-        if !self.outputs.is_empty() {
-            return Ok(self.outputs());
-        }
-        let has_unit =
-            |calibration: &Calibration| calibration.taxels.iter().any(|taxel| taxel.quantity != Quantity::Count);
-        let is_placed = self.body.is_some() || self.export_is_placed()?.unwrap_or(true);
-        Ok(match (is_placed, calibration.is_some_and(has_unit)) {
-            // Of sensors of which nobody says where they are.
-            (false, _) => Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE,
-            (true, true) => self.outputs() | Outputs::FORCE,
-            (true, false) => self.outputs(),
-        })
-    }
-
-    /// What is asked of touches of the whole body; `None` looks for none.
-    pub(in crate::cli) fn touches(&self) -> Option<touch::Options> {
-        let outputs = AskedOutputs::all_of(&self.outputs).of_touches?;
-        // Nobody has asked for them, and there are no pressures to find them in.
-        let is_in_vain =
-            self.outputs.is_empty() && !self.letters.is_empty() && !self.letters.contains(&Receptor::Sustained);
-        (!is_in_vain).then(|| self.touch.unwrap_or_default().options(outputs))
-    }
-
-    /// What tables have of that.
-    pub(in crate::cli) fn tables(&self, wide: bool) -> TableWish {
-        TableWish::new(self.outputs(), self.touches().is_some(), wide)
-    }
-
+impl Asked {
     /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation and an export
     /// have one, and a recording may, which is used with its body.
     pub(in crate::cli) fn own_calibration(&self) -> Result<Option<(PathBuf, String)>> {
@@ -55,8 +22,8 @@ impl RunOptions {
             Some(SourceSpec::Vendor(_)) => return self.export_calibration(),
             _ => {}
         }
-        let Some(recording) = self.recording()? else { return Ok(None) };
-        Ok(attached::calibration(&recording, self.quiet)?.map(|text| (recording, text)))
+        let Some(recording) = self.recording() else { return Ok(None) };
+        Ok(attached::calibration(recording, self.quiet)?.map(|text| (recording.clone(), text)))
     }
 
     /// The text of the calibration that is used, and what it comes with: the named one, laid over the own one of an export or
@@ -93,9 +60,7 @@ impl RunOptions {
             Some(path) => Some(load(path)?),
             None => self.own_calibration()?.map(parse).transpose()?,
         };
-        if let (Some(calibration), [source]) = (&calibration, &self.sources[..])
-            && source.starts_with("sim:")
-        {
+        if let (Some(calibration), [source @ SourceSpec::Sim(_)]) = (&calibration, &self.sources[..]) {
             calibration.check_body(&body.name).map_err(|_| {
                 let what =
                     format!("it is on another body than `{}`; leave --body out, or change its key `body`", body.name);

@@ -1,4 +1,4 @@
-//! The outputs that are asked for, and what help and schema say of them.
+//! The outputs that are asked for, and what help says of them.
 
 use somatic::scene::AskedOutputs;
 use somatic::{Error, Outputs, Result};
@@ -12,12 +12,6 @@ pub(in crate::cli) fn output(name: &str) -> Result<Outputs> {
             Err(Error::usage(format!("`{name}` is of touches; give quantities of fields here, such as `total`")))
         }
     }
-}
-
-/// Says in a schema which outputs there are.
-pub(super) fn output_names(schema: &mut schemars::Schema) {
-    let names: Vec<String> = AskedOutputs::names().collect();
-    schema.insert("items".to_owned(), serde_json::json!({"type": "string", "enum": names}));
 }
 
 pub(in crate::cli) fn outputs_help() -> String {

@@ -9,7 +9,7 @@ use somatic::{BackendKind, Body, Error, Options, Result};
 
 use crate::cli::input::{Input, RECORDED_BATCH};
 use crate::cli::plan::pressed;
-use crate::cli::scene::RunOptions;
+use crate::cli::scene::Asked;
 use crate::cli::words::number;
 
 /// What `pick` misses of `target`, which nothing grants.
@@ -32,7 +32,7 @@ pub(super) fn software() -> Option<String> {
     None
 }
 
-pub(super) fn measure_options(asked: &RunOptions, options: &Options, seconds: f64) -> Result<MeasureOptions> {
+pub(super) fn measure_options(asked: &Asked, options: &Options, seconds: f64) -> Result<MeasureOptions> {
     let backends = match options.backend {
         BackendKind::Auto if software().is_some() => vec![BackendKind::Cpu],
         BackendKind::Auto => vec![BackendKind::Cpu, BackendKind::Gpu],
@@ -46,7 +46,7 @@ pub(super) fn measure_options(asked: &RunOptions, options: &Options, seconds: f6
 }
 
 /// The first frames of `input`, up to `most`, and the truth where it knows it.
-pub(super) fn played(input: &Input, asked: &RunOptions, body: &Body, most: usize) -> Result<TestFrames> {
+pub(super) fn played(input: &Input, asked: &Asked, body: &Body, most: usize) -> Result<TestFrames> {
     let mut played = TestFrames { source: input.name.clone(), ..TestFrames::default() };
     fn next(played: &mut TestFrames, source: &mut dyn Source) -> Result<bool> {
         if played.frames.is_empty() {

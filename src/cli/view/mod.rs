@@ -29,7 +29,7 @@ use self::subject::{Subject, subject};
 use super::browser;
 use super::input::Input;
 use super::interrupt::stop_soon_on_signal;
-use super::scene::{LIVE, RunOptions, grouped};
+use super::scene::{Asked, LIVE, RunFlags, grouped};
 use super::stdio::{DONE, LOST, say};
 use super::tradeoff::settled;
 use super::words;
@@ -58,7 +58,7 @@ pub(super) struct Arguments {
     what: Option<String>,
 
     #[command(flatten)]
-    asked: RunOptions,
+    asked: RunFlags,
 
     /// Start the browser.
     #[arg(long)]
@@ -183,7 +183,7 @@ impl Opening<'_> {
     }
 
     /// A recording, from its first frame on.
-    fn recording(&self, asked: &RunOptions) -> Result<u8> {
+    fn recording(&self, asked: &Asked) -> Result<u8> {
         let input = Input::named(asked)?;
         if !input.is_recording() {
             return Err(Error::usage("live frames are for `somatic run --sink page`").at(&input.name));
@@ -232,7 +232,7 @@ impl Opening<'_> {
         let timeline = timeline::start(shared.clone(), recorded);
         let explainer = Explainer::start(shared.clone());
         let player = Player::new(engine, shared, publisher, explainer, timeline);
-        let speed = asked.speed.unwrap_or(1.0);
+        let speed = asked.playback_speed.unwrap_or(1.0);
         let requests = server.requests().ok_or_else(|| Error::failed("the server has no requests"))?;
         let is_ended = || stop.load(Ordering::Relaxed) || self.until.is_some_and(|until| Instant::now() >= until);
         player.speed(speed).loops(input.is_bundled()).run(&requests, is_ended)?;

@@ -6,21 +6,21 @@ use somatic::source::{BagName, SimulatedSource};
 use somatic::{Body, Error, Result, bundled};
 
 use super::super::bodies::load_body;
-use super::super::scene::RunOptions;
+use super::super::scene::{Asked, RunFlags};
 
 /// What is shown.
 pub(super) enum Subject {
     /// A body at rest.
     Body(Body),
     /// A recording, with all that is asked of it.
-    Recording(Box<RunOptions>),
+    Recording(Box<Asked>),
 }
 
 /// What `what` names, with the flags `asked`.
 ///
 /// # Errors
 /// It is neither a body, a recording, a scene nor a simulation; or flags contradict it.
-pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject> {
+pub(super) fn subject(what: Option<&str>, asked: &RunFlags) -> Result<Subject> {
     let Some(what) = what else { return Ok(Subject::Recording(Box::new(asked.with(None)?))) };
     let ending = Path::new(what).extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
     let as_source = |kind: &str| {
@@ -28,7 +28,7 @@ pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject>
             return Err(Error::usage(format!("`{what}` and --source {other}: give one of them")));
         }
         let source = if kind.is_empty() { what.to_owned() } else { format!("{kind}:{what}") };
-        let asked = RunOptions { sources: vec![source], ..asked.clone() };
+        let asked = RunFlags { sources: vec![source], ..asked.clone() };
         Ok(Subject::Recording(Box::new(asked.with(None)?)))
     };
     match ending.as_deref() {
@@ -48,7 +48,7 @@ pub(super) fn subject(what: Option<&str>, asked: &RunOptions) -> Result<Subject>
 }
 
 /// The body `what`, at rest, or with a recording where `asked` has one.
-fn body(what: &str, asked: &RunOptions) -> Result<Subject> {
+fn body(what: &str, asked: &RunFlags) -> Result<Subject> {
     if let Some(other) = &asked.body {
         return Err(Error::usage(format!("`{what}` and --body {other}: give one of them")));
     }
@@ -59,10 +59,10 @@ fn body(what: &str, asked: &RunOptions) -> Result<Subject> {
             ("--calibration", asked.calibration.is_some()),
             ("--outputs", !asked.outputs.is_empty()),
             ("--fields", !asked.fields.is_empty()),
-            ("--from", asked.from.is_some()),
-            ("--to", asked.to.is_some()),
-            ("--speed", asked.speed.is_some()),
-            ("--rate", asked.rate.is_some()),
+            ("--from", asked.from_s.is_some()),
+            ("--to", asked.to_s.is_some()),
+            ("--speed", asked.playback_speed.is_some()),
+            ("--rate", asked.rate_hz.is_some()),
             ("--wiring", asked.wiring.is_some()),
         ];
         if let Some((flag, _)) = about_frames.into_iter().find(|(_, is_given)| *is_given) {
@@ -71,7 +71,6 @@ fn body(what: &str, asked: &RunOptions) -> Result<Subject> {
         }
         return Ok(Subject::Body(load_body(what)?));
     }
-    let mut asked = asked.with(None)?;
-    asked.body = Some(what.to_owned());
-    Ok(Subject::Recording(Box::new(asked)))
+    let asked = RunFlags { body: Some(what.to_owned()), ..asked.clone() };
+    Ok(Subject::Recording(Box::new(asked.with(None)?)))
 }

@@ -16,6 +16,7 @@ mod percept_schema;
 mod recorded;
 #[cfg(feature = "mcap")]
 mod ros2;
+mod ros_time;
 mod spec;
 mod table;
 mod touch_line;
@@ -32,10 +33,11 @@ pub use ndjson::NdjsonSink;
 pub use page::PageSink;
 #[cfg(feature = "mcap")]
 pub use recorded::RecordingSink;
+pub use ros_time::RosTime;
+#[cfg(feature = "mcap")]
+pub use ros2::Ros2BagSink;
 #[cfg(feature = "ros2")]
 pub use ros2::Ros2Sink;
-#[cfg(feature = "mcap")]
-pub use ros2::{Ros2BagSink, RosTime};
 pub use spec::{SinkSpec, SinkTarget, TableName, TableWish};
 #[cfg(feature = "parquet")]
 pub use table::ParquetSink;
@@ -245,7 +247,6 @@ pub struct Session<'a> {
     /// Zenoh's own configuration, a file; without one limbs send to this computer alone.
     pub zenoh_config: Option<&'a std::path::Path>,
     /// Which times messages of ROS have.
-    #[cfg(feature = "mcap")]
     pub ros_time: RosTime,
 }
 

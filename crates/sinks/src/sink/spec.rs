@@ -1,5 +1,6 @@
 //! Parses the names of sinks.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -84,6 +85,26 @@ impl FromStr for SinkSpec {
                 Some(near) => bad(format!("there is no sink `{kind}:`; did you mean `{near}:`?")),
                 None => bad(format!("a sink is one of {FORMS}")),
             },
+        }
+    }
+}
+
+/// As it is named, the kind first.
+impl fmt::Display for SinkSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ndjson(path) => write!(f, "ndjson:{}", path.display()),
+            Self::Csv(path) => write!(f, "csv:{}", path.display()),
+            Self::Parquet(path) => write!(f, "parquet:{}", path.display()),
+            Self::Mcap(path) => write!(f, "mcap:{}", path.display()),
+            Self::Ros2Mcap(path) => write!(f, "ros2-mcap:{}", path.display()),
+            Self::Ros2(namespace) if namespace.is_empty() => f.write_str("ros2"),
+            Self::Ros2(namespace) => write!(f, "ros2:{namespace}"),
+            Self::Page(None) => f.write_str("page"),
+            Self::Page(Some(address)) => write!(f, "page:{address}"),
+            Self::Zenoh { key, sends: LimbSends::Frames } => write!(f, "zenoh:{key}"),
+            Self::Zenoh { key, sends: LimbSends::Percepts } => write!(f, "zenoh-percepts:{key}"),
+            Self::Stdout => f.write_str("-"),
         }
     }
 }
@@ -402,6 +423,27 @@ fn bag_file_name(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sink_is_written_as_it_is_named() {
+        for text in [
+            "-",
+            "ndjson:a",
+            "csv:-",
+            "csv:a/b.csv",
+            "parquet:a",
+            "mcap:a",
+            "ros2-mcap:bag",
+            "ros2",
+            "ros2:/left_arm",
+            "page",
+            "page:127.0.0.1:0",
+            "zenoh:robot/left",
+            "zenoh-percepts:robot/left",
+        ] {
+            assert_eq!(text.parse::<SinkSpec>().unwrap().to_string(), text);
+        }
+    }
 
     #[test]
     fn a_sink_is_named_as_people_write_it() {

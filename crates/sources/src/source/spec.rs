@@ -1,5 +1,6 @@
 //! Parses the names of sources.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -66,6 +67,26 @@ impl FromStr for SourceSpec {
 
     fn from_str(text: &str) -> Result<Self> {
         Self::one_of(text, &FORMS.map(|(kind, _)| kind)).map_err(|e| e.at(format!("source `{text}`")))
+    }
+}
+
+/// As it is named, the kind first where there is one.
+impl fmt::Display for SourceSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Csv(path) => write!(f, "csv:{}", path.display()),
+            Self::Serial { port, baud: None } => write!(f, "serial:{port}"),
+            Self::Serial { port, baud: Some(baud) } => write!(f, "serial:{port}@{baud}"),
+            Self::Ros2 { topic, kind: None } => write!(f, "ros2:{topic}"),
+            Self::Ros2 { topic, kind: Some(kind) } => write!(f, "ros2:{topic}@{kind}"),
+            Self::Zenoh(key) => write!(f, "zenoh:{key}"),
+            Self::Mcap(path) => write!(f, "mcap:{}", path.display()),
+            Self::Ros2Mcap(bag) => write!(f, "ros2-mcap:{bag}"),
+            Self::Vendor(path) => write!(f, "{}", path.display()),
+            Self::Sim(path) => write!(f, "sim:{}", path.display()),
+            Self::Stdin => f.write_str("-"),
+            Self::CsvStdin => f.write_str("csv:-"),
+        }
     }
 }
 
@@ -272,6 +293,26 @@ mod tests {
         assert_eq!(parsed("ros2:/arm/skin@sensor_msgs/PointCloud2"), ros2(cloud));
         let port = "/dev/ttyUSB0".to_owned();
         assert_eq!(parsed("serial:/dev/ttyUSB0@921600"), SourceSpec::Serial { port, baud: Some(921_600) });
+    }
+
+    #[test]
+    fn a_source_is_written_as_it_is_named() {
+        for text in [
+            "csv:a/b.txt",
+            "serial:/dev/ttyUSB0",
+            "serial:COM3@921600",
+            "ros2:/arm/skin",
+            "ros2:/arm/skin@sensor_msgs/msg/PointCloud2",
+            "zenoh:robot/left",
+            "mcap:a.mcap",
+            "ros2-mcap:a/bag:/arm/skin",
+            "walk.lst",
+            "sim:touch.toml",
+            "-",
+            "csv:-",
+        ] {
+            assert_eq!(text.parse::<SourceSpec>().unwrap().to_string(), text);
+        }
     }
 
     #[test]

@@ -3,18 +3,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::signal::FrameTime;
-
-words! {"time of ROS messages",
-    /// Which times messages of ROS have.
-    #[derive(Default)]
-    RosTime {
-        /// Those of the frames.
-        #[default]
-        Recording = "recording",
-        /// The first is this computer's, and those of the frames say how it goes on.
-        Wall = "wall",
-    }
-}
+use crate::sink::RosTime;
 
 /// Gives each frame a time that does not fall.
 pub(super) struct RosClock {

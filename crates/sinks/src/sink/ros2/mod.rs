@@ -12,6 +12,5 @@ mod touches;
 mod wrenches;
 
 pub use bag::Ros2BagSink;
-pub use clock::RosTime;
 #[cfg(feature = "ros2")]
 pub use live::Ros2Sink;

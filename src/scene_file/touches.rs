@@ -1,17 +1,23 @@
 //! What a scene asks of touches of the whole body.
 
+#[cfg(feature = "cli")]
 use schemars::JsonSchema;
 use serde::Deserialize;
-use somatic::{Error, Result, TouchOutputs, touch};
+
+use crate::error::{Error, Result};
+use crate::percept::TouchOutputs;
+use crate::touch;
 
 /// When touches of the whole body begin and end.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
-pub(in crate::cli) struct TouchKeys {
+#[cfg_attr(feature = "cli", derive(JsonSchema))]
+#[non_exhaustive]
+pub struct TouchKeys {
     /// A touch begins when its total is over this, in the unit of P.
-    on: f64,
+    pub on: f64,
     /// A touch ends when its total is this or less, in the unit of P.
-    off: f64,
+    pub off: f64,
 }
 
 impl TouchKeys {

@@ -4,14 +4,16 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::str::FromStr;
 
+#[cfg(feature = "cli")]
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use somatic::Result;
-use somatic::scene::{AskedOutputs, MotionFilter};
+
+use crate::scene::{AskedOutputs, MotionFilter};
 
 // As a schema says it.
 /// One text, or a list of them.
+#[cfg(feature = "cli")]
 #[derive(JsonSchema)]
 #[schemars(untagged)]
 #[expect(dead_code, reason = "only its schema is of use")]
@@ -59,23 +61,6 @@ pub(super) fn word<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(fro
     Parsed::deserialize(from).map(|Parsed(one)| Some(one))
 }
 
-struct Checked<T>(String, PhantomData<T>);
-
-impl<T: FromStr> FromStr for Checked<T> {
-    type Err = T::Err;
-
-    fn from_str(text: &str) -> Result<Self, T::Err> {
-        text.parse::<T>().map(|_| Self(text.to_owned(), PhantomData))
-    }
-}
-
-pub(super) fn names_of<'de, T: FromStr<Err: fmt::Display>, D: Deserializer<'de>>(
-    from: D,
-) -> Result<Vec<String>, D::Error> {
-    let checked: Vec<Checked<T>> = words(from)?;
-    Ok(checked.into_iter().map(|Checked(text, _)| text).collect())
-}
-
 pub(super) fn outputs<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<AskedOutputs>, D::Error> {
     words(from)
 }
@@ -92,4 +77,11 @@ pub(super) fn window<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String
     let text = String::deserialize(from)?;
     MotionFilter::default().with_window(&text).map_err(D::Error::custom)?;
     Ok(Some(text))
+}
+
+/// Says in a schema which outputs there are.
+#[cfg(feature = "cli")]
+pub(super) fn output_names(schema: &mut schemars::Schema) {
+    let names: Vec<String> = AskedOutputs::names().collect();
+    schema.insert("items".to_owned(), serde_json::json!({"type": "string", "enum": names}));
 }

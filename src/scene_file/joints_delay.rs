@@ -5,11 +5,12 @@ use std::str::FromStr;
 
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer};
-use somatic::{Error, Result};
 
-/// What is said of the two clocks.
+use crate::error::{Error, Result};
+
+/// How much later the clock of joint states stamps an instant than that of frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::cli) enum JointsDelay {
+pub enum JointsDelay {
     /// It is estimated.
     Auto,
     /// It is known, s.

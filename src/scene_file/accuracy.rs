@@ -2,89 +2,71 @@
 
 use std::collections::BTreeMap;
 
-use clap::Args;
+#[cfg(feature = "cli")]
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer};
-use somatic::error::place_in;
-use somatic::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
-use somatic::tradeoff::{Target, angle, length, time};
-use somatic::{BackendKind, Error, Outputs, Result};
 
 use super::deserialize::word;
-use super::flags::{ACCURACY, one_of};
+use super::target::{Target, angle, length, time};
+use crate::backend::BackendKind;
+use crate::error::{Error, Result, place_in};
+use crate::percept::Outputs;
+use crate::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
 
 /// Speed against accuracy: either how far percepts may be off and how long a frame may take, so that the knobs are chosen
 /// by measurement, or the knobs themselves.
-#[derive(Args, Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
-pub(in crate::cli) struct Accuracy {
-    /// Tolerances by flag; in a file they are two keys.
-    #[arg(long, help_heading = ACCURACY, value_name = "LENGTH,ANGLE", value_parser = Target::within,
-        help = "Measure, and use the fastest method that keeps 95 of 100 places and orientations within this of the truth, such as \
-                '3 mm, 5 deg' or one of these")]
-    #[serde(skip)]
-    pub(in crate::cli) within: Option<Target>,
-
+#[cfg_attr(feature = "cli", derive(JsonSchema))]
+#[non_exhaustive]
+pub struct Accuracy {
     /// How far 95 of 100 places may be from the truth, such as "3 mm".
-    #[arg(skip)]
-    #[serde(deserialize_with = "metres")]
-    #[schemars(with = "Option<String>")]
-    centroid: Option<f64>,
+    #[serde(rename = "centroid", deserialize_with = "metres")]
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>"))]
+    pub centroid_m: Option<f64>,
 
     /// How far 95 of 100 orientations may be turned from it, such as "5 deg".
-    #[arg(skip)]
-    #[serde(deserialize_with = "radians")]
-    #[schemars(with = "Option<String>")]
-    orientation: Option<f64>,
+    #[serde(rename = "orientation", deserialize_with = "radians")]
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>"))]
+    pub orientation_rad: Option<f64>,
 
-    /// Measure, and use only knobs with which a frame takes at most this in the median, such as 100us; without --within
+    /// Measure, and use only knobs with which a frame takes at most this in the median, such as 100us; without a tolerance
     /// the most accurate of them.
-    #[arg(long, help_heading = ACCURACY, value_name = "TIME", value_parser = time)]
-    #[serde(deserialize_with = "seconds")]
-    #[schemars(with = "Option<String>")]
-    pub(in crate::cli) budget: Option<f64>,
+    #[serde(rename = "budget", deserialize_with = "seconds")]
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>"))]
+    pub budget_s: Option<f64>,
 
     /// How sums are made: in single precision (one-pass), with the rounding errors added back (compensated), or in
     /// double precision on the CPU (double) [default: one-pass; reference: double].
-    #[arg(long, help_heading = ACCURACY, value_name = "HOW",
-        value_parser = one_of::<Arithmetic>(Arithmetic::WORDS))]
     #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = Arithmetic::WORDS))]
-    pub(in crate::cli) arithmetic: Option<Arithmetic>,
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Arithmetic::WORDS)))]
+    pub arithmetic: Option<Arithmetic>,
 
     /// Which charts fields have: the layout's (as-authored), tangent planes (plane), or shortest paths over the surface
     /// where that is possible (geodesic) [default: as-authored].
-    #[arg(long, help_heading = ACCURACY, value_name = "KIND",
-        value_parser = one_of::<Charts>(Charts::WORDS))]
     #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = Charts::WORDS))]
-    pub(in crate::cli) charts: Option<Charts>,
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Charts::WORDS)))]
+    pub charts: Option<Charts>,
 
-    /// Which output gives an orientation: the ones in --outputs (as-asked), orientation alone (two-points), principal_axis alone
+    /// Which output gives an orientation: the ones in `outputs` (as-asked), orientation alone (two-points), principal_axis alone
     /// (second-moments), or with it the direction and place of the contact fitted to each touch in one step (fit-1), two
     /// (fit-2) or all (fit): touches.fit_direction and touches.fit_place [default: as-asked].
-    #[arg(long, help_heading = ACCURACY, value_name = "WAY",
-        value_parser = one_of::<OrientationBy>(OrientationBy::WORDS))]
     #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = OrientationBy::WORDS))]
-    pub(in crate::cli) orientation_by: Option<OrientationBy>,
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = OrientationBy::WORDS)))]
+    pub orientation_by: Option<OrientationBy>,
 
     /// Which fields are computed in a live frame on the CPU: all, only those that changed (touched), or the faster of
     /// these (auto); percepts are the same [default: auto].
-    #[arg(long, help_heading = ACCURACY, value_name = "WHICH",
-        value_parser = one_of::<Coverage>(Coverage::WORDS))]
     #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = Coverage::WORDS))]
-    pub(in crate::cli) coverage: Option<Coverage>,
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Coverage::WORDS)))]
+    pub coverage: Option<Coverage>,
 
     /// When a field is computed: in every frame (every-frame), or when its values change (on-change), and motion then
     /// from change to change [default: every-frame].
-    #[arg(long, help_heading = ACCURACY, value_name = "WHEN",
-        value_parser = one_of::<Cadence>(Cadence::WORDS))]
     #[serde(deserialize_with = "word")]
-    #[schemars(with = "Option<String>", extend("enum" = Cadence::WORDS))]
-    pub(in crate::cli) cadence: Option<Cadence>,
+    #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Cadence::WORDS)))]
+    pub cadence: Option<Cadence>,
 }
 
 fn quantity<'de, D: Deserializer<'de>>(from: D, of: fn(&str) -> Result<f64>) -> Result<Option<f64>, D::Error> {
@@ -104,33 +86,36 @@ fn seconds<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> 
 }
 
 impl Accuracy {
-    /// These arguments, and what `file` says where they say nothing. Knobs by flag take the place of a file's wish, and a
-    /// wish by flag that of a file's knobs.
-    pub(super) fn or(&self, file: Self) -> Self {
-        let file = match (self.target().is_empty(), self.knob().is_none()) {
-            (true, false) => Self { centroid: None, orientation: None, budget: None, ..file },
-            (false, true) => {
-                Self { centroid: file.centroid, orientation: file.orientation, budget: file.budget, ..Self::default() }
-            }
-            _ => file,
+    /// This, and what `below` says where it says nothing. Knobs take the place of a wish that is below, and a wish that of
+    /// knobs below.
+    #[must_use]
+    pub fn over(self, below: Self) -> Self {
+        let below = match (self.target().is_empty(), self.knob().is_none()) {
+            (true, false) => Self { centroid_m: None, orientation_rad: None, budget_s: None, ..below },
+            (false, true) => Self {
+                centroid_m: below.centroid_m,
+                orientation_rad: below.orientation_rad,
+                budget_s: below.budget_s,
+                ..Self::default()
+            },
+            _ => below,
         };
         Self {
-            within: self.within,
-            centroid: file.centroid,
-            orientation: file.orientation,
-            budget: self.budget.or(file.budget),
-            arithmetic: self.arithmetic.or(file.arithmetic),
-            charts: self.charts.or(file.charts),
-            orientation_by: self.orientation_by.or(file.orientation_by),
-            coverage: self.coverage.or(file.coverage),
-            cadence: self.cadence.or(file.cadence),
+            centroid_m: self.centroid_m.or(below.centroid_m),
+            orientation_rad: self.orientation_rad.or(below.orientation_rad),
+            budget_s: self.budget_s.or(below.budget_s),
+            arithmetic: self.arithmetic.or(below.arithmetic),
+            charts: self.charts.or(below.charts),
+            orientation_by: self.orientation_by.or(below.orientation_by),
+            coverage: self.coverage.or(below.coverage),
+            cadence: self.cadence.or(below.cadence),
         }
     }
 
     /// What is wished for, if anything is.
-    pub(in crate::cli) fn target(&self) -> Target {
-        let file = Target { centroid_m: self.centroid, orientation_rad: self.orientation, budget_s: self.budget };
-        self.within.unwrap_or_default().or(file)
+    #[must_use]
+    pub fn target(&self) -> Target {
+        Target { centroid_m: self.centroid_m, orientation_rad: self.orientation_rad, budget_s: self.budget_s }
     }
 
     /// The first knob that is turned, by its key.
@@ -145,7 +130,9 @@ impl Accuracy {
         given.into_iter().find(|(_, given)| *given).map(|(key, _)| key)
     }
 
-    pub(in crate::cli) fn knobs(&self) -> Knobs {
+    /// The knobs that it turns; others stay where they usually are.
+    #[must_use]
+    pub fn knobs(&self) -> Knobs {
         let usual = Knobs::default();
         Knobs::default()
             .arithmetic(self.arithmetic)

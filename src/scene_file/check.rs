@@ -1,0 +1,81 @@
+//! What does not go together in what is asked for.
+
+use super::SceneFile;
+use crate::error::{Error, Result};
+use crate::percept::Outputs;
+use crate::sink::SinkSpec;
+use crate::source::SourceSpec;
+
+impl SceneFile {
+    /// Whether all that it asks for goes together.
+    ///
+    /// # Errors
+    /// A usage error that names a key in backticks, or with a value as a file has it: `` `max_gap_s = 0` is not a time span ``.
+    pub fn check(&self) -> Result<()> {
+        self.check_accuracy().map_err(|(_, e)| e)?;
+        self.line_keys().lines(&self.sources)?;
+        if self.strict && self.sources != [SourceSpec::Stdin] {
+            return Err(Error::usage(
+                "`strict` is for `source = \"-\"`; in other sources a taxel that the body does not have is always an error",
+            ));
+        }
+        self.check_joints()?;
+        self.check_sinks()?;
+        self.check_numbers()?;
+        if let Some(touch) = self.touch {
+            touch.check()?;
+            if self.touches().is_none() {
+                return Err(Error::usage("[touch] is for touches; add them to `outputs`"));
+            }
+        }
+        if self.contact_tolerance_m.is_some() && !self.outputs().contains(Outputs::SELF_CONTACTS) {
+            return Err(Error::usage("`contact_tolerance_m` is for self_contacts; add them to `outputs`"));
+        }
+        self.filter().map(drop)
+    }
+
+    /// Whether accuracy, backend and outputs go together; if not, by which key.
+    pub(super) fn check_accuracy(&self) -> Result<(), (&'static str, Error)> {
+        self.accuracy.check(self.backend.unwrap_or_default(), self.outputs())
+    }
+
+    fn check_sinks(&self) -> Result<()> {
+        let has_sink = |is_it: fn(&SinkSpec) -> bool| self.sinks.iter().any(is_it);
+        let has_limbs = self.sources.iter().any(|source| matches!(source, SourceSpec::Zenoh(_)));
+        if self.zenoh_config.is_some() && !has_limbs && !has_sink(|sink| matches!(sink, SinkSpec::Zenoh { .. })) {
+            return Err(Error::usage(
+                "`zenoh_config` is for limbs; add `source = \"zenoh:KEY\"` or `sink = \"zenoh:KEY\"`",
+            ));
+        }
+        let is_ros = |sink: &SinkSpec| matches!(sink, SinkSpec::Ros2(_) | SinkSpec::Ros2Mcap(_));
+        if self.ros_time.is_some() && !has_sink(is_ros) {
+            return Err(Error::usage(
+                "`ros_time` is for messages of ROS 2; add `sink = \"ros2-mcap:FOLDER\"` or `sink = \"ros2\"`",
+            ));
+        }
+        if !self.allow_hosts.is_empty() && !has_sink(|sink| matches!(sink, SinkSpec::Page(_))) {
+            return Err(Error::usage("`allow_host` is for a page; add `sink = \"page:HOST:PORT\"`"));
+        }
+        Ok(())
+    }
+
+    fn check_numbers(&self) -> Result<()> {
+        if let Some(speed) = self.playback_speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
+            return Err(Error::usage(format!(
+                "`playback_speed = {speed}` is not a speed; give a positive number, 1 for as recorded"
+            )));
+        }
+        if let Some(age) = self.max_age_s.filter(|age| !(age.is_finite() && *age >= 0.0)) {
+            return Err(Error::usage(format!("`max_age_s = {age}` is not a time span; give seconds from 0")));
+        }
+        if let Some(gap) = self.max_gap_s.filter(|gap| gap.is_nan() || *gap <= 0.0) {
+            return Err(Error::usage(format!("`max_gap_s = {gap}` is not a time span; give seconds over 0")));
+        }
+        if let Some(tolerance) = self.contact_tolerance_m.filter(|it| !(it.is_finite() && *it > 0.0)) {
+            return Err(Error::usage(format!(
+                "`contact_tolerance_m = {tolerance}` is no distance; give metres over 0"
+            )));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,39 @@
+//! Where joint states come from, as people name it.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::source::BagName;
+
+/// Where joint states come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StatesSpec {
+    /// A table, or lines.
+    File(PathBuf),
+    /// A topic of a bag of ROS 2.
+    Bag(BagName),
+    /// A live topic of ROS 2, from `/` on.
+    Topic(String),
+}
+
+impl StatesSpec {
+    /// What `states` names.
+    ///
+    /// # Errors
+    /// A usage error if it is no topic, or no bag.
+    pub fn named(states: &Path) -> Result<Self> {
+        // A path that is no text has no such beginning.
+        let text = states.to_str().unwrap_or_default();
+        if let Some(topic) = text.strip_prefix("ros2:") {
+            if !topic.starts_with('/') {
+                return Err(Error::usage(format!("`{topic}` is no topic; it begins with /: ros2:/{topic}"))
+                    .at("`joint_states`"));
+            }
+            return Ok(Self::Topic(topic.to_owned()));
+        }
+        if let Some(name) = text.strip_prefix("ros2-mcap:") {
+            return name.parse().map(Self::Bag).map_err(|e| Error::usage(e.to_string()).at("`joint_states`"));
+        }
+        Ok(if BagName::is_bag(states) { Self::Bag(BagName::new(states)) } else { Self::File(states.to_owned()) })
+    }
+}
