@@ -201,8 +201,8 @@ pub mod page {
     pub(crate) use somatic_page::*;
     #[doc(inline)]
     pub use somatic_page::{
-        EventKind, History, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Replies, Request, Series, Server,
-        ViewerId,
+        EventKind, History, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, RecordingEvents, Replies, Request,
+        Series, Server, ViewerId,
     };
 }
 
