@@ -16,6 +16,21 @@ const MIN_FACING: f64 = 0.05;
 /// A ray starts at this height over a taxel, in radii of its disc, and ends nowhere.
 const LIFT_RADII: f64 = 0.2;
 
+/// By view, which taxels of `body` it sees: those that face it and that nothing of the body hides.
+pub(super) fn seen(body: &Body, dots: &Dots, views: &[View]) -> Vec<Vec<bool>> {
+    let surface = RayTree::new(body.triangles_at_rest().into_iter().map(|(_, corners)| corners));
+    let in_view = |view: &View| {
+        let towards = view.axes()[2];
+        let is_seen = |taxel: usize| {
+            let (place, normal) = (dots.places[taxel], dots.normals[taxel]);
+            let from = place + normal * (LIFT_RADII * dots.radii[taxel]);
+            normal.dot(towards) > MIN_FACING && !surface.is_hit(&Ray::new(from, towards))
+        };
+        (0..dots.places.len()).map(is_seen).collect()
+    };
+    views.iter().map(in_view).collect()
+}
+
 /// The lines of a picture, each from disc to disc, pixels.
 pub(super) struct Lines {
     lines: Vec<[(i32, i32); 2]>,
@@ -34,23 +49,14 @@ impl Lines {
         thick: u32,
     ) -> Self {
         let (graph, _) = TaxelGraph::of(body);
-        let surface = RayTree::new(body.triangles_at_rest().into_iter().map(|(_, corners)| corners));
+        let seen_in_views = seen(body, dots, views);
         let mut lines = Vec::new();
-        for (index, view) in views.iter().enumerate() {
-            let towards = view.axes()[2];
-            let is_seen = |taxel: usize| {
-                let (place, normal) = (dots.places[taxel], dots.normals[taxel]);
-                let from = place + normal * (LIFT_RADII * dots.radii[taxel]);
-                normal.dot(towards) > MIN_FACING && !surface.is_hit(&Ray::new(from, towards))
-            };
-            let seen: Vec<bool> = (0..dots.places.len()).map(is_seen).collect();
-            let [left, top, width, height] = arrangement.views[index].part.map(|pixels| pixels as i32);
+        for (index, seen) in seen_in_views.iter().enumerate() {
             let pixel = |place: DVec3| {
                 let [x, y] = arrangement.pixel(index, place - middle);
                 (x.round() as i32, y.round() as i32)
             };
-            // A view may show less than the body.
-            let is_inside = |(x, y): (i32, i32)| (left..left + width).contains(&x) && (top..top + height).contains(&y);
+            let is_inside = |at: (i32, i32)| arrangement.views[index].holds(at);
             for (a, b) in graph.edges().map(|(a, b)| (a as usize, b as usize)).filter(|&(a, b)| seen[a] && seen[b]) {
                 let way = (dots.places[b] - dots.places[a]).normalize_or_zero();
                 let ends = [dots.places[a] + way * dots.radii[a], dots.places[b] - way * dots.radii[b]].map(pixel);
@@ -69,5 +75,27 @@ impl Lines {
             area.draw(&PathElement::new(ends, LINE.stroke_width(self.thick))).map_err(cannot)?;
         }
         area.present().map_err(cannot)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+
+    #[test]
+    fn a_view_sees_the_taxels_that_face_it_and_that_nothing_hides() {
+        let body = Body::from_bytes("humanoid", bundled::body("humanoid").unwrap()).unwrap();
+        let dots = Dots::of(&body);
+        let seen = seen(&body, &dots, &[View::Front, View::Back]);
+        let facing = |view: View, taxel: usize| dots.normals[taxel].dot(view.axes()[2]) > MIN_FACING;
+        for (view, seen) in [View::Front, View::Back].into_iter().zip(&seen) {
+            let of = |wanted: &dyn Fn(usize) -> bool| (0..seen.len()).filter(|&taxel| wanted(taxel)).count();
+            assert!(seen.iter().enumerate().all(|(taxel, seen)| !seen || facing(view, taxel)));
+            let (all, visible) = (of(&|taxel| facing(view, taxel)), of(&|taxel| seen[taxel]));
+            // An arm hides some of the flank, and little else is hidden.
+            assert!(visible < all && visible > all / 2, "{view:?}: {visible} of {all}");
+        }
+        assert!(seen[0].iter().zip(&seen[1]).all(|(front, back)| !(*front && *back)));
     }
 }

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colour::{PALETTE, PAPER, linear};
-use super::edges::Lines;
+use super::edges::{Lines, seen};
 use super::labels::{INK, Labels};
 use super::{Options, Picture, Prepared, stem};
 use crate::backend::gpu::raster;
@@ -29,6 +29,8 @@ const CORNERS: usize = 48;
 /// Width of a trail, pixels, and how opaque its oldest part is.
 const TRAIL_WIDTH: u32 = 3;
 const OLDEST_OPACITY: f64 = 0.15;
+/// Radius of a mark, in radii of a usual taxel.
+const MARK_RADII: f64 = 0.9;
 /// Marks are drawn in views that the touch faces by at least this cosine.
 const MIN_FACING: f64 = 0.15;
 
@@ -62,12 +64,13 @@ pub struct Moment<'a> {
 pub struct TouchPicture<'a> {
     body: &'a Body,
     prepared: Prepared,
-    ids: bool,
+    /// By view, the taxels that are labelled with their ids.
+    labelled: Vec<Vec<bool>>,
     edges: Option<Lines>,
 }
 
 impl<'a> TouchPicture<'a> {
-    /// For touches of `body` with `fields`; with `ids`, taxels are labelled with their ids.
+    /// For touches of `body` with `fields`; with `ids`, taxels are labelled with their ids in the views that see them.
     ///
     /// # Errors
     /// As [`super::of_body`].
@@ -75,7 +78,8 @@ impl<'a> TouchPicture<'a> {
         let key = vec![(None, "0.00 s".to_owned())];
         let prepared = Prepared::new(body, fields, options, &title(body), key)?;
         let edges = options.edges.then(|| prepared.edges(body));
-        Ok(Self { body, prepared, ids, edges })
+        let labelled = if ids { seen(body, &prepared.dots, &prepared.views) } else { Vec::new() };
+        Ok(Self { body, prepared, labelled, edges })
     }
 
     /// A picture of `moment`.
@@ -129,11 +133,14 @@ impl<'a> TouchPicture<'a> {
                 let [x, y] = arrangement.pixel(index, place - *middle);
                 (x.round() as i32, y.round() as i32)
             };
-            if self.ids {
+            let is_inside = |at: (i32, i32)| arrangement.views[index].holds(at);
+            if let Some(labelled) = self.labelled.get(index) {
                 let style = (FAMILY, 13).into_font().color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
-                for ((place, normal), taxel) in dots.places.iter().zip(&dots.normals).zip(&self.body.taxels) {
-                    if normal.dot(towards) > MIN_FACING {
-                        area.draw_text(&taxel.id.to_string(), &style, pixel(*place)).map_err(cannot)?;
+                let seen = dots.places.iter().zip(&self.body.taxels).zip(labelled).filter(|(_, seen)| **seen);
+                for ((place, taxel), _) in seen {
+                    let at = pixel(*place);
+                    if is_inside(at) {
+                        area.draw_text(&taxel.id.to_string(), &style, at).map_err(cannot)?;
                     }
                 }
             }
@@ -141,7 +148,8 @@ impl<'a> TouchPicture<'a> {
                 let [r, g, b] = own_colour(&marked.touch);
                 let colour = RGBColor(r, g, b);
                 let mark = Mark::new(self.body, marked, dots.mean_radius());
-                if mark.normal.dot(towards) < MIN_FACING {
+                // A mark is where its touch is: not in a view that shows another part of the body.
+                if mark.normal.dot(towards) < MIN_FACING || !is_inside(pixel(mark.place)) {
                     continue;
                 }
                 for (line, opacity) in mark.trail_lines() {
@@ -156,7 +164,10 @@ impl<'a> TouchPicture<'a> {
                     }
                 }
                 let (x, y) = pixel(mark.place);
-                for (radius, colour) in [(7, WHITE), (5, colour), (2, WHITE)] {
+                // As large as a taxel, so that a mark does not cover the touch that it marks.
+                let size = (self.prepared.usual_radius() * MARK_RADII).clamp(2.5, 7.0);
+                for (share, colour) in [(1.0, WHITE), (0.7, colour), (0.3, WHITE)] {
+                    let radius = (share * size).round() as i32;
                     area.draw(&Circle::new((x, y), radius, colour.filled())).map_err(cannot)?;
                 }
                 let style = (FAMILY, 15).into_font().color(&INK).pos(Pos::new(HPos::Left, VPos::Bottom));

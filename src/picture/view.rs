@@ -75,6 +75,14 @@ pub(super) struct PlacedView {
     middle: [f64; 2],
 }
 
+impl PlacedView {
+    /// Whether a pixel, right and down, is in its part: a view may show less than the body.
+    pub(super) fn holds(&self, (x, y): (i32, i32)) -> bool {
+        let [left, top, width, height] = self.part.map(|pixels| pixels as i32);
+        (left..left + width).contains(&x) && (top..top + height).contains(&y)
+    }
+}
+
 /// Views at one scale.
 pub(super) struct Arrangement {
     pub(super) views: Vec<PlacedView>,
@@ -214,6 +222,7 @@ mod tests {
             for (eye, placed) in arrangement.eyes(20.0).iter().zip(&arrangement.views) {
                 let [left, top, width, height] = placed.part;
                 assert!(left + width <= 900 && top >= 40 && top + height <= 742, "{:?}", placed.part);
+                assert!(placed.holds((left as i32, top as i32)) && !placed.holds(((left + width) as i32, top as i32)));
                 for point in &points {
                     let seen = eye.clip_from_world.project_point3(point.as_vec3());
                     assert!(seen.x.abs() < 1.0 && seen.y.abs() < 1.0 && (0.0..1.0).contains(&seen.z), "{seen}");

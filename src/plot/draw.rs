@@ -4,23 +4,22 @@ use std::collections::BTreeMap;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::HPos;
 
 use super::gather::{Gathered, Panel, colours_of};
+use super::line;
 use super::map::{MappedTaxel, PressureMap};
 use super::page::{Area, LEFT, LEGEND, Page, TITLE};
+use super::pen::{INK, Pen, SCALE, scaled};
 use super::series::Series;
 use super::ticks::{rounded, shown, ticks};
 use crate::colours::pressure_colours;
 use crate::error::{Error, Result};
-use crate::ink::{self, FAMILY, cannot};
-use crate::percept::{Column, Unit};
+use crate::ink::{self, cannot};
+use crate::percept::{Column, Outputs, Unit};
 use crate::plain;
 
-/// Dots drawn for each pixel of the arrangement: plotters has whole dots only.
-const SCALE: i32 = 2;
 const PAPER: RGBColor = RGBColor(252, 252, 250);
-const INK: RGBColor = RGBColor(40, 40, 40);
 const FAINT: RGBColor = RGBColor(226, 226, 224);
 const GREY: RGBColor = RGBColor(120, 120, 120);
 /// Of taxels that felt nothing.
@@ -49,8 +48,8 @@ const INTEGRAL: usize = 1;
 pub fn svg(all: &[Gathered]) -> Result<String> {
     let plot = Plot::of(all)?;
     let mut text = String::new();
-    plot.draw(&SVGBackend::with_string(&mut text, plot.dots()).into_drawing_area())?;
-    Ok(plain::xml(&text).into_owned())
+    plot.draw(&SVGBackend::with_string(&mut text, plot.dots()).into_drawing_area(), true)?;
+    Ok(plain::xml(&text).replace("<polyline ", "<polyline stroke-linejoin=\"round\" stroke-linecap=\"round\" "))
 }
 
 /// The same as PNG.
@@ -61,7 +60,7 @@ pub fn png(all: &[Gathered]) -> Result<Vec<u8>> {
     let plot = Plot::of(all)?;
     let (width, height) = plot.dots();
     let mut pixels = vec![0; (3 * width * height) as usize];
-    plot.draw(&BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area())?;
+    plot.draw(&BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area(), false)?;
     ink::png(&pixels, [width, height])
 }
 
@@ -87,6 +86,12 @@ fn for_people<'a>(column: &Column, p_unit: &'a str) -> (f64, &'a str) {
         Unit::MetrePerSecond => (1e3, "mm/s"),
         unit => (1.0, if unit == Unit::One { "" } else { unit.symbol() }),
     }
+}
+
+/// After how much an angle is the same again, rad: an axis after half a turn, a direction after a whole one.
+fn period(column: &Column) -> Option<f64> {
+    let is_axis = column.output == Outputs::ORIENTATION || column.output == Outputs::PRINCIPAL_AXIS;
+    (column.unit == Unit::Radian).then_some(if is_axis { std::f64::consts::PI } else { std::f64::consts::TAU })
 }
 
 /// The same of a pressure in `unit`.
@@ -128,10 +133,10 @@ impl<'a> Plot<'a> {
         ((SCALE * width) as u32, (SCALE * height) as u32)
     }
 
-    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<()> {
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, joins: bool) -> Result<()> {
         ink::font()?;
         area.fill(&PAPER).map_err(cannot)?;
-        let pen = Pen { area };
+        let pen = Pen { area, joins };
         self.draw_legend(&pen)?;
         let ranges = self.ranges();
         for (column, gathered) in self.all.iter().enumerate() {
@@ -231,9 +236,9 @@ impl<'a> Plot<'a> {
             let (own, width) = if is_whole { (WHOLE, WHOLE_WIDTH) } else { (self.colour(line), 1.5) };
             for (component, series) in components.iter().enumerate() {
                 let colour = paler(own, component);
-                for run in series.runs() {
-                    let at = |&(t, value): &(f64, f64)| (scaled(x(t - start_s)), scaled(y(value * factor)));
-                    pen.dots(&run.iter().map(at).collect::<Vec<_>>(), colour, width)?;
+                let (across, down) = (|t| scaled(x(t - start_s)), |value| scaled(y(value * factor)));
+                for run in line::points(series, period(panel.column), across, down) {
+                    pen.dots(&run, colour, width)?;
                 }
             }
         }
@@ -344,8 +349,12 @@ impl<'a> Plot<'a> {
         }
         let most = self.most[quantity] * factor;
         let range = [0.0, most.max(f64::MIN_POSITIVE)];
-        let marks = ticks(range, 4);
+        let mut marks = ticks(range, 4);
         let step = if marks.len() > 1 { marks[1] - marks[0] } else { most };
+        // The bar ends with its number, and a mark too close to it gives way.
+        marks.retain(|&mark| mark < 0.85 * range[1]);
+        marks.push(range[1]);
+        let step = if (range[1] / step - (range[1] / step).round()).abs() < 1e-6 { step } else { step / 10.0 };
         for &mark in &marks {
             let at = left + (f64::from(width) * mark / range[1]).round() as i32;
             pen.line(&[(at, top + 9), (at, top + 13)], GREY, 1.0)?;
@@ -361,75 +370,4 @@ fn paler(colour: RGBColor, index: usize) -> RGBColor {
     let share = [0.0, 0.45, 0.7][index.min(2)];
     let mixed = |part: u8| (f64::from(part) * (1.0 - share) + 255.0 * share).round() as u8;
     RGBColor(mixed(colour.0), mixed(colour.1), mixed(colour.2))
-}
-
-/// Pixels as dots.
-fn scaled(pixels: f64) -> i32 {
-    (pixels * f64::from(SCALE)).round() as i32
-}
-
-/// Draws in pixels of the arrangement; `dots` and `disc` in dots.
-struct Pen<'a, B: DrawingBackend> {
-    area: &'a DrawingArea<B, Shift>,
-}
-
-impl<B: DrawingBackend> Pen<'_, B> {
-    fn style(pixels: i32, colour: RGBColor, aligned: HPos) -> TextStyle<'static> {
-        (FAMILY, pixels * SCALE).into_font().color(&colour).pos(Pos::new(aligned, VPos::Center))
-    }
-
-    fn text(&self, text: &str, pixels: i32, colour: RGBColor, aligned: HPos, (x, y): (i32, i32)) -> Result<()> {
-        self.area.draw_text(text, &Self::style(pixels, colour, aligned), (SCALE * x, SCALE * y)).map_err(cannot)
-    }
-
-    fn upwards(&self, text: &str, pixels: i32, colour: RGBColor, (x, y): (i32, i32)) -> Result<()> {
-        let style = Self::style(pixels, colour, HPos::Center).transform(FontTransform::Rotate270);
-        self.area.draw_text(text, &style, (SCALE * x, SCALE * y)).map_err(cannot)
-    }
-
-    fn width(&self, text: &str, pixels: i32) -> Result<i32> {
-        let style = Self::style(pixels, INK, HPos::Left);
-        Ok(self.area.estimate_text_size(text, &style).map_err(cannot)?.0 as i32 / SCALE)
-    }
-
-    /// `text` cut off at its beginning where it is wider than `width`: the end of a path says more.
-    fn shortened(&self, text: &str, pixels: i32, width: i32) -> Result<String> {
-        let mut rest = text.to_owned();
-        while self.width(&rest, pixels)? > width && rest.chars().count() > 4 {
-            rest = format!("…{}", rest.chars().skip(3).collect::<String>());
-        }
-        Ok(rest)
-    }
-
-    fn fitted(&self, text: &str, pixels: i32, colour: RGBColor, at: (i32, i32), width: i32) -> Result<()> {
-        self.text(&self.shortened(text, pixels, width)?, pixels, colour, HPos::Left, at)
-    }
-
-    fn fitted_centred(&self, text: &str, pixels: i32, colour: RGBColor, at: (i32, i32), width: i32) -> Result<()> {
-        self.text(&self.shortened(text, pixels, width)?, pixels, colour, HPos::Center, at)
-    }
-
-    fn line(&self, points: &[(i32, i32)], colour: RGBColor, width: f64) -> Result<()> {
-        let points: Vec<(i32, i32)> = points.iter().map(|&(x, y)| (SCALE * x, SCALE * y)).collect();
-        self.dots(&points, colour, width)
-    }
-
-    fn dots(&self, points: &[(i32, i32)], colour: RGBColor, width: f64) -> Result<()> {
-        match points {
-            [] => Ok(()),
-            [at] => self.disc(*at, scaled(width / 2.0).max(1), colour),
-            points => {
-                let stroke = colour.stroke_width(scaled(width).max(1) as u32);
-                self.area.draw(&PathElement::new(points.to_vec(), stroke)).map_err(cannot)
-            }
-        }
-    }
-
-    fn disc(&self, at: (i32, i32), radius: i32, colour: RGBColor) -> Result<()> {
-        self.area.draw(&Circle::new(at, radius, colour.filled())).map_err(cannot)
-    }
-
-    fn rectangle(&self, corners: [(i32, i32); 2], colour: RGBColor) -> Result<()> {
-        self.area.draw(&Rectangle::new(corners, colour.filled())).map_err(cannot)
-    }
 }

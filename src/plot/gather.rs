@@ -244,7 +244,11 @@ impl Gatherer {
                 let children = level(1).into_iter().filter(|&field| self.fields[field].most_load > 0.0).collect();
                 [vec![only], self.heaviest(children, MAX_LINES - 1)].concat()
             }
-            _ => self.heaviest(top, MAX_LINES),
+            _ => {
+                let is_touched = |&field: &usize| self.fields[field].most_load > 0.0;
+                let touched: Vec<usize> = top.iter().copied().filter(is_touched).collect();
+                self.heaviest(if touched.is_empty() { top } else { touched }, MAX_LINES)
+            }
         }
     }
 

@@ -6,9 +6,11 @@
 
 mod draw;
 mod gather;
+mod line;
 mod map;
 mod page;
 mod path;
+mod pen;
 mod series;
 mod ticks;
 

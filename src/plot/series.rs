@@ -52,24 +52,6 @@ impl Series {
         let ranges = self.buckets.iter().filter_map(|bucket| bucket.range);
         ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)])
     }
-
-    /// The points of its line, one list for each stretch in which it is not absent.
-    pub(super) fn runs(&self) -> Vec<Vec<(f64, f64)>> {
-        let mut runs: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-        for bucket in &self.buckets {
-            let Some([low, high]) = bucket.range else {
-                runs.push(Vec::new());
-                continue;
-            };
-            let Some(run) = runs.last_mut() else { continue };
-            run.push((bucket.t_s, low));
-            if high > low {
-                run.push((bucket.t_s, high));
-            }
-        }
-        runs.retain(|run| !run.is_empty());
-        runs
-    }
 }
 
 fn joined(one: Bucket, other: Bucket) -> Bucket {
@@ -96,14 +78,5 @@ mod tests {
         assert!(series.buckets.windows(2).all(|pair| pair[0].t_s < pair[1].t_s));
         let peak = series.buckets.iter().rposition(|bucket| bucket.t_s <= 777_777.0).unwrap();
         assert_eq!(series.buckets[peak].range.unwrap()[1], 99.0);
-    }
-
-    #[test]
-    fn what_is_absent_parts_the_line() {
-        let mut series = Series::default();
-        for (t, value) in [(0.0, Some(1.0)), (1.0, Some(2.0)), (2.0, None), (3.0, Some(4.0))] {
-            series.push(t, value);
-        }
-        assert_eq!(series.runs(), [vec![(0.0, 1.0), (1.0, 2.0)], vec![(3.0, 4.0)]]);
     }
 }

@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+use somatic::source::BoardState;
 use somatic_testing::skip;
 
 /// Browsers by the names that systems give them.
@@ -46,11 +48,13 @@ fn the_page_does_in_a_browser_what_it_promises() {
         "wire.test.js",
         "messages.test.js",
         "parts.test.js",
+        "colours.test.js",
         "browser.test.js",
         "look.test.js",
         "touches.test.js",
         "self_contacts.test.js",
         "hidden.test.js",
+        "situations.test.js",
     ])
     .current_dir(folder);
     node.env("SOMATIC", env!("CARGO_BIN_EXE_somatic")).env("CHROMIUM", browser);
@@ -58,4 +62,14 @@ fn the_page_does_in_a_browser_what_it_promises() {
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
     eprintln!("{said}");
+}
+
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+#[test]
+fn the_page_has_the_words_of_boards_that_the_program_has() {
+    let page =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/page/src/web/wire.js")).unwrap();
+    let words: Vec<String> = BoardState::ALL.iter().map(|state| format!("\"{}\"", state.word())).collect();
+    let table = format!("BOARD_STATES = [{}];", words.join(", "));
+    assert!(page.contains(&table), "wire.js has not {table}");
 }

@@ -93,3 +93,56 @@ fn what_cannot_be_plotted_is_said_in_a_line() {
     assert!(fails(3, &["plot", &at("cut.csv"), "-o", &svg]).contains("never processed"));
     assert_eq!(files_in(folder.path()), ["a.svg", "cut.csv", "empty.csv"]);
 }
+
+#[test]
+fn a_noisy_line_stays_in_its_panel() {
+    let folder = tempfile::tempdir().unwrap();
+    let noisy = folder.path().join("noisy.csv");
+    // 30 s at 200 Hz on the palm: far more frames than pixels, each far from the one before.
+    let rows = (0..6000_u32).map(|frame| {
+        let values = (0..9_u32).map(|taxel| (50 + (frame * 7919 + taxel * 104_729) % 300).to_string());
+        format!("{:.3},{}", f64::from(frame) / 200.0, values.collect::<Vec<_>>().join(","))
+    });
+    let text = [vec!["t,0,1,2,3,4,5,6,7,8".to_owned()], rows.collect()].concat().join("\n");
+    std::fs::write(&noisy, text + "\n").unwrap();
+    let arguments = [
+        "--body",
+        "hand",
+        "--fields",
+        "hand/palm",
+        "--fields",
+        "hand/back",
+        "--outputs",
+        "total,orientation",
+        text_of(&noisy),
+    ];
+    let png = drawn(folder.path(), "noisy.png", &arguments);
+    let decoder = png::Decoder::new(std::io::Cursor::new(&png));
+    let mut reader = decoder.read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    let width = reader.info().width as usize;
+    // Two dots a pixel of the arrangement. Title and legend, panels 132 high and 16 apart, then the axis and the maps.
+    let panels = [60..60 + 132, 208..208 + 132];
+    let is_line = |pixel: &[u8]| [[0_u8, 114, 178], [213, 94, 0]].iter().any(|line| pixel == line);
+    let (mut inside, mut outside) = (0, 0);
+    for (at, pixel) in pixels.chunks_exact(3).enumerate() {
+        let (x, y) = (at % width / 2, at / width / 2);
+        let is_legend = y < 56;
+        if !is_line(pixel) || is_legend {
+            continue;
+        }
+        // Half the width of a line may stand out.
+        let is_in =
+            panels.iter().any(|panel| (panel.start - 2..panel.end + 2).contains(&y)) && (64..66 + 760 + 2).contains(&x);
+        *(if is_in { &mut inside } else { &mut outside }) += 1;
+    }
+    assert!(inside > 10_000 && outside == 0, "{inside} dots of lines in their panels, {outside} outside");
+    // As SVG the corners are round too, and the lines are no longer than the panel is wide, twice.
+    let svg = String::from_utf8(drawn(folder.path(), "noisy.svg", &arguments)).unwrap();
+    assert!(svg.contains("stroke-linejoin=\"round\""));
+    let of_palm = svg.split("<polyline ").filter(|line| line.contains("stroke=\"#D55E00\""));
+    let points = of_palm.filter_map(|line| line.split("points=\"").nth(1)?.split('"').next());
+    let longest = points.map(|points| points.split_whitespace().count()).max();
+    assert!(longest.unwrap() <= 4 * 760 + 8, "{longest:?} points");
+}

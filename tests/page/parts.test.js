@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Choices, MARKS } from "../../crates/page/src/web/choices.js";
+import { countOf } from "../../crates/page/src/web/boards.js";
 import { Camera, PRESETS } from "../../crates/page/src/web/camera.js";
 import { addRect, changedRects } from "../../crates/page/src/web/dirty.js";
 import { PALETTE } from "../../crates/page/src/web/dom.js";
@@ -9,15 +10,21 @@ import {
   scaleFor,
   seconds,
   short,
+  shortPath,
   tickText,
   ticks,
   vectorWithUnit,
   withUnit,
 } from "../../crates/page/src/web/format.js";
+import { endedTicks } from "../../crates/page/src/web/legend.js";
 import { poseToRows, toWorld } from "../../crates/page/src/web/math.js";
 import { Model } from "../../crates/page/src/web/model.js";
-import { touchInWorld } from "../../crates/page/src/web/places.js";
-import { byPixel } from "../../crates/page/src/web/plot.js";
+import { orientationLine, touchInWorld } from "../../crates/page/src/web/places.js";
+import { byPixel, runsOf } from "../../crates/page/src/web/plot.js";
+import { spacings } from "../../crates/page/src/web/rest.js";
+import { roundLength } from "../../crates/page/src/web/scale_bar.js";
+import { tokenIn } from "../../crates/page/src/web/tokens.js";
+import { BOARD_STATES } from "../../crates/page/src/web/wire.js";
 import { colourIndex, fillColours } from "../../crates/page/src/web/taxels.js";
 
 const near = (a, b, bound = 1e-6) => assert.ok(Math.abs(a - b) <= bound, `${a} is not near ${b}`);
@@ -50,10 +57,14 @@ test("the colour of a pressure is round(clamp(p / max) * 255)", () => {
   const colours = Array.from({ length: 256 }, (_, i) => [i, i, i]);
   const out = new Uint8Array(16);
   fillColours(new Float32Array([0, 5, NaN, 1e9]), new Uint8Array([0, 0, 0, 4]), 10, colours, [1, 2, 3], out);
-  assert.deepEqual([...out.subarray(0, 4)], [1, 2, 3, 7]);
+  assert.deepEqual([...out.subarray(0, 4)], [1, 2, 3, 15]);
   assert.deepEqual([...out.subarray(4, 8)], [128, 128, 128, 0]);
   assert.equal(out[11], 1, "a taxel without a pressure looks missing");
   assert.deepEqual([...out.subarray(12)], [255, 255, 255, 4]);
+  const unsent = new Uint8Array([7, 1, 0, 0]);
+  fillColours(new Float32Array([NaN, NaN, 0, 0]), unsent, 10, colours, [1, 2, 3], out, () => [9, 8, 7]);
+  assert.deepEqual([...out.subarray(0, 4)], [9, 8, 7, 7], "what no source sends has its field's colour");
+  assert.equal(out[7], 1, "what a source should have sent is missing");
 });
 
 test("changed taxels give few rectangles that hold them", () => {
@@ -273,4 +284,111 @@ test("an absent column says why", () => {
   assert.equal(model.value(0, "principal_axis"), null);
   assert.equal(model.reason(0, "principal_axis"), "one_taxel");
   assert.equal(model.value(1, "total"), null);
+});
+
+test("boards that speak are counted as speaking", () => {
+  const boards = BOARD_STATES.map((state) => ({ state }));
+  assert.equal(countOf(boards), "1 of 4 speaking");
+  assert.equal(countOf([boards[1], boards[1]]), "2 speaking");
+});
+
+test("an angle that goes past its end breaks its line, and nothing else does", () => {
+  const line = (values) => ({ least: values, most: values, reach: 1 });
+  const turning = line([2.9, 3.1, 0.1, 0.3, NaN, 0.5]);
+  const spans = (runs) => runs.map((run) => run.map(({ x }) => x));
+  assert.deepEqual(spans(runsOf(turning, Math.PI)), [[0, 1], [2, 3], [5]]);
+  assert.deepEqual(spans(runsOf(turning, Infinity)), [[0, 1, 2, 3], [5]]);
+  // Both ends in one pixel are two points, without a line between them.
+  const both = runsOf({ least: [0.01, 0.02], most: [3.1, 0.03], reach: 1 }, Math.PI);
+  assert.deepEqual(
+    both.map((run) => run.map(({ low, high }) => [low, high])),
+    [[[0.01, 0.01]], [[3.1, 3.1]], [[0.02, 0.03]]],
+  );
+});
+
+test("a bar of colours ends with its number", () => {
+  const texts = (most) => endedTicks(most).map(({ part, text }) => [Math.round(100 * part), text]);
+  assert.deepEqual(texts(880), [
+    [0, "0"],
+    [57, "500"],
+    [100, "880"],
+  ]);
+  assert.deepEqual(texts(40).at(-1), [100, "40"]);
+  // One right before the end gives way.
+  assert.deepEqual(texts(4.855).at(-1), [100, "4.86"]);
+  assert.ok(texts(4.3).every(([part]) => part === 100 || part < 85));
+});
+
+test("a length is round and fits", () => {
+  assert.deepEqual(
+    [0.0234, 0.07, 12, 0.0051, 0.19].map((most) => roundLength(most).text),
+    ["2 cm", "5 cm", "10 m", "5 mm", "10 cm"],
+  );
+  for (const most of [1e-4, 0.033, 7]) assert.ok(roundLength(most).metres <= most);
+});
+
+test("a long path shows its end", () => {
+  assert.equal(shortPath("walk.csv"), "walk.csv");
+  const long = shortPath("/home/somebody/experiments/of/last/year/with/a/robot/walk.csv");
+  assert.equal(long, "…/of/last/year/with/a/robot/walk.csv");
+  assert.ok(shortPath("x".repeat(99)).length === 40);
+});
+
+test("a token is found in an address, and nowhere else", () => {
+  const token = "0123456789abcdef0123456789abcdef";
+  assert.equal(tokenIn(` http://127.0.0.1:7879/#token=${token} `), token);
+  assert.equal(tokenIn(`#token=${token}&t=2.9`), token);
+  assert.equal(tokenIn(token), token);
+  for (const text of ["", "http://127.0.0.1:7879/#t=2.9", `${token}0`, "#token=short"])
+    assert.equal(tokenIn(text), null);
+});
+
+test("spacing is the distance to the nearest taxel of the same link", () => {
+  const mesh = {
+    taxelPosition: new Float32Array([0, 0, 0, 0.01, 0, 0, 0.014, 0, 0, 0.0101, 0, 0]),
+    taxelLink: new Uint32Array([0, 0, 0, 1]),
+  };
+  assert.deepEqual(
+    spacings(mesh).map((m) => Math.round(1e6 * m)),
+    [4000, 4000, 10000],
+  );
+});
+
+test("a field keeps its colour, and fields with other names begin anew", () => {
+  const model = new Model();
+  const welcome = (names) => ({
+    run: "1",
+    columns: [{ name: "peak", unit: "P", components: 1 }],
+    fields: names.map((name) => ({ name, letter: null, label: name, parent: null, link: 0, members: [] })),
+    links: [],
+  });
+  model.begin(welcome(["a", "b", "c"]));
+  assert.deepEqual([model.fieldColour(2), model.fieldColour(0), model.fieldColour(2)], [0, 1, 0]);
+  model.begin(welcome(["a", "b", "c"]));
+  assert.equal(model.fieldColour(0), 1);
+  model.begin(welcome(["a", "b"]));
+  assert.equal(model.fieldColour(1), 0);
+  assert.deepEqual([model.loadColumn, model.loadUnit, model.plottedColumn], ["peak", "P", "peak"]);
+});
+
+test("an orientation line ends at the two farthest points of its field", () => {
+  // Pressed by 4 at the right, by 2 at the upper left: their points are at the taxel and half of the way.
+  const uv = [
+    [0.02, 0],
+    [-0.02, 0.02],
+    [0, -0.001],
+  ];
+  const centroid = [0.004, 0.004];
+  const points = [
+    [0.02, 0],
+    [0.004 - 0.012, 0.004 + 0.008],
+  ];
+  const angle = Math.atan2(points[0][1] - points[1][1], points[0][0] - points[1][0]) + Math.PI;
+  const model = {
+    welcome: { fields: [{ members: [0, 1, 2], weights: null, chart: { uv } }] },
+    pressure: [4, 2, 1],
+    value: (_, column) => (column === "orientation" ? [angle % Math.PI] : centroid),
+  };
+  const line = orientationLine(model, 0);
+  line.flat().forEach((x, i) => near(x, points.flat()[i]));
 });

@@ -39,7 +39,7 @@ impl Current {
         Self {
             snapshot: Box::new(Snapshot::new(&scene.plan)),
             is_read: true,
-            readings: Readings::new(scene.plan.clone(), scene.counts.taxels),
+            readings: Readings::new(scene.plan.clone(), scene.counts.taxels, &scene.value_of),
             poses: scene.poses.clone(),
             percepts: Vec::new(),
             percept_changes: 0,

@@ -9,6 +9,7 @@
 
 mod answers;
 mod connection;
+mod contacts;
 mod current;
 mod encode;
 mod exchange;
@@ -38,6 +39,7 @@ mod touches;
 mod viewer;
 mod wake;
 
+pub use contacts::RecordingEvents;
 pub use encode::History;
 pub use exchange::{Replies, ViewerId};
 pub use listen::Listen;

@@ -16,6 +16,8 @@ const SMOOTH_COSINE: f64 = 0.766;
 const MAX_DEFAULT_RADIUS_M: f64 = 0.005;
 /// The radius of such a disc, of the distance to the nearest taxel.
 const DEFAULT_RADIUS_SHARE: f64 = 0.4;
+/// The largest radius of any disc, of that distance: discs leave a gap between each other.
+const MAX_RADIUS_SHARE: f64 = 0.47;
 
 /// Triangles of all surfaces.
 #[derive(Debug, Default)]
@@ -127,29 +129,28 @@ impl Mesh {
     }
 }
 
-/// The radius of each taxel's disc, m: that of its area, or where that is unknown a part of the distance to the nearest
-/// other taxel of its link.
+/// The radius of each taxel's disc, m: that of its area as far as it reaches no neighbour, or where the area is unknown a part of
+/// the distance to the nearest other taxel of its link.
 pub(super) fn disc_radii_m(taxels: &[Taxel]) -> Vec<f64> {
     let mut of_link: HashMap<usize, Vec<GeomWithData<[f64; 3], u32>>> = HashMap::new();
-    if taxels.iter().any(|taxel| taxel.area <= 0.0) {
-        for (index, taxel) in taxels.iter().enumerate() {
-            let point = GeomWithData::new(taxel.position_in_link.to_array(), index as u32);
-            of_link.entry(taxel.link).or_default().push(point);
-        }
+    for (index, taxel) in taxels.iter().enumerate() {
+        let point = GeomWithData::new(taxel.position_in_link.to_array(), index as u32);
+        of_link.entry(taxel.link).or_default().push(point);
     }
     let trees: HashMap<usize, RTree<_>> =
         of_link.into_iter().map(|(link, points)| (link, RTree::bulk_load(points))).collect();
     let radius = |(index, taxel): (usize, &Taxel)| {
-        if taxel.area > 0.0 {
-            return (taxel.area / std::f64::consts::PI).sqrt();
-        }
         let near = trees[&taxel.link].nearest_neighbor_iter(taxel.position_in_link.to_array());
         let distances = near
             .filter(|other| other.data != index as u32)
             .map(|other| DVec3::from_array(*other.geom()).distance(taxel.position_in_link));
         // Taxels at the same place are one sensor to look at.
         let nearest = { distances }.find(|distance| *distance > 1e-9);
-        nearest.map_or(MAX_DEFAULT_RADIUS_M, |distance| (DEFAULT_RADIUS_SHARE * distance).min(MAX_DEFAULT_RADIUS_M))
+        let nearest = nearest.unwrap_or(f64::INFINITY);
+        if taxel.area > 0.0 {
+            return (taxel.area / std::f64::consts::PI).sqrt().min(MAX_RADIUS_SHARE * nearest);
+        }
+        (DEFAULT_RADIUS_SHARE * nearest).min(MAX_DEFAULT_RADIUS_M)
     };
     taxels.iter().enumerate().map(radius).collect()
 }
@@ -229,8 +230,10 @@ mod tests {
         let taxels =
             [taxel(0, 0.0, 1e-4), taxel(1, 0.010, 0.0), taxel(2, 0.014, 0.0), taxel(3, 1.0, 0.0), taxel(4, 1.0, 0.0)];
         let radii = disc_radii_m(&taxels);
-        let expected = [(1e-4 / std::f64::consts::PI).sqrt(), 0.4 * 0.004, 0.4 * 0.004, 0.005, 0.005];
+        // The first one's area would reach over its neighbour, 10 mm away.
+        let expected = [0.0047, 0.4 * 0.004, 0.4 * 0.004, 0.005, 0.005];
         assert!(radii.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{radii:?}");
         assert_eq!(disc_radii_m(&taxels[1..2]), [0.005]);
+        assert_eq!(disc_radii_m(&taxels[..1]), [(1e-4 / std::f64::consts::PI).sqrt()]);
     }
 }

@@ -4,13 +4,14 @@ use std::collections::HashMap;
 use std::sync::{Arc, MutexGuard};
 use std::time::Instant;
 
+use super::contacts::{Contacts, RecordingEvents};
 use super::exchange::{Exchange, Shared, WAITING_ROWS};
 use super::log::{About, Event, EventKind};
 use super::scene::PageScene;
 use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
 use crate::signal::{BoardHealth, Frame, Pose, RawValue};
-use somatic_engine::percept::{Flags, Percepts, TouchTrails};
+use somatic_engine::percept::{Percepts, TouchTrails};
 use somatic_engine::scene::Plan;
 
 /// Events that wait for their log at most.
@@ -46,14 +47,12 @@ pub struct Publisher {
     index_of_link: HashMap<String, u32>,
     /// Poses of the last frame that was not late with them.
     last_poses: Vec<(u32, Pose)>,
-    /// By field.
-    in_contact: Vec<bool>,
-    /// Touches of the last frame: their ids and links.
-    touching: Vec<(u64, u32)>,
+    /// Number of fields.
+    fields: usize,
+    /// Of the last frame; none where a pass over the recording logs them.
+    contacts: Option<Contacts>,
     /// Where touches were.
     trails: TouchTrails,
-    /// Whether the next frame does not follow the last one.
-    jumped: bool,
     number: Option<u64>,
     published: u64,
     events: Vec<Event>,
@@ -72,10 +71,9 @@ impl Publisher {
             value_of: scene.value_of.clone(),
             index_of_link: scene.index_of_link.clone(),
             last_poses: Vec::new(),
-            in_contact: vec![false; scene.plan.fields.len()],
-            touching: Vec::new(),
+            fields: scene.plan.fields.len(),
+            contacts: Some(Contacts::new(scene.plan.fields.len())),
             trails: TouchTrails::default(),
-            jumped: false,
             number: None,
             published: 0,
             events: Vec::with_capacity(MAX_WAITING_EVENTS),
@@ -165,7 +163,15 @@ impl Publisher {
 
     /// Says that the next frame does not follow the last one, as after a seek: what is touched in it begins no touch.
     pub fn jump(&mut self) {
-        self.jumped = true;
+        if let Some(contacts) = &mut self.contacts {
+            contacts.jumped = true;
+        }
+    }
+
+    /// Leaves onsets and releases to a pass over the whole recording, to which it gives what logs them.
+    pub fn recording_events(&mut self) -> RecordingEvents {
+        self.contacts = None;
+        RecordingEvents { exchange: Arc::clone(&self.exchange), contacts: Contacts::new(self.fields) }
     }
 
     /// Logs an event: a message about a board or another notice.
@@ -224,48 +230,11 @@ impl Publisher {
         self.exchange.wake_for_viewers();
     }
 
-    /// Onsets and releases: of touches of the whole body where these are looked for, else of fields.
+    /// Onsets and releases, unless a pass over the recording logs them.
     fn note_contacts(&mut self, percepts: &Percepts) {
-        if percepts.touches(0).is_some() {
-            return self.note_touches(percepts);
-        }
-        let fields = percepts.fields().max(1);
-        for (frame, flags) in percepts.flags.chunks_exact(fields).enumerate() {
-            let jumped = std::mem::take(&mut self.jumped);
-            for (field, flags) in flags.iter().enumerate() {
-                let touched = !flags.contains(Flags::NO_CONTACT);
-                if self.in_contact[field] == touched {
-                    continue;
-                }
-                self.in_contact[field] = touched;
-                if !jumped {
-                    let kind = if touched { EventKind::Onset } else { EventKind::Release };
-                    let t_s = percepts.t_s(frame);
-                    self.add_event(Event { seq: 0, t_s, kind, about: About::Field(field as u32), text: None });
-                }
-            }
-        }
-    }
-
-    fn note_touches(&mut self, percepts: &Percepts) {
-        let mut before = std::mem::take(&mut self.touching);
-        for frame in 0..percepts.frames() {
-            let jumped = std::mem::take(&mut self.jumped);
-            let now = percepts.touches(frame).map_or(&[][..], |found| &found.touches);
-            if !jumped {
-                let t_s = percepts.t_s(frame);
-                let event = |kind, id, link| Event { seq: 0, t_s, kind, about: About::Touch { id, link }, text: None };
-                for &(id, link) in before.iter().filter(|(id, _)| now.iter().all(|touch| touch.id != *id)) {
-                    self.add_event(event(EventKind::Release, id, link));
-                }
-                for touch in now.iter().filter(|touch| before.iter().all(|(id, _)| *id != touch.id)) {
-                    self.add_event(event(EventKind::Onset, touch.id, touch.link));
-                }
-            }
-            before.clear();
-            before.extend(now.iter().map(|touch| (touch.id, touch.link)));
-        }
-        self.touching = before;
+        let Some(mut contacts) = self.contacts.take() else { return };
+        contacts.note(percepts, |event| self.add_event(event));
+        self.contacts = Some(contacts);
     }
 
     fn add_event(&mut self, event: Event) {

@@ -19,6 +19,8 @@ pub(super) enum Health {
     OutOfRange,
     /// By the calibration, by drift compensation, or because no field of the run holds it.
     LeftOut,
+    /// The source has no value for it, in no frame.
+    NotSent,
 }
 
 impl Health {
@@ -32,6 +34,7 @@ impl Health {
             Self::Saturated => "saturated",
             Self::OutOfRange => "out of range",
             Self::LeftOut => "left out",
+            Self::NotSent => "not sent",
         }
     }
 }
@@ -48,6 +51,8 @@ pub(super) struct Reading {
 #[derive(Debug)]
 pub(super) struct Readings {
     plan: Plan,
+    /// By the plan's channels, whether frames have their values.
+    is_sent: Vec<bool>,
     /// By taxel; NaN where there is none.
     pressures: Vec<f32>,
     /// By taxel, as [`Health`].
@@ -59,9 +64,10 @@ pub(super) struct Readings {
 }
 
 impl Readings {
-    /// Of `taxels` taxels, of which `plan` reads some.
-    pub(super) fn new(plan: Plan, taxels: usize) -> Self {
+    /// Of `taxels` taxels, of which `plan` reads some; `value_of` says where frames have the values of its channels.
+    pub(super) fn new(plan: Plan, taxels: usize, value_of: &[Option<usize>]) -> Self {
         Self {
+            is_sent: value_of.iter().map(Option::is_some).collect(),
             plan,
             pressures: vec![f32::NAN; taxels],
             health: vec![Health::LeftOut as u8; taxels],
@@ -127,6 +133,7 @@ impl Readings {
         let flags = Flags::from_bits_truncate(pressure.status & !UNUSABLE);
         let health = match () {
             () if taxel.mask => Health::LeftOut,
+            () if !self.is_sent[channel] => Health::NotSent,
             () if value == RawValue::STALE => Health::Stale,
             () if value.is_missing() => Health::Missing,
             () if flags.contains(Flags::FAULTY_INPUT) => Health::Faulty,
@@ -165,11 +172,14 @@ mod tests {
             (RawValue::new(-20.0), Some(0.0), Health::OutOfRange),
             (RawValue::new(40.0), None, Health::LeftOut),
             (RawValue::new(0.0), Some(0.0), Health::Good),
+            (RawValue::MISSING, None, Health::NotSent),
         ];
+        let mut value_of: Vec<Option<usize>> = (0..ids.len()).map(Some).collect();
+        value_of[8] = None;
         for (raw, (value, ..)) in snapshot.raw.iter_mut().zip(values) {
             *raw = value;
         }
-        let mut readings = Readings::new(plan, body.taxels.len() + 1);
+        let mut readings = Readings::new(plan, body.taxels.len() + 1, &value_of);
         assert_eq!(readings.read(&snapshot), 200.0);
         for (index, (_, pressure, health)) in values.into_iter().enumerate() {
             assert_eq!(readings.health()[index], health as u8);
@@ -180,6 +190,12 @@ mod tests {
         }
         assert_eq!(readings.health()[body.taxels.len()], Health::LeftOut as u8);
         assert_eq!(readings.changes(), 1);
+        // The page knows them by the same numbers and words.
+        let words = [&values[..7], &values[8..]].concat();
+        let words: Vec<String> = words.iter().map(|(.., health)| format!("\"{}\"", health.word())).collect();
+        let table = format!("HEALTH = [{}]", words.join(","));
+        let plain = |text: &str| text.replace(char::is_whitespace, "").replace(",]", "]");
+        assert!(plain(include_str!("web/wire.js")).contains(&plain(&table)), "{table}");
         readings.read(&snapshot);
         assert_eq!(readings.changes(), 1, "nothing has changed");
         (snapshot.baselines[0].0, snapshot.calibration_changes) = (20.0, 1);

@@ -11,11 +11,14 @@ mod timeline;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use somatic::author::lint;
+use somatic::field::FieldSet;
 use somatic::output::PrivateFile;
-use somatic::page::{Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
+use somatic::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
 use somatic::source::SourceSpec;
 use somatic::{BackendKind, Body, Engine, Error, Options, Result};
 
@@ -128,6 +131,14 @@ pub(super) fn view(arguments: &Arguments) -> Result<u8> {
     }
 }
 
+/// What is odd about the layout of `body`, each in a sentence.
+fn findings(body: &Body) -> Vec<String> {
+    let fields = FieldSet::new(body).map(|set| set.fields);
+    let odd = fields.map(|fields| lint(body, &fields)).unwrap_or_default();
+    let found: Vec<String> = body.findings.iter().cloned().chain(odd.iter().map(ToString::to_string)).collect();
+    if found.is_empty() { vec!["Nothing is odd about its layout.".to_owned()] } else { found }
+}
+
 impl Opening<'_> {
     /// Serves `scene` and says where.
     fn start(&self, scene: PageScene) -> Result<Opened> {
@@ -148,7 +159,6 @@ impl Opening<'_> {
     fn body(&self, body: &Body) -> Result<u8> {
         let mut engine = Engine::new(body, Options::default().backend(BackendKind::Cpu))?;
         let (name, what, why) = engine.backend();
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let scene = PageScene::new(
             body,
             engine.plan(),
@@ -156,14 +166,14 @@ impl Opening<'_> {
                 source: "at rest",
                 mode: Mode::Live,
                 backend: [name, &what, why],
-                taxels: &ids,
+                // Nothing sends a value of any.
+                taxels: &[],
                 wiring: None,
                 recorded_max: None,
             },
         );
         let stop = stop_soon_on_signal()?;
         let mut opened = self.start(scene)?;
-        // Without frames every taxel's value is missing, and so it is shown.
         let frame = engine.frame(0.0);
         engine.process_one(&frame)?;
         opened.publisher.read(&PageInput {
@@ -176,7 +186,15 @@ impl Opening<'_> {
         });
         opened.publisher.publish(engine.percepts());
         opened.publisher.ended("The body at rest, without frames.");
+        let (sender, found) = channel();
+        let looked_at = body.clone();
+        // A large body takes a while, in which the page is there already. The thread ends with this one alone.
+        std::thread::spawn(move || sender.send(findings(&looked_at)));
         while !stop.load(Ordering::Relaxed) && self.until.is_none_or(|until| Instant::now() < until) {
+            for finding in found.try_recv().into_iter().flatten() {
+                opened.publisher.event(EventKind::Notice, 0.0, None, finding);
+            }
+            opened.publisher.flush();
             std::thread::sleep(Duration::from_millis(50));
         }
         Ok(DONE)
@@ -216,7 +234,7 @@ impl Opening<'_> {
         // The same backend for all engines, so that they have the same bits.
         let options = settled.options.backend(name.parse()?);
         let checkpoints = Arc::new(Checkpoints::new(&mut engine)?);
-        let Opened { mut server, publisher, _handed_over } = self.start(scene)?;
+        let Opened { mut server, mut publisher, _handed_over } = self.start(scene)?;
         let recorded = match input.spec {
             Some(SourceSpec::Mcap(ref path)) => Recorded::open(path, engine.plan())?,
             _ => None,
@@ -229,7 +247,7 @@ impl Opening<'_> {
             differences: Arc::new(Differences::default()),
             replies: server.replies(),
         };
-        let timeline = timeline::start(shared.clone(), recorded);
+        let timeline = timeline::start(shared.clone(), recorded, publisher.recording_events());
         let explainer = Explainer::start(shared.clone());
         let player = Player::new(engine, shared, publisher, explainer, timeline);
         let speed = asked.playback_speed.unwrap_or(1.0);

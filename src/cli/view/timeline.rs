@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
+use somatic::page::RecordingEvents;
 use somatic::{Percepts, Result};
 
 use super::super::stdio::say;
@@ -91,19 +92,24 @@ impl Timeline {
     }
 }
 
-/// Starts the pass on a thread of its own, which compares with what is `recorded`. It ends with the recording.
-pub(super) fn start(shared: Shared, recorded: Option<Recorded>) -> Arc<Timeline> {
+/// Starts the pass on a thread of its own, which compares with what is `recorded` and logs `events`. It ends with the recording.
+pub(super) fn start(shared: Shared, recorded: Option<Recorded>, events: RecordingEvents) -> Arc<Timeline> {
     let timeline = Arc::new(Timeline::new(&shared.recording));
     let filled = Arc::clone(&timeline);
     std::thread::spawn(move || {
-        if let Err(error) = pass(&shared, recorded, &filled) {
+        if let Err(error) = pass(&shared, recorded, events, &filled) {
             say(&format!("{error}; the recording can be played, but jumps take long"));
         }
     });
     timeline
 }
 
-fn pass(shared: &Shared, mut recorded: Option<Recorded>, timeline: &Timeline) -> Result<()> {
+fn pass(
+    shared: &Shared,
+    mut recorded: Option<Recorded>,
+    mut events: RecordingEvents,
+    timeline: &Timeline,
+) -> Result<()> {
     let Shared { recording, checkpoints, replies, differences, .. } = shared;
     let mut engine = shared.engine()?;
     let (mut done, mut first_bin) = (0, 0);
@@ -112,6 +118,7 @@ fn pass(shared: &Shared, mut recorded: Option<Recorded>, timeline: &Timeline) ->
     for frames in recording.frames.chunks(CHUNK) {
         let percepts = engine.process(frames)?;
         timeline.add(percepts, recording, done);
+        events.see(percepts);
         if let Some(recorded) = &mut recorded {
             timeline.add_differing(&recorded.compare(percepts, recording, done, differences)?, recording, done);
         }

@@ -2,6 +2,7 @@
 
 import { byId, make, setText } from "./dom.js";
 import { ABSENT, short } from "./format.js";
+import { SPEAKING } from "./wire.js";
 
 export class Boards {
   /** @param {import("./model.js").Model} model */
@@ -16,11 +17,10 @@ export class Boards {
   update() {
     const { boards } = this.model;
     this.panel.hidden = !boards.length;
-    const good = boards.filter((board) => board.state === "good").length;
-    setText(this.count, good === boards.length ? String(good) : `${good} of ${boards.length} good`);
+    setText(this.count, countOf(boards));
     this.list.replaceChildren(
       ...boards.map((board) => {
-        const row = make("div", `board ${board.state === "good" ? "good" : "bad"}`);
+        const row = make("div", `board ${board.state === SPEAKING ? "good" : "bad"}`);
         const numbers = [
           board.rate_hz === null ? ABSENT : `${short(board.rate_hz)} Hz`,
           `${board.frames} frames`,
@@ -37,4 +37,15 @@ export class Boards {
       }),
     );
   }
+}
+
+/**
+ * How many boards speak.
+ * @param {import("./wire.js").Board[]} boards
+ */
+export function countOf(boards) {
+  const speaking = boards.filter((board) => board.state === SPEAKING).length;
+  return speaking === boards.length
+    ? `${speaking} ${SPEAKING}`
+    : `${speaking} of ${boards.length} ${SPEAKING}`;
 }

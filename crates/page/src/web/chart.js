@@ -186,14 +186,20 @@ export class ChartPanel {
     const known = p === p;
     context.beginPath();
     context.arc(at.x, at.y, radius, 0, 2 * Math.PI);
-    if (known) {
+    const atRest = model.colourAtRest(taxel);
+    if (atRest) {
+      context.fillStyle = `rgb(${atRest.join(" ")})`;
+      context.fill();
+    } else if (known) {
       context.fillStyle =
         p > 0 ? `rgb(${colours[colourIndex(p, model.scaleMax)].join(" ")})` : cssColour("rest");
       context.fill();
     }
     context.lineWidth = taxel === this.choices.hoveredTaxel ? 2.5 : 1;
     context.strokeStyle = taxel === this.choices.hoveredTaxel ? cssColour("accent") : cssColour("disc-rim");
-    if (state !== "good" || !known) {
+    if (state === "not sent") {
+      context.lineWidth = 1;
+    } else if (state !== "good" || !known) {
       context.strokeStyle = cssColour("text");
       context.lineWidth = state === "saturated" ? 2.5 : 1.25;
       if (state === "stale" || state === "out of range") context.setLineDash([2, 2]);

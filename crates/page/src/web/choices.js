@@ -11,6 +11,9 @@ export const MARKS = /** @type {const} */ ([
   "none",
 ]);
 
+/** A field is left for another that is pressed so many times as hard. */
+const MUCH_HARDER = 4;
+
 export class Choices extends Observed {
   constructor() {
     super();
@@ -43,6 +46,8 @@ export class Choices extends Observed {
     /** Taxels have rings in the colour of their field. */
     this.tint = false;
     this.labels = true;
+    /** Taxels show their ids. */
+    this.ids = false;
   }
 
   /** The field whose percept and chart are shown. */
@@ -97,26 +102,27 @@ export class Choices extends Observed {
     this.tell("hover");
   }
 
-  /** @param {"xray" | "body" | "taxels" | "tint" | "labels"} name */
+  /** @param {"xray" | "body" | "taxels" | "tint" | "labels" | "ids"} name */
   toggle(name) {
     this[name] = !this[name];
     this.tell("look");
   }
 
   /**
-   * Follows the strongest touch, and stays with a field as long as it is touched.
+   * Follows the strongest touch, and stays with a field as long as it is touched and none is pressed much harder.
    * @param {import("./model.js").Model} model
    */
   follow(model) {
     const fields = model.welcome?.fields;
     if (!fields || this.chosen !== null) return;
-    if (this.followed !== null && model.inContact.has(this.followed)) return;
+    const stays = this.followed !== null && model.inContact.has(this.followed) ? this.followed : null;
     const touched = [...model.inContact.keys()].filter((field) => fields[field]?.letter === this.letter);
     const whole = touched.filter((field) => this.isWhole(model, field));
-    let most = 0;
+    let most = -Infinity;
     let best = this.followed;
     for (const field of whole.length ? whole : touched)
       if (model.load(field) > most) [most, best] = [model.load(field), field];
+    if (stays !== null && most <= MUCH_HARDER * model.load(stays)) return;
     if (best === null) best = fields.findIndex((field) => field.chart && field.letter === this.letter);
     if (best === this.followed || best < 0) return;
     this.followed = best;
@@ -134,6 +140,18 @@ export class Choices extends Observed {
     for (let above = fields[index].parent; above !== null; above = fields[above].parent)
       if (fields[above].chart) return false;
     return true;
+  }
+
+  /**
+   * The fields that touches lie on, those alone that hold no other such field: the hardest pressed first.
+   * @param {import("./model.js").Model} model
+   */
+  smallestTouched(model) {
+    const fields = model.welcome?.fields ?? [];
+    const touched = [...model.inContact.keys()].filter((f) => fields[f]?.letter === this.letter);
+    const above = new Set(touched.map((f) => fields[f].parent));
+    const smallest = touched.filter((f) => !above.has(f));
+    return smallest.sort((a, b) => model.load(b) - model.load(a) || a - b);
   }
 
   /**
@@ -165,11 +183,10 @@ export class Choices extends Observed {
     /** @type {Map<number, number[]>} */
     const rings = new Map();
     if (this.tint) {
-      let colour = 0;
       fields.forEach((field, f) => {
         if (!this.isWhole(model, f)) return;
-        for (const taxel of field.members) rings.set(taxel, PALETTE[colour % PALETTE.length]);
-        colour++;
+        const colour = PALETTE[model.fieldColour(f) % PALETTE.length];
+        for (const taxel of field.members) rings.set(taxel, colour);
       });
     }
     if (this.showsTouches(model))

@@ -22,7 +22,7 @@ export class PerceptPanel {
     this.result = byId("explanation", HTMLElement);
     this.button = byId("explain", HTMLButtonElement);
     this.button.addEventListener("click", () => this.ask());
-    /** @type {Map<string, {value: HTMLElement, plot: HTMLElement}>} */
+    /** @type {Map<string, {row: HTMLElement, value: HTMLElement, plot: HTMLElement}>} */
     this.rows = new Map();
     model.on("scene", () => this.build());
     model.on("explain", () => this.showExplanation());
@@ -48,7 +48,7 @@ export class PerceptPanel {
           if (field !== null) this.plots.toggle(field, column.name);
         });
         row.append(make("span", "output-name", column.name.replaceAll("_", " ")), value, plot);
-        this.rows.set(column.name, { value, plot });
+        this.rows.set(column.name, { row, value, plot });
         return row;
       }),
     );
@@ -77,9 +77,12 @@ export class PerceptPanel {
     setText(byId("chart-title", HTMLElement), about.label);
     byId("percept-follow", HTMLElement).hidden = choices.chosen !== null;
     const touched = model.inContact.has(field);
+    // A sum of pressures says less than the force that they make, and looks like a pressure.
+    const force = model.value(field, "force");
     for (const column of welcome.columns) {
       const row = this.rows.get(column.name);
       if (!row) continue;
+      row.row.hidden = column.name === "total" && force !== null && Number.isFinite(force[0]);
       const value = model.told(field, column.name);
       const text = value
         ? vectorWithUnit(value, column.unit, model.quantity)

@@ -1,9 +1,9 @@
 /** The tree of fields: search, loads as bars, a click chooses, a second one looks at the field. */
 
-import { byId, make, setText } from "./dom.js";
+import { byId, make, paletteColour, setText } from "./dom.js";
 import { withUnit } from "./format.js";
 
-/** @typedef {{row: HTMLElement, bar: HTMLElement, value: HTMLElement, caret: HTMLElement, depth: number, open: boolean,
+/** @typedef {{row: HTMLElement, bar: HTMLElement, dot: HTMLElement, value: HTMLElement, caret: HTMLElement, depth: number, open: boolean,
  *   text: string, width: number, key: string}} Row */
 
 export class Fields {
@@ -101,11 +101,13 @@ export class Fields {
     const caret = make("span", "caret", parent ? (open ? "▾" : "▸") : "");
     const bar = make("span", "field-bar");
     const value = make("span", "field-value");
+    const dot = make("i", "field-dot");
     const name = make("span", "field-name", field?.label ?? "");
-    row.append(bar, caret, name, value);
+    row.append(bar, caret, dot, name, value);
     const entry = {
       row,
       bar,
+      dot,
       value,
       caret,
       depth,
@@ -177,11 +179,17 @@ export class Fields {
       entry.row.classList.toggle("followed", i === field && chosen === null);
       entry.row.tabIndex = i === chosen || (chosen === null && entry.depth === 0) ? 0 : -1;
     }
-    if (chosen !== null) {
-      const fields = this.model.welcome?.fields ?? [];
-      for (let at = fields[chosen]?.parent ?? null; at !== null; at = fields[at].parent)
-        this.unfold(at, true);
-      this.rows.get(chosen)?.row.scrollIntoView({ block: "nearest" });
+    if (field === null) return;
+    const fields = this.model.welcome?.fields ?? [];
+    for (let at = fields[field]?.parent ?? null; at !== null; at = fields[at].parent) this.unfold(at, true);
+    const row = this.rows.get(field)?.row;
+    if (chosen !== null) row?.scrollIntoView({ block: "nearest" });
+    else if (row && !this.tree.matches(":hover")) {
+      // What is followed changes by itself: only the tree scrolls, and nothing under the pointer.
+      const top = row.offsetTop - this.tree.offsetTop;
+      const { scrollTop, clientHeight } = this.tree;
+      if (top < scrollTop || top + row.offsetHeight > scrollTop + clientHeight)
+        this.tree.scrollTop = top - clientHeight / 3;
     }
   }
 
@@ -198,6 +206,7 @@ export class Fields {
         entry.text = text;
         setText(entry.value, text);
       }
+      this.showColour(i, entry.dot);
       const width = this.largest > 0 ? Math.round((100 * load) / this.largest) : 0;
       if (width !== entry.width) {
         entry.width = width;
@@ -207,6 +216,20 @@ export class Fields {
     if (this.largest > 0)
       setText(this.caption, `full bar: ${withUnit(this.largest, model.loadUnit, model.quantity)}`);
     if (this.onlyTouched.checked) this.filter();
+  }
+
+  /**
+   * The colour that a field has elsewhere, once it has one.
+   * @param {number} field
+   * @param {HTMLElement} dot
+   */
+  showColour(field, dot) {
+    const number = this.model.fieldColours.get(field);
+    const colour = number === undefined ? "" : paletteColour(number);
+    if (dot.dataset.colour === colour) return;
+    dot.dataset.colour = colour;
+    dot.style.background = colour;
+    dot.hidden = !colour;
   }
 
   /**

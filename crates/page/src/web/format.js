@@ -122,3 +122,18 @@ export function tickText(x, places) {
   if (Math.abs(x) >= 1e6 || (step < 1e-4 && step > 0)) return x.toExponential(1).replace("e+", "e");
   return x.toFixed(Math.max(0, Math.min(6, -Math.floor(Math.log10(step) + 1e-9))));
 }
+
+/** Characters of a path that are shown. */
+const PATH_MAX = 40;
+
+/**
+ * A path cut off at its beginning where it is long: its end says more.
+ * @param {string} path
+ */
+export function shortPath(path) {
+  if (path.length <= PATH_MAX) return path;
+  const end = path.slice(-(PATH_MAX - 1));
+  const slash = end.indexOf("/");
+  // From the beginning of a folder's name, unless that leaves little.
+  return `…${slash >= 0 && slash < PATH_MAX / 2 ? end.slice(slash) : end}`;
+}

@@ -4,8 +4,9 @@ import { byId, make } from "./dom.js";
 import { ABSENT, short, withUnit } from "./format.js";
 import { HEALTH, say } from "./wire.js";
 
-/** A press that moves less is a click. */
+/** A press that moves less is a click, by a finger a tap. */
 const CLICK_PX = 4;
+const TAP_PX = 12;
 
 export class Inspector {
   /**
@@ -24,11 +25,19 @@ export class Inspector {
     this.drag = null;
     this.asked = /** @type {number | null} */ (null);
     this.looking = false;
+    /** Fingers on the picture, by their ids. @type {Map<number, {x: number, y: number}>} */
+    this.fingers = new Map();
+    /** Whether what is described was tapped by a finger. */
+    this.tapped = false;
     stage.addEventListener("pointerdown", (event) => this.down(event));
     stage.addEventListener("pointermove", (event) => this.move(event));
     stage.addEventListener("pointerup", (event) => this.up(event));
-    stage.addEventListener("pointercancel", () => (this.drag = null));
-    stage.addEventListener("pointerleave", () => this.hover(null));
+    stage.addEventListener("pointercancel", (event) => {
+      this.fingers.delete(event.pointerId);
+      this.drag = null;
+    });
+    // A finger always leaves: what it tapped stays described.
+    stage.addEventListener("pointerleave", (event) => event.pointerType !== "touch" && this.hover(null));
     stage.addEventListener("contextmenu", (event) => event.preventDefault());
     stage.addEventListener("dblclick", () => {
       const { chosen } = parts.choices;
@@ -51,6 +60,8 @@ export class Inspector {
   down(event) {
     this.stage.setPointerCapture(event.pointerId);
     this.stage.focus();
+    if (event.pointerType === "touch")
+      this.fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     const pan = event.button !== 0 || event.shiftKey;
     this.drag = { x: event.clientX, y: event.clientY, pan, moved: 0 };
   }
@@ -59,15 +70,16 @@ export class Inspector {
   move(event) {
     const { camera, onMove } = this.parts;
     this.pointer = { x: event.offsetX, y: event.offsetY };
+    if (this.pinch(event)) return;
     const { drag } = this;
     if (!drag) {
-      this.look();
+      if (event.pointerType !== "touch") this.look();
       return;
     }
     const [dx, dy] = [event.clientX - drag.x, event.clientY - drag.y];
     [drag.x, drag.y] = [event.clientX, event.clientY];
     drag.moved += Math.abs(dx) + Math.abs(dy);
-    if (drag.moved < CLICK_PX) return;
+    if (drag.moved < (event.pointerType === "touch" ? TAP_PX : CLICK_PX)) return;
     this.hover(null);
     if (drag.pan) camera.pan(dx, dy);
     else camera.orbit(-dx * 0.008, dy * 0.008);
@@ -76,9 +88,44 @@ export class Inspector {
 
   /** @param {PointerEvent} event */
   up(event) {
-    const click = this.drag && this.drag.moved < CLICK_PX && event.button === 0;
+    const byFinger = event.pointerType === "touch";
+    const slack = byFinger ? TAP_PX : CLICK_PX;
+    const click = this.drag && this.drag.moved < slack && event.button === 0;
+    this.fingers.delete(event.pointerId);
     this.drag = null;
-    if (click) this.click(event.offsetX, event.offsetY);
+    this.tapped = byFinger;
+    if (!click) return;
+    const [x, y] = [event.offsetX, event.offsetY];
+    this.click(x, y);
+    if (byFinger) {
+      this.pointer = { x, y };
+      this.hover(this.parts.picker.taxelAt(x, y, this.parts.choices.xray));
+    }
+  }
+
+  /**
+   * Two fingers: the picture follows the point between them, and comes nearer as they part.
+   * @param {PointerEvent} event
+   */
+  pinch(event) {
+    const finger = this.fingers.get(event.pointerId);
+    if (!finger || this.fingers.size !== 2) return false;
+    const other = [...this.fingers].find(([id]) => id !== event.pointerId)?.[1] ?? finger;
+    const before = { ...finger };
+    [finger.x, finger.y] = [event.clientX, event.clientY];
+    const [apart, apartNow] = [before, finger].map((f) =>
+      Math.max(1, Math.hypot(f.x - other.x, f.y - other.y)),
+    );
+    const { camera, onMove } = this.parts;
+    const box = this.stage.getBoundingClientRect();
+    camera.pan((finger.x - before.x) / 2, (finger.y - before.y) / 2);
+    const middle = [(finger.x + other.x) / 2 - box.left, (finger.y + other.y) / 2 - box.top];
+    camera.zoom(apartNow / apart, middle[0], middle[1]);
+    // What is left of it when one finger goes is neither a click nor a turn.
+    this.drag = null;
+    this.hover(null);
+    onMove();
+    return true;
   }
 
   /** Looks what is under the pointer, once a drawing at most. */
@@ -172,7 +219,7 @@ export class Inspector {
     const { tip, stage } = this;
     if (tip.hidden) return;
     const [w, h] = [tip.offsetWidth, tip.offsetHeight];
-    const inside = stage.matches(":hover");
+    const inside = stage.matches(":hover") || this.tapped;
     const x = inside ? this.pointer.x : stage.clientWidth - w - 20;
     const y = inside ? this.pointer.y : 60;
     const left = x + 18 + w > stage.clientWidth ? x - 18 - w : x + 18;

@@ -7,7 +7,7 @@ import { byId } from "./dom.js";
  *   fields: import("./fields.js").Fields, legend: import("./legend.js").Legend,
  *   timeline: import("./timeline.js").Timeline, look: (name: import("./camera.js").Preset) => void,
  *   lookAt: (field: number) => void, lookAtAll: () => void, release: () => void, moved: () => void, explain: () => void,
- *   help: () => void}} page
+ *   photo: () => void, help: () => void}} page
  * @returns {import("./keys.js").Key[]}
  */
 export function keyList(page) {
@@ -53,6 +53,8 @@ export function keyList(page) {
     { group: "Picture", keys: ["b"], does: "body on and off", act: () => choices.toggle("body") },
     { group: "Picture", keys: ["d"], does: "taxels on and off", act: () => choices.toggle("taxels") },
     { group: "Picture", keys: ["t"], does: "colour rims by field", act: () => choices.toggle("tint") },
+    { group: "Picture", keys: ["s"], does: "save the view as a PNG", act: page.photo },
+    { group: "Picture", keys: ["k"], does: "ids of taxels on and off", act: () => choices.toggle("ids") },
     { group: "Picture", keys: ["n"], does: "labels on and off", act: () => choices.toggle("labels") },
     {
       group: "Picture",
@@ -64,6 +66,8 @@ export function keyList(page) {
     { group: "Recording", keys: [" "], does: "play and pause", act: () => timeline.togglePlay() },
     { group: "Recording", keys: [","], does: "one frame back", act: () => timeline.step(-1) },
     { group: "Recording", keys: ["."], does: "one frame on", act: () => timeline.step(1) },
+    { group: "Recording", keys: ["w"], does: "to the touch before", act: () => timeline.toTouch(-1) },
+    { group: "Recording", keys: ["r"], does: "to the next touch", act: () => timeline.toTouch(1) },
     { group: "Recording", keys: ["PageUp"], does: "one second back", act: () => timeline.jump(-1) },
     { group: "Recording", keys: ["PageDown"], does: "one second on", act: () => timeline.jump(1) },
     { group: "Recording", keys: ["Home"], does: "to the start", act: () => timeline.seek(-Infinity) },

@@ -14,7 +14,7 @@ export class Keys {
     document.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       const { target } = event;
-      if (target instanceof HTMLInputElement && target.type === "search") return;
+      if (target instanceof HTMLInputElement && target.type !== "checkbox") return;
       if (target instanceof HTMLSelectElement && event.key !== "Escape") return;
       // Space and Enter press the button that has the focus.
       if (target instanceof HTMLButtonElement && (event.key === " " || event.key === "Enter")) return;

@@ -1,8 +1,23 @@
 /** The legend: colours of pressure with units, and how states of taxels look. */
 
 import { make, setText } from "./dom.js";
-import { clock, scaleFor, tickText, ticks } from "./format.js";
+import { clock, scaleFor, short, tickText, ticks } from "./format.js";
 import { HEALTH } from "./wire.js";
+
+/** Ticks closer to the end of the bar than this part of it would lie under the number there. */
+const NEAR_END = 0.15;
+
+/**
+ * The ticks of a bar from 0 to `most`: round ones, and the last at its end with its number.
+ * @param {number} most
+ */
+export function endedTicks(most) {
+  const places = ticks(0, most, 4);
+  const round = places.filter((place) => place < (1 - NEAR_END) * most);
+  const isRound = Math.abs(places[places.length - 1] - most) < 1e-6 * most;
+  const end = { part: 1, text: isRound ? tickText(most, places) : short(most) };
+  return [...round.map((place) => ({ part: place / most, text: tickText(place, places) })), end];
+}
 
 export class Legend {
   /**
@@ -53,11 +68,10 @@ export class Legend {
       model.quantity === "N" ? "Force of a taxel" : model.quantity === "Pa" ? "Pressure" : "Raw value";
     setText(this.title, `${what}, ${by.unit}`);
     this.paint(welcome.colours);
-    const places = ticks(0, most * by.factor, 4);
     this.ticks.replaceChildren(
-      ...places.map((place) => {
-        const tick = make("span", "", tickText(place, places));
-        tick.style.left = `${(100 * place) / (most * by.factor)}%`;
+      ...endedTicks(most * by.factor).map(({ part, text }) => {
+        const tick = make("span", "", text);
+        tick.style.left = `${100 * part}%`;
         return tick;
       }),
     );
@@ -101,6 +115,8 @@ export class Legend {
     if (!model.frame) return;
     const counts = new Array(HEALTH.length).fill(0);
     for (const state of model.health) counts[state]++;
+    if (model.isAtRest) counts.fill(0);
+    this.root.hidden = model.isAtRest;
     const key = counts.slice(1).join();
     if (key === this.counts) return;
     this.counts = key;

@@ -16,12 +16,17 @@ import { Log } from "./log.js";
 import { dot, toWorld } from "./math.js";
 import { Model } from "./model.js";
 import { Marks } from "./percepts.js";
+import { Photo } from "./photo.js";
 import { Picker } from "./pick.js";
+import { TaxelIds } from "./taxel_ids.js";
 import { taxelInWorld } from "./places.js";
 import { Plots } from "./plots.js";
 import { Connection, readAddress } from "./socket.js";
+import { RestPanel } from "./rest.js";
+import { ScaleBar } from "./scale_bar.js";
 import { Status } from "./status.js";
 import { Timeline } from "./timeline.js";
+import { tokenIn } from "./tokens.js";
 import { TouchPanel } from "./touch_panel.js";
 import { View } from "./view.js";
 import { say } from "./wire.js";
@@ -33,8 +38,16 @@ const camera = new Camera();
 const connection = new Connection(model, token);
 const stage = byId("stage", HTMLElement);
 const view = new View(byId("scene", HTMLCanvasElement), model, camera, choices);
-const marks = new Marks(byId("marks", HTMLCanvasElement), model, camera, choices);
 const picker = new Picker(model, camera);
+const marks = new Marks(
+  byId("marks", HTMLCanvasElement),
+  model,
+  camera,
+  choices,
+  new TaxelIds(model, picker),
+);
+const scaleBar = new ScaleBar(byId("scale-bar", HTMLCanvasElement), camera);
+const photo = new Photo(view, model, [marks.canvas, scaleBar.canvas]);
 const legend = new Legend(byId("legend", HTMLElement), model);
 const plots = new Plots(model, connection);
 const timeline = new Timeline(model, connection);
@@ -49,6 +62,7 @@ const chart = new ChartPanel(
 const touches = new TouchPanel(model, choices, (touch) => lookAtTaxels([...touch.taxels]));
 const selfContacts = new SelfContactsPanel(model, choices);
 new Boards(model);
+new RestPanel(model);
 new Log(
   model,
   (field) => choices.choose(field),
@@ -118,15 +132,26 @@ window.addEventListener("keydown", (event) => {
   if (/^(Arrow\w+|[0-9f+=-])$/.test(event.key)) turned = true;
 });
 
-/** The field whose side was shown last. @type {number | null} */
-let shownSide = null;
+/** The touch or field whose side was shown last. */
+let shownSide = "";
+
+/** The taxels of the oldest touch, or where touches are not looked for those of the field that is followed. */
+function touchedTaxels() {
+  if (model.welcome?.touches) {
+    const [touch] = model.touches;
+    return { name: `touch ${touch?.id}`, members: [...(touch?.taxels ?? [])] };
+  }
+  const { field } = choices;
+  const members = field !== null && model.inContact.has(field) ? model.welcome?.fields[field]?.members : [];
+  return { name: `field ${field}`, members: members ?? [] };
+}
 
 /** Turns the body so that the side that is touched is seen, until somebody turns it. */
 function showTouchedSide() {
-  const field = choices.field;
-  if (turned || field === null || field === shownSide || !model.inContact.has(field)) return;
-  shownSide = field;
-  const members = model.welcome?.fields[field]?.members ?? [];
+  if (turned) return;
+  const { name, members } = touchedTaxels();
+  if (!members.length || name === shownSide) return;
+  shownSide = name;
   const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? NO_NORMAL);
   const facing = normals.reduce((sum, normal) => sum + dot(normal, camera.back), 0) / normals.length;
   if (facing > 0.2) return;
@@ -196,6 +221,7 @@ model.on("frame", () => {
   if (model.frame?.touches) view.ringsChanged = true;
   if (choices.touch !== null && !model.touch(choices.touch)) choices.chooseTouch(null);
   choices.follow(model);
+  plots.follow(choices.smallestTouched(model));
   showTouchedSide();
   view.request();
   updatePanels();
@@ -226,6 +252,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 view.onDraw = () => {
   const acknowledge = connection.takeToDraw();
   marks.draw();
+  scaleBar.draw();
   return acknowledge;
 };
 
@@ -264,7 +291,7 @@ for (const button of document.querySelectorAll("[data-view]"))
   });
 for (const button of document.querySelectorAll("[data-toggle]")) {
   if (!(button instanceof HTMLElement)) continue;
-  const name = /** @type {"xray" | "tint" | "labels"} */ (button.dataset.toggle);
+  const name = /** @type {"xray" | "tint" | "labels" | "ids"} */ (button.dataset.toggle);
   const show = () => button.setAttribute("aria-pressed", String(choices[name]));
   button.addEventListener("click", () => choices.toggle(name));
   choices.on("look", show);
@@ -296,11 +323,23 @@ const keys = new Keys(
     },
     moved,
     explain: () => percept.ask(),
+    photo: () => photo.take(),
     help: () => keys.toggleHelp(),
   }),
 );
+byId("photo", HTMLButtonElement).addEventListener("click", () => photo.take());
 byId("help-button", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
 byId("help-close", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
+
+const tokenBox = byId("token-box", HTMLInputElement);
+byId("token-form", HTMLFormElement).addEventListener("submit", (event) => {
+  event.preventDefault();
+  const token = tokenIn(tokenBox.value);
+  tokenBox.setCustomValidity(token ? "" : "There is no token=… in it.");
+  if (token) connection.take(token);
+  else tokenBox.reportValidity();
+});
+tokenBox.addEventListener("input", () => tokenBox.setCustomValidity(""));
 
 window.addEventListener("hashchange", () => {
   const { moment } = readAddress();

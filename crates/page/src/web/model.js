@@ -1,31 +1,18 @@
 /** What the page knows: the scene, the newest frame, events. It changes only by messages from the server. */
 
-import { Observed } from "./dom.js";
+import { Observed, PALETTE } from "./dom.js";
+import { smallestFields } from "./field_tree.js";
 import { withUnit } from "./format.js";
 import { poseToRows } from "./math.js";
+import { REASONS } from "./reasons.js";
 import { HEALTH, IN_WORLD_BIT } from "./wire.js";
 
 /** @typedef {import("./wire.js").Welcome} Welcome */
 /** @typedef {import("./wire.js").Frame} Frame */
 
+const NOT_SENT = HEALTH.indexOf("not sent");
 /** Events that the page keeps. */
 const EVENTS_MAX = 1000;
-
-/** Flags that explain why a column is absent, the likeliest first; other columns look at all flags. */
-const MOTION = ["no_chart", "no_previous", "bad_dt", "held", "jumped"];
-/** @type {Record<string, string[]>} */
-const REASONS = {
-  centroid: ["no_chart"],
-  orientation: ["no_chart", "one_taxel", "coincident"],
-  principal_axis: ["no_chart", "one_taxel", "coincident", "isotropic"],
-  anisotropy: ["no_chart", "one_taxel", "coincident"],
-  displacement: MOTION,
-  distance: MOTION,
-  speed: MOTION,
-  radial_distance: MOTION,
-  radial_speed: MOTION,
-  direction: [...MOTION, "still"],
-};
 
 export class Model extends Observed {
   constructor() {
@@ -52,6 +39,13 @@ export class Model extends Observed {
     this.touches = [];
     /** Colours of touches, by their ids: one keeps its own from onset to release. @type {Map<number, number>} */
     this.touchColours = new Map();
+    /** Colours of fields, given as they are first shown: each keeps its own everywhere. @type {Map<number, number>} */
+    this.fieldColours = new Map();
+    /** Whether no taxel of these is sent. @type {Uint8Array | null} */
+    this.restOf = null;
+    this.rest = false;
+    /** By taxel, the smallest field that holds it, or -1. @type {Int32Array | null} */
+    this.smallestFields = null;
     /** Touches of two links at one place. @type {import("./wire.js").SelfContacts} */
     this.selfContacts = noSelfContacts();
     /** The newest frame's head. @type {Frame | null} */
@@ -79,13 +73,39 @@ export class Model extends Observed {
     this.history = null;
     /** The newest samples of the series that are plotted. @type {import("./wire.js").Samples | null} */
     this.samples = null;
-    /** @type {{state: "connecting" | "open" | "silent" | "lost", since: Date, reason: string}} */
-    this.connection = { state: "connecting", since: new Date(), reason: "" };
+    /** @type {{state: "connecting" | "open" | "silent" | "lost", since: Date, reason: string, asksToken: boolean}} */
+    this.connection = { state: "connecting", since: new Date(), reason: "", asksToken: false };
   }
 
   /** Pressure at the upper end of the colours. */
   get scaleMax() {
     return this.autoscale ?? this.scale.max;
+  }
+
+  /** Whether a body without a source is shown. */
+  get isAtRest() {
+    if (this.restOf !== this.health) {
+      this.restOf = this.health;
+      this.rest = this.health.length > 0 && this.health.every((state) => state === NOT_SENT);
+    }
+    return this.frame !== null && this.rest;
+  }
+
+  /**
+   * The colour of a taxel of a body without a source: that of the smallest field that holds it. Null where it is in none, or
+   * where there is a source.
+   * @param {number} taxel
+   */
+  colourAtRest(taxel) {
+    if (!this.isAtRest) return null;
+    if (!this.smallestFields) {
+      const { smallest, leaves } = smallestFields(this.welcome?.fields ?? [], this.health.length);
+      // Colours in the tree's order, so that neighbours differ.
+      for (const leaf of leaves) this.fieldColour(leaf);
+      this.smallestFields = smallest;
+    }
+    const field = this.smallestFields[taxel];
+    return field < 0 ? null : PALETTE[this.fieldColour(field) % PALETTE.length];
   }
 
   get quantity() {
@@ -95,6 +115,8 @@ export class Model extends Observed {
   /** @param {Welcome} welcome */
   begin(welcome) {
     const sameRun = this.welcome?.run === welcome.run;
+    if (namesOf(this.welcome) !== namesOf(welcome)) this.fieldColours = new Map();
+    this.smallestFields = null;
     this.welcome = welcome;
     this.columnIndex = new Map(welcome.columns.map((column, i) => [column.name, i]));
     this.scale = welcome.scale;
@@ -180,6 +202,19 @@ export class Model extends Observed {
     return this.touchColours.get(id) ?? 0;
   }
 
+  /**
+   * The number of a field's colour in the palette: the least that no other field has.
+   * @param {number} field
+   */
+  fieldColour(field) {
+    let colour = this.fieldColours.get(field);
+    if (colour === undefined) {
+      colour = this.fieldColours.size;
+      this.fieldColours.set(field, colour);
+    }
+    return colour;
+  }
+
   /** @param {number | null} id */
   touch(id) {
     return this.touches.find((touch) => touch.id === id) ?? null;
@@ -251,8 +286,8 @@ export class Model extends Observed {
       case "events":
         this.eventsLost += message.lost;
         this.events.push(...message.events);
-        this.events.splice(0, Math.max(0, this.events.length - EVENTS_MAX));
         if (this.events.length) this.newestEvent = this.events[this.events.length - 1].seq;
+        this.events.splice(0, Math.max(0, this.events.length - EVENTS_MAX));
         break;
       case "boards":
         this.boards = message.boards;
@@ -281,12 +316,13 @@ export class Model extends Observed {
   /**
    * @param {"connecting" | "open" | "silent" | "lost"} state
    * @param {string} [reason]
+   * @param {boolean} [asksToken] whether the server has not taken the page's token
    * @param {Date} [since]
    */
-  setConnection(state, reason = "", since = new Date()) {
+  setConnection(state, reason = "", asksToken = false, since = new Date()) {
     if (state === this.connection.state && reason === this.connection.reason) return;
     const goesOn = state !== "open" && this.connection.state === "lost";
-    this.connection = { state, reason, since: goesOn ? this.connection.since : since };
+    this.connection = { state, reason, asksToken, since: goesOn ? this.connection.since : since };
     this.tell("connection");
   }
 
@@ -317,9 +353,14 @@ export class Model extends Observed {
     return value.map((x, i) => x + (this.welcome?.origin[i] ?? 0));
   }
 
-  /** The column that says how hard a field is pressed: its force where that is computed, else the sum of its pressures. */
+  /**
+   * The column that says how hard a field is pressed: its force where that is computed, else the sum of its pressures, else the
+   * highest of them; null where the run computes none of these.
+   */
   get loadColumn() {
-    return this.columnIndex.has("force") ? "force" : "total";
+    // Counts have no unit, so a force is never known.
+    if (this.columnIndex.has("force") && this.quantity !== "count") return "force";
+    return ["total", "peak", "force"].find((name) => this.columnIndex.has(name)) ?? null;
   }
 
   /** Its unit. */
@@ -327,19 +368,25 @@ export class Model extends Observed {
     return this.loadColumn === "force" ? "N" : "P";
   }
 
+  /** The column that is plotted first: how hard fields are pressed, or where that is not computed the run's first output. */
+  get plottedColumn() {
+    return this.loadColumn ?? this.welcome?.columns[0]?.name ?? null;
+  }
+
   /**
    * How hard a field is pressed; 0 where that is absent.
    * @param {number} field
    */
   load(field) {
-    return this.value(field, this.loadColumn)?.[0] ?? 0;
+    return (this.loadColumn && this.value(field, this.loadColumn)?.[0]) || 0;
   }
 
   /**
-   * It as text; a dash where it is absent.
+   * It as text; a dash where it is absent, and only that it is touched where a run computes none.
    * @param {number} field
    */
   loadText(field) {
+    if (!this.loadColumn) return "touched";
     const value = this.value(field, this.loadColumn);
     return value ? withUnit(value[0], this.loadUnit, this.quantity) : "–";
   }
@@ -366,6 +413,13 @@ export class Model extends Observed {
     return likely ?? flags.join(", ");
   }
 }
+
+/**
+ * The fields of a run, to tell runs of other fields apart.
+ * @param {Welcome | null} welcome
+ */
+const namesOf = (welcome) =>
+  (welcome?.fields ?? []).map((field) => `${field.letter} ${field.name}`).join("\n");
 
 /** Before a frame has told of any.
  * @returns {import("./wire.js").SelfContacts} */

@@ -21,12 +21,14 @@ export class Marks {
    * @param {import("./model.js").Model} model
    * @param {import("./camera.js").Camera} camera
    * @param {import("./choices.js").Choices} choices
+   * @param {import("./taxel_ids.js").TaxelIds} ids
    */
-  constructor(canvas, model, camera, choices) {
+  constructor(canvas, model, camera, choices, ids) {
     this.canvas = canvas;
     this.model = model;
     this.camera = camera;
     this.choices = choices;
+    this.ids = ids;
     /** Where marks are, to be clicked. @type {{x: number, y: number, field?: number, touch?: number}[]} */
     this.places = [];
     this.drawn = false;
@@ -38,7 +40,7 @@ export class Marks {
     const touches = choices.showsTouches(model) ? model.touches : [];
     const selfContacts = choices.marks === "none" ? [] : model.selfContacts.list;
     this.places = [];
-    const drawn = marked.length + touches.length + selfContacts.length > 0;
+    const drawn = choices.ids || marked.length + touches.length + selfContacts.length > 0;
     if (!drawn && !this.drawn) return;
     this.drawn = drawn;
     const fitted = fitCanvas(this.canvas);
@@ -48,11 +50,12 @@ export class Marks {
     this.halo = cssColour("halo");
     /** @type {Label[]} */
     const labels = [];
+    if (choices.ids) this.ids.draw(context, () => this.draw());
     for (const touch of touches) this.touch(context, touch, labels);
     for (const field of marked) {
       const plane = tangentPlane(model, field);
       if (!plane) continue;
-      const colour = paletteColour(field);
+      const colour = paletteColour(model.fieldColour(field));
       const facing = !plane.normal || dot(plane.normal, subtract(camera.eye, plane.point)) > 0;
       // What lies behind the body is a faint ring only.
       context.globalAlpha = facing ? 1 : 0.3;

@@ -89,8 +89,9 @@ export function taxelInWorld(model, taxel) {
 }
 
 /**
- * The ends of a field's orientation line in its chart. The engine says the angle; the two farthest points (largest
- * w P |x − c|) are the ends where they agree with it. Else the line runs through the centroid over the pressed taxels.
+ * The ends of a field's orientation line in its chart. The engine says the angle. Each pressed taxel puts a point on the way from
+ * the centroid to itself, as far out as it is pressed: c + w P / P_max (x − c). The two farthest points are the ends where they
+ * agree with the angle. Else the line runs through the centroid over the pressed taxels.
  * @param {Model} model
  * @param {number} f
  * @returns {[number[], number[]] | null}
@@ -104,13 +105,15 @@ export function orientationLine(model, f) {
   /** @type {[number, number[]][]} */
   const ends = [];
   let [least, most] = [0, 0];
-  field.members.forEach((taxel, i) => {
-    const p = model.pressure[taxel];
+  const pressed = (/** @type {number} */ i) =>
+    model.pressure[field.members[i]] * (field.weights?.[i] ?? 1) || 0;
+  const hardest = field.members.reduce((most, _, i) => Math.max(most, pressed(i)), 0);
+  field.members.forEach((_, i) => {
     const uv = field.chart?.uv[i];
-    if (!uv || !(p > 0)) return;
+    const share = pressed(i) / hardest;
+    if (!uv || !(share > 0)) return;
     const [du, dv] = [uv[0] - centroid[0], uv[1] - centroid[1]];
-    const far = p * (field.weights?.[i] ?? 1) * Math.hypot(du, dv);
-    ends.push([far, uv]);
+    ends.push([share * Math.hypot(du, dv), [centroid[0] + share * du, centroid[1] + share * dv]]);
     const s = du * along[0] + dv * along[1];
     [least, most] = [Math.min(least, s), Math.max(most, s)];
   });

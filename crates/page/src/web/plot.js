@@ -3,7 +3,7 @@
 import { cssColour, fitCanvas } from "./dom.js";
 import { scaleFor, short, tickText, ticks } from "./format.js";
 
-/** @typedef {{colour: string, ring?: import("./plots.js").Ring, band?: {least: Float32Array, most: Float32Array}}} Line */
+/** @typedef {{colour: string, dash?: number[], period?: number, ring?: import("./plots.js").Ring, band?: {least: Float32Array, most: Float32Array}}} Line */
 /** @typedef {{from: number, to: number, now: number, unit: string, quantity: string, live: boolean, pointer: number | null,
  *   until: number, spacing: number, bandRange: {from: number, to: number}}} How */
 
@@ -86,7 +86,7 @@ export function drawPlot(canvas, lines, how) {
   context.beginPath();
   context.rect(EDGE.left, 0, wide, height);
   context.clip();
-  data.forEach((one, i) => drawLine(context, one, lines[i].colour, y));
+  data.forEach((one, i) => drawLine(context, one, lines[i], y));
   if (!how.live) {
     if (how.until < how.to) {
       context.fillStyle = cssColour("hatch");
@@ -103,29 +103,59 @@ export function drawPlot(canvas, lines, how) {
 /**
  * @param {CanvasRenderingContext2D} context
  * @param {ReturnType<typeof byPixel>} data
- * @param {string} colour
+ * @param {Line} line
  * @param {(value: number) => number} y
  */
-function drawLine(context, { least, most, reach }, colour, y) {
+function drawLine(context, data, { colour, dash = [], period = Infinity }, y) {
   context.beginPath();
-  let last = -Infinity;
-  let end = 0;
-  for (let x = 0; x < least.length; x++) {
-    if (least[x] !== least[x]) continue;
-    const [low, high] = [y(least[x]), y(most[x])];
-    const px = EDGE.left + x + 0.5;
-    // From the nearer end of this pixel's range to the other.
-    const ordered = Math.abs(end - low) < Math.abs(end - high) ? [low, high] : [high, low];
-    if (x - last > Math.max(1, reach)) context.moveTo(px, ordered[0]);
-    else context.lineTo(px, ordered[0]);
-    context.lineTo(px, ordered[1] === ordered[0] ? ordered[0] + 0.01 : ordered[1]);
-    end = ordered[1];
-    last = x;
+  for (const run of runsOf(data, period)) {
+    let end = 0;
+    run.forEach(({ x, low, high }, i) => {
+      const px = EDGE.left + x + 0.5;
+      const [bottom, top] = [y(low), y(high)];
+      // From the nearer end of this pixel's range to the other.
+      const ordered = Math.abs(end - bottom) < Math.abs(end - top) ? [bottom, top] : [top, bottom];
+      if (i === 0) context.moveTo(px, ordered[0]);
+      else context.lineTo(px, ordered[0]);
+      context.lineTo(px, ordered[1] === ordered[0] ? ordered[0] + 0.01 : ordered[1]);
+      end = ordered[1];
+    });
   }
+  context.setLineDash(dash);
   context.lineJoin = "round";
   context.lineWidth = 1.5;
   context.strokeStyle = colour;
   context.stroke();
+  context.setLineDash([]);
+}
+
+/**
+ * The pixels of a line, one list for each stretch that is drawn without a break. An angle that goes past its end comes back at
+ * the other one, which is no motion through all that is between: there the line breaks.
+ * @param {ReturnType<typeof byPixel>} data
+ * @param {number} period of an angle; infinite for all else
+ */
+export function runsOf({ least, most, reach }, period) {
+  /** @type {{x: number, low: number, high: number}[][]} */
+  const runs = [];
+  /** @type {{x: number, low: number, high: number} | undefined} */
+  let last;
+  for (let x = 0; x < least.length; x++) {
+    const [low, high] = [least[x], most[x]];
+    if (low !== low) continue;
+    // What has both ends of an angle in one pixel has gone past its end.
+    const isPast = high - low > period / 2;
+    const follows =
+      last &&
+      x - last.x <= Math.max(1, reach) &&
+      !isPast &&
+      Math.max(low - last.high, last.low - high) <= period / 2;
+    if (isPast) runs.push([{ x, low, high: low }], [{ x, low: high, high }]);
+    else if (follows) runs[runs.length - 1].push({ x, low, high });
+    else runs.push([{ x, low, high }]);
+    last = isPast ? undefined : { x, low, high };
+  }
+  return runs;
 }
 
 /**

@@ -11,7 +11,20 @@ import { say } from "./wire.js";
 const SERIES_MAX = 16;
 /** Samples that are kept of a series; a power of two. */
 const SAMPLES_MAX = 1 << 16;
+/** Fields that are plotted as they are touched, until somebody chooses others. */
+const FOLLOWED_MAX = 5;
+/** A field takes the place of another where it is pressed so many times as hard. */
+const HARDER = 1.5;
 const WINDOWS_S = [2, 5, 10, 30, 60, 120, 300];
+
+/** Dashes of the lines of one field in one plot. @type {number[][]} */
+const DASHES = [[], [5, 3], [1.5, 3], [8, 3, 1.5, 3]];
+/** Angles that come back: an axis is the same after half a turn, a direction after a whole one. */
+const PERIODS = new Map([
+  ["orientation", Math.PI],
+  ["principal_axis", Math.PI],
+  ["direction", 2 * Math.PI],
+]);
 
 /** @param {Series} s */
 const keyOf = (s) => `${s.field}/${s.column}/${s.component}`;
@@ -26,8 +39,12 @@ export class Plots {
     this.connection = connection;
     this.root = byId("plots", HTMLElement);
     this.note = byId("plots-note", HTMLElement);
-    /** @type {(Series & {colour: number})[]} */
+    /** @type {Series[]} */
     this.series = [];
+    /** Whether the fields that are touched are plotted: until somebody chooses what is. */
+    this.follows = true;
+    /** How hard each of the plotted fields was pressed at most. @type {Map<number, number>} */
+    this.mostLoads = new Map();
     /** Series by the number of the `series` message that asked for them. @type {Series[][]} */
     this.asked = [[]];
     /** @type {Map<string, Ring>} */
@@ -74,24 +91,43 @@ export class Plots {
     if (body !== this.body) {
       this.body = body;
       this.series = [];
+      this.follows = true;
+      this.mostLoads.clear();
       if (welcome.time) [this.from, this.to] = [welcome.time.start_s, welcome.time.end_s];
-      const { fields } = welcome;
-      const roots = fields.map((_, i) => i).filter((i) => fields[i].parent === null);
-      const below = fields.map((_, i) => i).filter((i) => roots.includes(fields[i].parent ?? -1));
-      const letter = fields[roots[0]]?.letter;
-      for (const f of (below.length ? below : roots).filter((i) => fields[i].letter === letter).slice(0, 5))
-        this.series.push({
-          field: f,
-          column: this.model.loadColumn,
-          component: 0,
-          colour: this.freeColour(),
-        });
     }
     this.ask();
   }
 
-  freeColour() {
-    for (let colour = 0; ; colour++) if (!this.series.some((s) => s.colour === colour)) return colour;
+  /**
+   * Plots the fields that are touched, as long as nobody has chosen what is plotted.
+   * @param {number[]} touched the hardest pressed first
+   */
+  follow(touched) {
+    const { model } = this;
+    const column = model.plottedColumn;
+    if (!this.follows || !column) return;
+    const components = model.welcome?.columns.find((c) => c.name === column)?.components ?? 1;
+    const before = [...this.mostLoads.keys()].join();
+    for (const field of touched.slice(0, FOLLOWED_MAX)) {
+      const load = model.load(field);
+      const most = this.mostLoads.get(field);
+      if (most !== undefined) this.mostLoads.set(field, Math.max(most, load));
+      else if (this.mostLoads.size < FOLLOWED_MAX) this.mostLoads.set(field, load);
+      else {
+        const [least] = [...this.mostLoads].sort((a, b) => a[1] - b[1]);
+        if (load <= HARDER * least[1]) continue;
+        this.mostLoads.delete(least[0]);
+        this.mostLoads.set(field, load);
+      }
+    }
+    if ([...this.mostLoads.keys()].join() === before) return;
+    this.series = [...this.mostLoads.keys()]
+      .sort((a, b) => a - b)
+      .flatMap((field) =>
+        Array.from({ length: components }, (_, component) => ({ field, column, component })),
+      )
+      .slice(0, SERIES_MAX);
+    this.ask();
   }
 
   /**
@@ -100,6 +136,7 @@ export class Plots {
    * @param {string} column
    */
   toggle(field, column) {
+    this.follows = false;
     const components = this.model.welcome?.columns.find((c) => c.name === column)?.components ?? 1;
     if (this.has(field, column)) {
       this.series = this.series.filter((s) => s.field !== field || s.column !== column);
@@ -109,7 +146,7 @@ export class Plots {
           setText(this.note, `At most ${SERIES_MAX} lines: take one away first.`);
           break;
         }
-        this.series.push({ field, column, component, colour: this.freeColour() });
+        this.series.push({ field, column, component });
       }
     }
     this.ask();
@@ -125,6 +162,7 @@ export class Plots {
 
   /** @param {Series} one */
   remove(one) {
+    this.follows = false;
     this.series = this.series.filter((s) => keyOf(s) !== keyOf(one));
     setText(this.note, "");
     this.ask();
@@ -194,8 +232,7 @@ export class Plots {
   build() {
     const { welcome } = this.model;
     if (!welcome) return;
-    const unitOf = (/** @type {Series} */ s) => welcome.columns.find((c) => c.name === s.column)?.unit ?? "1";
-    const units = [...new Set(this.series.map(unitOf))];
+    const units = [...new Set(this.series.map((s) => this.unitOf(s)))];
     this.groups.clear();
     this.root.replaceChildren(
       ...units.map((unit) => {
@@ -203,22 +240,40 @@ export class Plots {
         const canvas = make("canvas");
         const chips = make("div", "chips");
         box.append(canvas, chips);
-        for (const s of this.series.filter((one) => unitOf(one) === unit)) chips.append(this.chip(s));
+        for (const s of this.series.filter((one) => this.unitOf(one) === unit)) chips.append(this.chip(s));
         this.groups.set(unit, { box, canvas, chips });
         this.listen(canvas);
         return box;
       }),
     );
-    if (this.series.length < SERIES_MAX)
-      setText(this.note, this.series.length ? "" : "Press ∿ beside an output of a field to plot it.");
+    if (this.series.length < SERIES_MAX) setText(this.note, this.series.length ? "" : this.emptyNote());
     this.draw();
   }
 
-  /** @param {Series & {colour: number}} s */
+  emptyNote() {
+    const byHand = "Press ∿ beside an output of a field to plot it.";
+    return this.follows ? `Fields are plotted as they are touched. ${byHand}` : byHand;
+  }
+
+  /** @param {Series} s */
+  unitOf(s) {
+    return this.model.welcome?.columns.find((c) => c.name === s.column)?.unit ?? "1";
+  }
+
+  /**
+   * How a line is dashed: lines of one field have one colour, so those in one plot differ by this.
+   * @param {Series} s
+   */
+  dashOf(s) {
+    const alike = this.series.filter((one) => one.field === s.field && this.unitOf(one) === this.unitOf(s));
+    return DASHES[alike.findIndex((one) => keyOf(one) === keyOf(s)) % DASHES.length] ?? [];
+  }
+
+  /** @param {Series} s */
   chip(s) {
     const chip = make("span", "chip");
     const swatch = make("i");
-    swatch.style.background = paletteColour(s.colour);
+    swatch.style.background = swatchOf(paletteColour(this.model.fieldColour(s.field)), this.dashOf(s));
     const field = this.model.welcome?.fields[s.field];
     const components = this.model.welcome?.columns.find((c) => c.name === s.column)?.components ?? 1;
     const part =
@@ -294,9 +349,11 @@ export class Plots {
     for (const [unit, { canvas }] of this.groups) {
       this.bins = Math.max(50, Math.min(4096, canvas.clientWidth));
       const lines = this.series
-        .filter((s) => (welcome.columns.find((c) => c.name === s.column)?.unit ?? "1") === unit)
+        .filter((s) => this.unitOf(s) === unit)
         .map((s) => ({
-          colour: paletteColour(s.colour),
+          colour: paletteColour(this.model.fieldColour(s.field)),
+          dash: this.dashOf(s),
+          period: PERIODS.get(s.column),
           ring: this.rings.get(keyOf(s)),
           band: this.bands.get(keyOf(s)),
         }));
@@ -318,4 +375,15 @@ export class Plots {
     if (this.model.welcome?.time) return `${seconds(this.from)} – ${seconds(this.to)}`;
     return `${this.window} s to ${clock(new Date())}`;
   }
+}
+
+/**
+ * A swatch of a line, as a CSS background.
+ * @param {string} colour
+ * @param {number[]} dash
+ */
+function swatchOf(colour, dash) {
+  if (!dash.length) return colour;
+  const [on, off] = dash;
+  return `repeating-linear-gradient(90deg, ${colour} 0 ${on}px, transparent ${on}px ${on + off}px)`;
 }

@@ -1,5 +1,6 @@
 /** The connection: says hello, hands messages to the model, comes back after a loss. */
 
+import { Tokens } from "./tokens.js";
 import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "./wire.js";
 
 const TOKEN = "somatic token";
@@ -43,8 +44,26 @@ export class Connection {
     this.scene = { taxels: 0, links: 0, components: /** @type {number[]} */ ([]) };
     this.heard = performance.now();
     this.saidAfter = /** @type {number | null} */ (null);
+    this.timer = 0;
+    this.tokens = new Tokens(
+      () => (model.connection.state === "open" ? this.token : ""),
+      (token) => model.connection.asksToken && this.take(token),
+    );
     setInterval(() => this.watch(), 500);
     document.addEventListener("visibilitychange", () => (this.heard = performance.now()));
+  }
+
+  /**
+   * Tries another token at once.
+   * @param {string} token
+   */
+  take(token) {
+    sessionStorage.setItem(TOKEN, token);
+    this.token = token;
+    this.wait = RETRY_MIN_MS;
+    if (this.socket) return;
+    clearTimeout(this.timer);
+    this.open();
   }
 
   open() {
@@ -72,14 +91,21 @@ export class Connection {
       if (this.socket !== socket) return;
       this.socket = null;
       this.toDraw = [];
-      this.model.setConnection("lost", event.code === 1008 ? this.refusal(event.reason) : event.reason);
-      setTimeout(() => this.open(), this.wait);
+      const isWrong = event.code === 1008 && event.reason.startsWith("wrong token");
+      this.model.setConnection(
+        "lost",
+        event.code === 1008 ? this.refusal(event.reason) : event.reason,
+        isWrong,
+      );
+      if (isWrong) this.tokens.ask();
+      this.timer = window.setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(RETRY_MAX_MS, this.wait * 1.6);
     };
   }
 
   /** @param {string} reason */
   refusal(reason) {
+    if (!this.token) return "A link to a moment has no token.";
     const advice = "Open the address that somatic printed when it started.";
     return reason ? `The server refused the page: ${reason}. ${advice}` : advice;
   }
@@ -90,7 +116,7 @@ export class Connection {
     const due = model.ended === null && (model.welcome?.mode === "live" || model.status.playing);
     const quiet = performance.now() - this.heard;
     if (model.connection.state === "open" && due && !document.hidden && quiet > SILENT_MS)
-      model.setConnection("silent", "", new Date(Date.now() - quiet));
+      model.setConnection("silent", "", false, new Date(Date.now() - quiet));
     else if (model.connection.state === "silent" && quiet < SILENT_MS) model.setConnection("open");
   }
 

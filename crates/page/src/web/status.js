@@ -1,7 +1,7 @@
 /** The line of truth: backend, latency, frames skipped, rate; and what is wrong with the connection. */
 
 import { byId, setText } from "./dom.js";
-import { ABSENT, clock } from "./format.js";
+import { ABSENT, clock, shortPath } from "./format.js";
 
 export class Status {
   /**
@@ -15,6 +15,8 @@ export class Status {
     this.last = { drawn: 0, frame: 0, at: performance.now() };
     model.on("scene", () => this.head());
     model.on("connection context ended", () => this.connection());
+    // Whether it is at rest is known with its first frame.
+    model.on("frame", () => model.isAtRest && this.connection());
     setInterval(() => this.update(), 500);
     if (!view.gl) byId("no-webgl", HTMLElement).hidden = false;
   }
@@ -22,11 +24,15 @@ export class Status {
   head() {
     const { welcome } = this.model;
     if (!welcome) return;
-    setText(byId("body-name", HTMLElement), welcome.body);
-    setText(byId("source-name", HTMLElement), welcome.source);
+    const body = byId("body-name", HTMLElement);
+    setText(body, shortPath(welcome.body));
+    body.title = welcome.body;
+    const source = byId("source-name", HTMLElement);
+    setText(source, shortPath(welcome.source));
+    source.title = welcome.source;
     setText(byId("mode", HTMLElement), welcome.mode === "live" ? "live" : "recording");
     document.documentElement.classList.toggle("live", welcome.mode === "live");
-    document.title = `${welcome.body} · somatic`;
+    document.title = `${shortPath(welcome.body)} · somatic`;
     const backend = byId("backend", HTMLElement);
     setText(backend, welcome.backend.name);
     backend.title = `${welcome.backend.device}\n${welcome.backend.why}\nsomatic ${welcome.somatic}`;
@@ -48,8 +54,8 @@ export class Status {
     setText(byId("skipped", HTMLElement), frame ? String(frame.skipped) : ABSENT);
     setText(byId("rate", HTMLElement), view.gl ? drawn.toFixed(0) : ABSENT);
     const detail = byId("detail", HTMLElement);
-    detail.hidden = view.detail >= 1 || !view.gl;
-    setText(detail, `drawn at ${Math.round(100 * view.detail)} % in motion`);
+    detail.hidden = view.part >= 1 || !view.gl;
+    setText(detail, `drawn at ${Math.round(100 * view.part)} %`);
     byId("rate-chip", HTMLElement).title = `Drawings in the last second, by ${view.renderer.name}`;
   }
 
@@ -66,8 +72,9 @@ export class Status {
     else if (state === "silent") text = `No frames since ${clock(since)}.`;
     else if (state === "connecting") text = "Connecting …";
     else if (view.lost) text = "The graphics were lost. Waiting for them to come back.";
-    else if (model.ended !== null) text = model.ended;
-    if (reason) text += ` ${reason}`;
+    else if (model.ended !== null && !model.isAtRest) text = model.ended;
+    if (reason) text = model.connection.asksToken && !model.welcome ? reason : `${text} ${reason}`;
+    byId("token-form", HTMLFormElement).hidden = !model.connection.asksToken;
     setText(this.banner, text);
     this.banner.hidden = text === "";
     this.banner.classList.toggle("calm", !grey && !view.lost);

@@ -10,8 +10,12 @@ import { HEALTH } from "./wire.js";
 /** How steep the cones are that discs are to the depth test. */
 export const CONE = 1.5;
 
+/** Of taxels that no source sends: they have the colours of their fields, or that of the body. */
+const NOT_SENT = HEALTH.indexOf("not sent");
 /** In place of a state: a good taxel that feels nothing. */
-const REST = 7;
+const REST = 15;
+/** How much darker than the body a taxel is that no source sends. */
+const BARE_SHADE = 0.9;
 /** Taxels in a row of the textures of colours. */
 const ROW = 1024;
 
@@ -45,7 +49,7 @@ void main() {
   vec3 toEye = u_eye - place;
   float distance = length(toEye);
   v_state = int(fill.a * 255.0 + 0.5);
-  bool special = (v_state != 0 && v_state != ${REST}) || ring.a > 0.0;
+  bool special = (v_state != 0 && v_state != ${REST} && v_state != ${NOT_SENT}) || ring.a > 0.0;
   if (special != u_special || (!u_bothSides && dot(normal, toEye) < 0.0)) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return;
@@ -154,9 +158,14 @@ void main() {
   o_colour = vec4(colour, hidden ? 0.4 * alpha : alpha);
 }`;
 
+/** States that the plain program draws. */
+const PLAIN_STATES = [0, REST, NOT_SENT];
 const MISSING = HEALTH.indexOf("missing");
 const FAULTY = HEALTH.indexOf("faulty");
 const LEFT_OUT = HEALTH.indexOf("left out");
+
+/** States that a taxel without a pressure has in its own right. */
+const SAID_ALONE = [FAULTY, LEFT_OUT, NOT_SENT];
 
 /**
  * The colours of all taxels: four bytes each, the last one the state.
@@ -166,19 +175,21 @@ const LEFT_OUT = HEALTH.indexOf("left out");
  * @param {number[][]} colours
  * @param {number[]} rest colour of a taxel that feels nothing
  * @param {Uint8Array} out
+ * @param {(taxel: number) => number[]} unsent colour of a taxel that no source sends
  */
-export function fillColours(pressure, health, max, colours, rest, out) {
+export function fillColours(pressure, health, max, colours, rest, out, unsent = () => rest) {
   for (let i = 0; i < pressure.length; i++) {
     const p = pressure[i];
     const known = p === p;
-    const [r, g, b] = p > 0 ? colours[colourIndex(p, max)] : rest;
+    const isUnsent = health[i] === NOT_SENT;
+    const [r, g, b] = isUnsent ? unsent(i) : p > 0 ? colours[colourIndex(p, max)] : rest;
     out[4 * i] = r;
     out[4 * i + 1] = g;
     out[4 * i + 2] = b;
     // Without a pressure a taxel never looks like one at 0, whatever its state.
     const state = health[i];
     if (known && state === 0) out[4 * i + 3] = p > 0 ? 0 : REST;
-    else out[4 * i + 3] = known || state === FAULTY || state === LEFT_OUT ? state : MISSING;
+    else out[4 * i + 3] = known || SAID_ALONE.includes(state) ? state : MISSING;
   }
 }
 
@@ -251,7 +262,10 @@ export class Taxels {
   update(model, theme, rectOf, limits) {
     if (!model.welcome || model.pressure.length !== this.count) return [];
     [this.fill, this.before] = [this.before, this.fill];
-    fillColours(model.pressure, model.health, model.scaleMax, model.welcome.colours, theme.rest, this.fill);
+    const { pressure, health, scaleMax, welcome } = model;
+    const bare = theme.albedo.map((part) => Math.round(255 * BARE_SHADE * part));
+    const unsent = (/** @type {number} */ taxel) => model.colourAtRest(taxel) ?? bare;
+    fillColours(pressure, health, scaleMax, welcome.colours, theme.rest, this.fill, unsent);
     this.upload(this.fills, this.fill);
     this.findSpecial();
     return changedRects(this.before, this.fill, rectOf, limits);
@@ -270,7 +284,7 @@ export class Taxels {
   findSpecial() {
     this.hasSpecial = false;
     for (let i = 3; i < this.fill.length && !this.hasSpecial; i += 4)
-      this.hasSpecial = (this.fill[i] !== 0 && this.fill[i] !== REST) || this.ring[i] !== 0;
+      this.hasSpecial = !PLAIN_STATES.includes(this.fill[i]) || this.ring[i] !== 0;
   }
 
   /**

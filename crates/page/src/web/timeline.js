@@ -36,6 +36,8 @@ export class Timeline {
     this.playButton.addEventListener("click", () => this.togglePlay());
     byId("back-step", HTMLButtonElement).addEventListener("click", () => this.step(-1));
     byId("forward-step", HTMLButtonElement).addEventListener("click", () => this.step(1));
+    byId("back-touch", HTMLButtonElement).addEventListener("click", () => this.toTouch(-1));
+    byId("forward-touch", HTMLButtonElement).addEventListener("click", () => this.toTouch(1));
     this.linkButton.addEventListener("click", () => void this.copyLink());
     for (const speed of SPEEDS)
       this.speedBox.add(new Option(`${speed}×`, String(speed), speed === 1, speed === 1));
@@ -142,11 +144,27 @@ export class Timeline {
     this.seek((this.model.frame?.t ?? 0) + seconds);
   }
 
+  /**
+   * Goes to where the next touch begins, or the one before.
+   * @param {1 | -1} way
+   */
+  toTouch(way) {
+    const time = this.span;
+    const { peak } = this.model.timeline;
+    if (!time || !peak.length) return;
+    const bin = (time.end_s - time.start_s) / peak.length;
+    const onsets = peak.flatMap((p, i) => (p !== null && (i === 0 || peak[i - 1] === null) ? [i] : []));
+    const now = Math.floor(((this.model.frame?.t ?? time.start_s) - time.start_s) / bin + 1e-6);
+    const next = way > 0 ? onsets.find((i) => i > now) : onsets.filter((i) => i < now).pop();
+    // At the end of its part of the recording it has begun.
+    if (next !== undefined) this.seek(time.start_s + (next + 0.999) * bin);
+  }
+
   async copyLink() {
     const t = this.model.frame?.t;
     if (t === undefined || !this.span) return;
     history.replaceState(null, "", `${location.pathname}${location.search}#t=${Number(t.toFixed(6))}`);
-    let done = "Link copied";
+    let done = "Link copied, without the token";
     try {
       await navigator.clipboard.writeText(location.href);
     } catch {

@@ -49,10 +49,14 @@ export class TouchPanel {
       if (!entry) {
         entry = this.row(touch.id);
         this.rows.set(touch.id, entry);
-        this.list.append(entry.row);
       }
       this.show(touch, entry);
     }
+    // In the order of the touches, also where a seek brought older ones later.
+    touches.forEach((touch, i) => {
+      const row = this.rows.get(touch.id)?.row;
+      if (row && this.list.children[i] !== row) this.list.insertBefore(row, this.list.children[i] ?? null);
+    });
     if (touches.length) this.nothing.remove();
     else this.list.append(this.nothing);
   }

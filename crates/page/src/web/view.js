@@ -35,8 +35,12 @@ export class View {
     this.onDraw = () => () => {};
     /** Part of the picture's width and height that is drawn while it moves. */
     this.detail = 1;
+    /** Part of the picture's width and height that is drawn now. */
+    this.part = 1;
     /** Smoothed time of a drawing, ms. */
     this.drawMs = 0;
+    /** What is handed the canvas after the next drawing. @type {((canvas: HTMLCanvasElement) => void) | null} */
+    this.kept = null;
     this.scheduled = false;
     this.busy = false;
     this.again = false;
@@ -81,6 +85,16 @@ export class View {
     this.request();
   }
 
+  /**
+   * Draws everything once more, as fine as it can be, and hands over the canvas while it holds that.
+   * @param {(canvas: HTMLCanvasElement) => void} take
+   */
+  keep(take) {
+    this.kept = take;
+    this.drawn = { motion: "", look: "" };
+    this.request();
+  }
+
   request() {
     if (this.scheduled) return;
     this.scheduled = true;
@@ -117,12 +131,13 @@ export class View {
       this.drawn = { motion, look };
       this.refined = false;
       this.movedAt = begun;
-      const part = moved ? this.detail : 1;
+      const part = (this.part = moved ? this.detail : 1);
       const target = this.target("body", Math.ceil(width * part), Math.ceil(height * part));
       parts.body.draw(target, camera, parts.poses, theme, how);
       setTimeout(() => this.request(), REFINE_AFTER_MS + 20);
     } else if (!this.refined && begun - this.movedAt > REFINE_AFTER_MS) {
       this.refined = whole = true;
+      this.part = 1;
       this.refine(width, height, theme, how);
     }
     const { body } = this.targets;
@@ -160,6 +175,9 @@ export class View {
     }
     gl.disable(gl.SCISSOR_TEST);
     picture.toScreen();
+    // Only now does the canvas hold it.
+    this.kept?.(this.canvas);
+    this.kept = null;
     this.whenDone(() => {
       this.framesDrawn++;
       this.firstPictureMs ??= performance.now();

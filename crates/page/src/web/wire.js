@@ -8,8 +8,21 @@ export const VERSION = 3;
 export const NO_LINK = 0xffffffff;
 /** Bit of a percept's `present`: its position is in the world, not in the frame of a link. */
 export const IN_WORLD_BIT = 31;
+/** States of a board: those of `BoardState` in Rust, in its order and words. */
+export const BOARD_STATES = ["awaited", "speaking", "silent", "unplugged"];
+/** The state of a board that sends frames. */
+export const SPEAKING = BOARD_STATES[1];
 /** Names of the states of a taxel, by number. */
-export const HEALTH = ["good", "missing", "stale", "faulty", "saturated", "out of range", "left out"];
+export const HEALTH = [
+  "good",
+  "missing",
+  "stale",
+  "faulty",
+  "saturated",
+  "out of range",
+  "left out",
+  "not sent",
+];
 
 /**
  * @typedef {{kind: "plane" | "geodesic", origin: number[], u: number[], v: number[], normal: number[], uv: number[][]}} Chart

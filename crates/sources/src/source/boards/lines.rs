@@ -33,6 +33,9 @@ pub enum BoardState {
 }
 
 impl BoardState {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Awaited, Self::Speaking, Self::Silent, Self::Unplugged];
+
     /// The state's name.
     #[must_use]
     pub fn word(self) -> &'static str {

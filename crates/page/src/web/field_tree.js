@@ -1,0 +1,15 @@
+/** What follows from which fields hold which. */
+
+/**
+ * By taxel the smallest field of the first letter that holds it, or -1; and the fields that hold no other, in their order.
+ * @param {import("./wire.js").Field[]} fields
+ * @param {number} taxels
+ */
+export function smallestFields(fields, taxels) {
+  const smallest = new Int32Array(taxels).fill(-1);
+  const ofLetter = fields.map((_, f) => f).filter((f) => fields[f].letter === fields[0].letter);
+  const parents = new Set(ofLetter.map((f) => fields[f].parent));
+  const largestFirst = [...ofLetter].sort((a, b) => fields[b].members.length - fields[a].members.length);
+  for (const f of largestFirst) for (const taxel of fields[f].members) smallest[taxel] = f;
+  return { smallest, leaves: ofLetter.filter((f) => !parents.has(f)) };
+}
