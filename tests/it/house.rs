@@ -249,7 +249,7 @@ fn each_heavy_dependency_has_one_door() {
         ("rayon", "parallel.rs|backend/cpu/tests.rs|experiments|author/sample_neighbours.rs"),
         ("globset", "scene|author/recipe_values.rs"),
         ("fearless_simd", "backend/cpu"),
-        ("plotters", "ink.rs|figure.rs|picture|plot/draw.rs|tradeoff/plot.rs"),
+        ("plotters", "ink.rs|figure.rs|picture|plot/draw.rs|plot/pen.rs|tradeoff/plot.rs"),
         ("png", "ink.rs"),
         ("rustix", "cli/board/pty.rs|cli/keys.rs|source/ports.rs|page/wake.rs|output/lock.rs"),
         ("tungstenite", "page/socket.rs"),
