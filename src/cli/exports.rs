@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use somatic::Result;
 use somatic::signal::UnitOfP;
-use somatic::source::{SourceSpec, VendorFormat, VendorOptions, VendorSource};
+use somatic::source::{SourceSpec, TextSource, VendorFormat, VendorOptions, VendorSource};
 
-use super::first_source::{Export, Found};
+use super::first_source::{Export, Found, Text};
 use super::scene::{RunOptions, one_of};
+use super::stdio::say;
 
 /// What is said of a recording beside what its file says.
 #[derive(Args, Clone, Debug, Default)]
@@ -49,6 +50,7 @@ impl ExportFlags {
             pitch_m: self.pitch.as_deref().map(VendorOptions::pitch_of).transpose()?,
             unit: self.unit.as_deref().map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("--unit"))?,
             layout: self.layout.clone(),
+            ..VendorOptions::default()
         })
     }
 }
@@ -56,7 +58,30 @@ impl ExportFlags {
 impl RunOptions {
     pub(super) fn export_options(&self) -> Result<VendorOptions> {
         let Self { rate, format, grid, pitch, unit, layout, .. } = self.clone();
-        ExportFlags { rate, format, grid, pitch, unit, layout }.options()
+        let text = self.text.options()?;
+        Ok(VendorOptions { text, ..ExportFlags { rate, format, grid, pitch, unit, layout }.options()? })
+    }
+
+    /// What `look` sees of the lines of text that are listened to, if there are any.
+    fn text<T>(&self, look: impl FnOnce(&mut Text) -> T) -> Result<Option<T>> {
+        Ok(self.found(|found| Ok(found.text()?.map(look)))?.flatten())
+    }
+
+    /// The lines of text that are listened to, for a body whose taxels have `ids`, if there are any and they have not been taken
+    /// before.
+    pub(super) fn take_text(&self, ids: &[u32]) -> Result<Option<TextSource>> {
+        let source = self.text(|text| text.source.take())?.flatten();
+        source.map(|source| source.for_body(ids)).transpose()
+    }
+
+    /// The body that is made for lines of text, where none is named.
+    pub(super) fn text_body(&self) -> Result<Option<(String, Vec<u8>)>> {
+        let made = self.text(|text| (text.body.clone(), text.about_body.clone()))?;
+        let Some((body, about)) = made.filter(|_| self.body.is_none()) else { return Ok(None) };
+        if !self.quiet {
+            say(&about);
+        }
+        Ok(Some(("text".to_owned(), body?)))
     }
 
     /// What `look` sees of the first source, which is found out once.

@@ -4,8 +4,10 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use somatic::source::{SourceSpec, VendorOptions, VendorSource};
+use somatic::source::{SourceSpec, TextSource, VendorOptions, VendorSource};
 use somatic::{Error, Result};
+
+use super::stdio::say;
 
 /// The source `text` as one of `kinds`, and what its content says that it is.
 pub(super) fn source_of(text: &str, kinds: Option<&[&str]>, options: &VendorOptions) -> Result<SourceSpec> {
@@ -36,6 +38,15 @@ pub(super) struct Found {
     options: VendorOptions,
     pub(super) spec: SourceSpec,
     export: Option<Export>,
+    text: Option<Text>,
+}
+
+/// Lines of text that are listened to, and the body that is made for them.
+pub(super) struct Text {
+    pub(super) body: Result<Vec<u8>>,
+    pub(super) about_body: String,
+    /// Until it is read.
+    pub(super) source: Option<Box<TextSource>>,
 }
 
 /// What an export says of itself, and its frames.
@@ -62,7 +73,7 @@ impl FirstSource {
             Some(found) if found.text == text && found.options == options => found,
             _ => {
                 let spec = source_of(text, None, &options)?;
-                Found { text: text.to_owned(), options, spec, export: None }
+                Found { text: text.to_owned(), options, spec, export: None, text: None }
             }
         };
         look(known.insert(found))
@@ -76,6 +87,17 @@ impl fmt::Debug for FirstSource {
 }
 
 impl Found {
+    /// The lines of text, listened to if the source is such.
+    pub(super) fn text(&mut self) -> Result<Option<&mut Text>> {
+        if let (SourceSpec::Text(place), None) = (&self.spec, &self.text) {
+            self.spec.check_options(&self.options)?;
+            let source = TextSource::open(place, &self.options, &mut |what| say(what))?;
+            let (body, about_body) = (source.body(), source.about_body());
+            self.text = Some(Text { body, about_body, source: Some(Box::new(source)) });
+        }
+        Ok(self.text.as_mut())
+    }
+
     /// The export, opened if it is one.
     pub(super) fn export(&mut self) -> Result<Option<&mut Export>> {
         if let (SourceSpec::Vendor(path), None) = (&self.spec, &self.export) {

@@ -49,6 +49,7 @@ mod simulate;
 mod states_from;
 mod stdio;
 mod table;
+mod text_flags;
 mod tradeoff;
 mod tune;
 mod unfit;

@@ -36,6 +36,7 @@ use self::touches::TouchKeys;
 use self::within::{sink_within, source_within, states_within};
 use super::first_source::FirstSource;
 use super::ports::LineFlags;
+use super::text_flags::TextFlags;
 
 /// What `somatic run` is asked to do. Each flag of the command is a key of a scene file, with `_` for `-` and the unit in
 /// its name; of `--force` and `--speed` keys say more: `overwrite`, `playback_speed`. Paths in a file are relative to that file.
@@ -50,7 +51,7 @@ pub(super) struct RunOptions {
     pub(super) body: Option<String>,
 
     /// Where touch frames come from: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a bag of ROS 2, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
-    /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// .asc, .txt), one or more serial:PORT[@BAUD], text:PORT[@BAUD] (also text:tcp://HOST:PORT, text:udp://:PORT, text:-) for a board that prints numbers, ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(long = "source", value_name = "SOURCE")]
     #[serde(rename = "source", deserialize_with = "names_of::<SourceSpec, _>")]
     #[schemars(with = "OneOrMany")]
@@ -255,6 +256,10 @@ pub(super) struct RunOptions {
     #[serde(rename = "board_rate_hz")]
     pub(super) board_rate: Option<f64>,
 
+    #[command(flatten)]
+    #[schemars(description = "How lines of `text:` are written, where that is not to be found out.")]
+    pub(super) text: TextFlags,
+
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
     #[arg(long, help_heading = LIVE, value_name = "FILE.json5")]
     pub(super) zenoh_config: Option<PathBuf>,
@@ -363,6 +368,7 @@ impl RunOptions {
                     $($list: if self.$list.is_empty() { file.$list } else { self.$list.clone() },)*
                     $($switch: self.$switch || file.$switch,)*
                     accuracy: self.accuracy.or(file.accuracy),
+                    text: self.text.or(file.text),
                     first: FirstSource::default(),
                 }
             };
