@@ -1,5 +1,6 @@
 //! Lines of text, live: real pseudo-terminals and sockets, and what `somatic run` makes of what comes over them.
 
+use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, UdpSocket};
 use std::path::Path;
@@ -8,12 +9,38 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use serde_json::Value;
-use serialport::{SerialPort as _, TTYPort};
 
 use super::{frames, somatic, stderr, text_of};
 
-/// A board on a pseudo-terminal that sends `line(n)` again and again until it is dropped.
+/// A pseudo-terminal: this end of it, and the name of the other one.
+fn pty() -> (File, String) {
+    let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    grantpt(&end).unwrap();
+    unlockpt(&end).unwrap();
+    let name = ptsname(&end, Vec::new()).unwrap().into_string().unwrap();
+    // After one open and close it reports a hang-up while nobody has it open.
+    drop(File::open(&name).unwrap());
+    (File::from(end), name)
+}
+
+/// Whether somebody has the other end open.
+fn is_open(end: &File) -> bool {
+    let mut ask = [PollFd::new(end, PollFlags::IN)];
+    poll(&mut ask, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok() && !ask[0].revents().contains(PollFlags::HUP)
+}
+
+/// Waits until somebody has opened the other end and set it up.
+fn wait_until_open(end: &File) {
+    while !is_open(end) {
+        thread::sleep(Duration::from_millis(5));
+    }
+    thread::sleep(Duration::from_millis(100));
+}
+
+/// A board on a pseudo-terminal that sends `line(n)` again and again, once somebody listens, until it is dropped.
 struct Board {
     name: String,
     stop: Option<Sender<()>>,
@@ -22,36 +49,26 @@ struct Board {
 
 impl Board {
     fn start(every: Duration, line: impl Fn(u64) -> Vec<u8> + Send + 'static) -> Self {
-        let (mut device, end) = TTYPort::pair().unwrap();
-        let name = end.name().unwrap();
-        let (stop, stopped) = channel();
+        let (mut device, name) = pty();
+        let (stop, stopped) = channel::<()>();
         let thread = thread::spawn(move || {
-            // Until somebody listens, the other end stays open, or writing would fail.
-            let mut end = Some(end);
-            let start = Instant::now();
+            let is_stopped = |wait: Duration| stopped.recv_timeout(wait) != Err(RecvTimeoutError::Timeout);
+            while !is_open(&device) {
+                if is_stopped(Duration::from_millis(5)) {
+                    return 0;
+                }
+            }
+            let start = Instant::now() + Duration::from_millis(100);
             let mut sent = 0;
             loop {
-                let due = every * u32::try_from(sent).unwrap();
-                match stopped.recv_timeout(due.saturating_sub(start.elapsed())) {
-                    Err(RecvTimeoutError::Timeout) => {}
-                    _ => return sent,
-                }
-                if start.elapsed() > Duration::from_millis(300) {
-                    end = None;
-                }
-                let _ = &end;
-                if device.write_all(&line(sent)).is_err() {
-                    thread::sleep(Duration::from_millis(5));
+                let due = start + every * u32::try_from(sent).unwrap();
+                if is_stopped(due.saturating_duration_since(Instant::now())) || device.write_all(&line(sent)).is_err() {
+                    return sent;
                 }
                 sent += 1;
             }
         });
         Self { name, stop: Some(stop), thread: Some(thread) }
-    }
-
-    fn end(mut self) -> u64 {
-        self.stop.take();
-        self.thread.take().unwrap().join().unwrap()
     }
 }
 
@@ -333,7 +350,7 @@ fn a_board_that_is_unplugged_is_waited_for_and_goes_on() {
     let output = child.wait_with_output().unwrap();
     let said = stderr(&output);
     assert!(said.contains("gone; waiting for it to come back") && said.contains("is back"), "{said}");
-    second.end();
+    drop(second);
 }
 
 #[test]
@@ -354,8 +371,8 @@ fn text_where_packets_belong_is_named() {
 #[ignore = "a measurement, of SOMATIC_SOAK_SECONDS, 10 unless set"]
 fn latency_at_a_thousand_frames_a_second() {
     let seconds: u64 = std::env::var("SOMATIC_SOAK_SECONDS").map_or(10, |text| text.parse().unwrap());
-    let (mut device, end) = TTYPort::pair().unwrap();
-    let source = format!("text:{}", end.name().unwrap());
+    let (mut device, name) = pty();
+    let source = format!("text:{name}");
     let mut child = somatic(&[
         "run",
         "--backend",
@@ -376,6 +393,7 @@ fn latency_at_a_thousand_frames_a_second() {
     let heard = thread::spawn(move || {
         out.lines().map_while(Result::ok).map(|line| (Instant::now(), line)).collect::<Vec<(Instant, String)>>()
     });
+    wait_until_open(&device);
     let start = Instant::now();
     let mut sent = Vec::new();
     for index in 0..(seconds + 3) * 1000 {
@@ -388,7 +406,7 @@ fn latency_at_a_thousand_frames_a_second() {
         sent.push(Instant::now());
     }
     thread::sleep(Duration::from_millis(500));
-    drop((device, end));
+    drop(device);
     let _ = child.kill();
     let _ = child.wait();
     let heard = heard.join().unwrap();

@@ -144,8 +144,8 @@ impl Assembler {
         let text = match line {
             Line::Text(text) => text,
             Line::Garbled if std::mem::take(&mut self.is_joining) => return self.skipped.add(Wrong::Torn, ""),
-            Line::Garbled => return self.lose(Wrong::Garbled, "", true),
-            Line::Long => return self.lose(Wrong::Long, "", true),
+            Line::Garbled => return self.lose(Wrong::Garbled, ""),
+            Line::Long => return self.lose(Wrong::Long, ""),
         };
         if self.form.header.as_deref() == Some(text) {
             self.is_joining = false;
@@ -172,7 +172,7 @@ impl Assembler {
             Ok(()) if self.form.is_spread => {}
             Ok(()) => self.next_row(),
             Err(_) if self.is_end(text) => {}
-            Err(wrong) => self.lose(wrong, text, true),
+            Err(wrong) => self.lose(wrong, text),
         }
     }
 
@@ -180,10 +180,10 @@ impl Assembler {
         self.form.end.as_ref().is_some_and(|end| end.is(text))
     }
 
-    /// Counts a line. Where it `was_row`, the frame that it was of is none.
-    fn lose(&mut self, wrong: Wrong, text: &str, was_row: bool) {
+    /// Counts a line. If it may have been a row, the frame that it was of is none.
+    fn lose(&mut self, wrong: Wrong, text: &str) {
         self.skipped.add(wrong, text);
-        if was_row && self.form.rows > 1 && wrong != Wrong::Words {
+        if self.form.rows > 1 && wrong != Wrong::Words {
             match self.form.end {
                 Some(_) => self.in_step = false,
                 // Nothing else says where a frame begins.
@@ -213,7 +213,7 @@ impl Assembler {
         }
         match result {
             _ if text.is_empty() => {}
-            Err(wrong) if self.in_step => self.lose(wrong, text, true),
+            Err(wrong) if self.in_step => self.lose(wrong, text),
             Err(Wrong::Words) => self.skipped.add(Wrong::Words, text),
             // Of a frame that is lost already.
             _ if !self.in_step => {}

@@ -139,8 +139,8 @@ impl Form {
         (0..self.columns.len()).filter(|&index| is(&self.columns[index])).collect()
     }
 
-    /// What was understood, on a line.
-    pub(super) fn words(&self) -> String {
+    /// What was understood, on a line; `has_rate` is whether a rate gives the times.
+    pub(super) fn words(&self, has_rate: bool) -> String {
         let sensors = self.which(|column| matches!(column, Use::Sensor(_)));
         let called = self.called(&sensors);
         let verb = if sensors.len() == 1 { "is" } else { "are" };
@@ -163,6 +163,7 @@ impl Form {
                 let guess = if self.is_time_guessed { ", as it seems" } else { "" };
                 let _ = write!(text, ", {} is time in {}{guess}", self.called(&time), unit.symbol());
             }
+            None if has_rate => text += ", time goes on as --rate says",
             None => text += ", time is that of arrival",
         }
         for why in ["counts frames", "rises like a time of unknown unit", "is no sensor"] {

@@ -133,7 +133,7 @@ impl TextSource {
     pub fn understood(&self) -> String {
         let speed = self.link.baud().filter(|_| !self.name.contains('@')).map(|baud| format!(" (at {baud} baud)"));
         let advice = self.form.advice().map_or_else(String::new, |advice| format!("; {advice}"));
-        format!("{}{}{advice}", self.form.words(), speed.unwrap_or_default())
+        format!("{}{}{advice}", self.form.words(self.rate_hz.is_some()), speed.unwrap_or_default())
     }
 
     /// Rows and columns of its sensors; one row where it is not known that they are a grid.
