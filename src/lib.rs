@@ -160,8 +160,9 @@ pub mod source {
     pub(crate) use somatic_sources::source::*;
     #[doc(inline)]
     pub use somatic_sources::source::{
-        BagName, Cell, CsvFile, CsvSource, Cut, JointPosition, JointStates, Layout, NdjsonSource, Panel, Replay,
-        SimulatedSource, Source, SourceSpec, Truth, VendorFormat, VendorOptions, VendorSource, write_recording,
+        BagName, Cell, CsvFile, CsvSource, Cut, FrameEnd, JointPosition, JointStates, Layout, NdjsonSource, Panel,
+        Replay, SimulatedSource, Source, SourceSpec, TextColumns, TextIds, TextOptions, TextPlace, TextSource,
+        TextTime, TimeColumnName, Truth, VendorFormat, VendorOptions, VendorSource, write_recording,
         write_recording_with_progress,
     };
     #[cfg(any(feature = "serial", feature = "zenoh"))]

@@ -38,7 +38,7 @@ pub(super) struct Found {
     options: VendorOptions,
     pub(super) spec: SourceSpec,
     export: Option<Export>,
-    text: Option<Text>,
+    lines: Option<Text>,
 }
 
 /// Lines of text that are listened to, and the body that is made for them.
@@ -73,7 +73,7 @@ impl FirstSource {
             Some(found) if found.text == text && found.options == options => found,
             _ => {
                 let spec = source_of(text, None, &options)?;
-                Found { text: text.to_owned(), options, spec, export: None, text: None }
+                Found { text: text.to_owned(), options, spec, export: None, lines: None }
             }
         };
         look(known.insert(found))
@@ -89,13 +89,13 @@ impl fmt::Debug for FirstSource {
 impl Found {
     /// The lines of text, listened to if the source is such.
     pub(super) fn text(&mut self) -> Result<Option<&mut Text>> {
-        if let (SourceSpec::Text(place), None) = (&self.spec, &self.text) {
+        if let (SourceSpec::Text(place), None) = (&self.spec, &self.lines) {
             self.spec.check_options(&self.options)?;
             let source = TextSource::open(place, &self.options, &mut |what| say(what))?;
             let (body, about_body) = (source.body(), source.about_body());
-            self.text = Some(Text { body, about_body, source: Some(Box::new(source)) });
+            self.lines = Some(Text { body, about_body, source: Some(Box::new(source)) });
         }
-        Ok(self.text.as_mut())
+        Ok(self.lines.as_mut())
     }
 
     /// The export, opened if it is one.
