@@ -18,6 +18,8 @@ use super::{frames, somatic, stderr, text_of};
 /// A pseudo-terminal: this end of it, and the name of the other one.
 fn pty() -> (File, String) {
     let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    // No program that is started holds it open.
+    rustix::io::fcntl_setfd(&end, rustix::io::FdFlags::CLOEXEC).unwrap();
     grantpt(&end).unwrap();
     unlockpt(&end).unwrap();
     let name = ptsname(&end, Vec::new()).unwrap().into_string().unwrap();
@@ -110,7 +112,7 @@ fn a_board_that_prints_numbers_is_read_with_one_line() {
         0 => b"2,300,7\r\n".to_vec(),
         1 => b"Ready. Version 1.2\r\n".to_vec(),
         60 => b"512,30\r\n".to_vec(),
-        sent => format!("{},300,7\r\n", sent % 500).into_bytes(),
+        sent => format!("300,{},7\r\n", sent % 500).into_bytes(),
     });
     let source = format!("text:{}@115200", board.name);
     let output =
@@ -206,7 +208,7 @@ fn flags_say_what_is_not_found_out() {
     for (flags, code, why) in [
         (&["--columns", "2-9"][..], 2, "there is no column `2-9`; lines have 4 columns"),
         (&["--columns", "no"], 2, "no column `no`"),
-        (&["--grid", "3x3"], 1, "--grid 3x3 needs lines of 3 or 9 values"),
+        (&["--grid", "5x5"], 1, "--grid 5x5 needs lines of 5 or 25 values, and most have 3"),
         (&["--ids", "1,2"], 2, "--ids names 2 taxels, and a frame has 3 sensors"),
         (&["--ids", "x"], 2, "are no taxels"),
         (&["--time", "9"], 2, "there is no column `9`"),
@@ -242,7 +244,7 @@ fn lines_that_are_no_frames_are_counted_by_kind_and_what_holds_none_is_an_error(
     for (input, why) in [
         ("", "the input has ended without a line"),
         ("hello\nworld\n", "no line holds numbers, such as `512,300,7`; the first one is `hello`"),
-        ("\u{1}\u{2}\u{3}\u{4}\n", "no text"),
+        ("\u{1}\u{2}\u{3}\u{4}\n", "no line holds numbers"),
     ] {
         let output = fed(input, &[]);
         assert!(stderr(&output).contains(why) && output.status.code() == Some(1), "{}", stderr(&output));
@@ -252,7 +254,7 @@ fn lines_that_are_no_frames_are_counted_by_kind_and_what_holds_none_is_an_error(
 
 /// A run over a network, which is waited for until its percepts come.
 fn over_network(source: &str) -> Child {
-    somatic(&["run", "--backend", "cpu", "--source", source, "--sink", "-", "--outputs", "total", "--for", "1s"])
+    somatic(&["run", "--backend", "cpu", "--source", source, "--sink", "-", "--outputs", "total", "--for", "3s"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
