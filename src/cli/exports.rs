@@ -64,7 +64,7 @@ impl RunOptions {
 
     /// What `look` sees of the lines of text that are listened to, if there are any.
     fn text<T>(&self, look: impl FnOnce(&mut Text) -> T) -> Result<Option<T>> {
-        Ok(self.found(|found| Ok(found.text()?.map(look)))?.flatten())
+        Ok(self.found(|found| Ok(found.text(self.quiet)?.map(look)))?.flatten())
     }
 
     /// The lines of text that are listened to, for a body whose taxels have `ids`, if there are any and they have not been taken

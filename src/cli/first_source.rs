@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use somatic::source::{SourceSpec, TextSource, VendorOptions, VendorSource};
+use somatic::source::{Source as _, SourceSpec, TextSource, VendorOptions, VendorSource};
 use somatic::{Error, Result};
 
 use super::stdio::say;
@@ -87,11 +87,13 @@ impl fmt::Debug for FirstSource {
 }
 
 impl Found {
-    /// The lines of text, listened to if the source is such.
-    pub(super) fn text(&mut self) -> Result<Option<&mut Text>> {
+    /// The lines of text, listened to if the source is such. What they were taken for is said at once, before a table fills the terminal,
+    /// unless `quiet`.
+    pub(super) fn text(&mut self, quiet: bool) -> Result<Option<&mut Text>> {
         if let (SourceSpec::Text(place), None) = (&self.spec, &self.lines) {
             self.spec.check_options(&self.options)?;
-            let source = TextSource::open(place, &self.options, &mut |what| say(what))?;
+            let mut source = TextSource::open(place, &self.options, &mut |what| say(what))?;
+            source.notices().iter().filter(|_| !quiet).for_each(|notice| say(notice));
             let (body, about_body) = (source.body(), source.about_body());
             self.lines = Some(Text { body, about_body, source: Some(Box::new(source)) });
         }
