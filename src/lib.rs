@@ -145,7 +145,7 @@ pub mod scene {
     pub mod file {
         #[doc(inline)]
         pub use crate::scene_file::{
-            Accuracy, JointsDelay, LineKeys, SceneFile, StatesSpec, Target, TouchKeys, angle, length, time,
+            Accuracy, JointsDelay, LineKeys, SceneFile, StatesSpec, Target, TextKeys, TouchKeys, angle, length, time,
         };
     }
 }
@@ -179,14 +179,17 @@ pub mod source {
     #[allow(unused_imports, reason = "which of them are used hangs on features")]
     pub(crate) use somatic_sources::source::*;
     #[doc(hidden)]
-    pub use somatic_sources::source::{BagName, Cell, CsvFile, Layout, Panel, write_recording_with_progress};
+    pub use somatic_sources::source::{
+        BagName, Cell, CsvFile, FrameEnd, Layout, Panel, TextColumns, TextIds, TextTime, TimeColumnName,
+        write_recording_with_progress,
+    };
     #[cfg(any(feature = "serial", feature = "zenoh"))]
     #[doc(hidden)]
     pub use somatic_sources::source::{BoardAccount, BoardState, ChannelWiper, LimbPercepts, WiperTrouble};
     #[doc(inline)]
     pub use somatic_sources::source::{
-        CsvSource, Cut, JointPosition, JointStates, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, Truth,
-        VendorFormat, VendorOptions, VendorSource, write_recording,
+        CsvSource, Cut, JointPosition, JointStates, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec,
+        TextOptions, TextPlace, TextSource, Truth, VendorFormat, VendorOptions, VendorSource, write_recording,
     };
     #[cfg(feature = "zenoh")]
     #[doc(inline)]

@@ -330,6 +330,7 @@ pub(crate) fn read(
             pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
             unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
             layout,
+            ..VendorOptions::default()
         };
         let spec = text.parse::<SourceSpec>()?.with_content(&options);
         Ok((options, spec))

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use crate::survey::known::{KnownForce, PressedOn};
 use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use serde_json::json;
 use somatic::signal::{RawValue, UnitOfP};
-use somatic::source::{Lines, Source, SourceSpec, VendorOptions, VendorSource};
+use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, VendorSource};
 use somatic::tradeoff::length;
 use somatic::{Body, Calibration, Error, Result};
 
@@ -20,8 +21,10 @@ use super::files::FilesRead;
 use super::interrupt::{left_out, stop_on_signal};
 use super::plot_file::PlotFile;
 use super::ports::LineFlags;
+use super::scene::one_of;
 use super::stdio::{print, say, tell_losses};
 use super::table::{more, plain, shown};
+use super::text_flags::TextFlags;
 use super::words::{bullet, count};
 
 const EXAMPLES: &str = "\
@@ -77,6 +80,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     lines: LineFlags,
 
+    #[command(flatten)]
+    text: TextFlags,
+
     /// The calibration to write, TOML.
     #[arg(short, long, value_name = "FILE.toml")]
     output: PathBuf,
@@ -104,6 +110,15 @@ pub(super) struct Arguments {
     /// Give each sensor the gain that makes all the presses equal: for sensors that were all pressed alike.
     #[arg(long)]
     equalise: bool,
+
+    /// The force of every press, such as 4.9N, or as a weight 500g: P is in newtons then.
+    #[arg(long, value_name = "FORCE", requires = "on", value_parser = str::parse::<KnownForce>,
+        conflicts_with_all = ["equalise", "gains_from"])]
+    known: Option<KnownForce>,
+
+    /// What --known pressed on: each sensor by itself (taxel), or all of them together (field).
+    #[arg(long, value_name = "WHAT", requires = "known", value_parser = one_of::<PressedOn>(&["taxel", "field"]))]
+    on: Option<PressedOn>,
 
     /// Mask the sensors that moved during the rest, instead of writing nothing: for broken ones.
     #[arg(long)]
@@ -144,11 +159,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let ports = arguments.lines.lines(&arguments.sources)?;
     let (source, lines): (Box<dyn Source + Send>, _) = if ports.is_empty() {
-        (
-            first_of(&arguments.sources)?
-                .open(&ids, &VendorOptions { rate_hz: arguments.rate, ..VendorOptions::default() })?,
-            None,
-        )
+        (open(&first_of(&arguments.sources)?, &ids, arguments)?, None)
     } else if arguments.rate.is_some() {
         return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
     } else {
@@ -157,7 +168,8 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
         (Box::new(source), Some(lines))
     };
     let mut survey = Survey::new(&in_body(&body, &*source)?);
-    let is_live = lines.is_some() || first_of(&arguments.sources)?.is_stdin();
+    let first = first_of(&arguments.sources);
+    let is_live = lines.is_some() || first.is_ok_and(|spec| spec.is_stdin() || matches!(spec, SourceSpec::Text(_)));
     let gathered = gather(&mut survey, source, arguments, lines.as_ref(), is_live);
     if let Some(lines) = &lines {
         lines.close();
@@ -182,6 +194,9 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
 
     findings.missing.clone_from(&arguments.missing);
     findings.unit = if ports.is_empty() { unit_of(&arguments.sources, arguments.rate)? } else { UnitOfP::COUNT };
+    if let (Some(force), Some(on)) = (arguments.known, arguments.on) {
+        findings.know(force, on)?;
+    }
     let text = findings.calibration(&name_of(&body));
     // What is written must be what `run` takes; if it were not, nothing is written.
     let known: Vec<u32> =
@@ -211,6 +226,19 @@ fn unit_of(sources: &[String], rate_hz: Option<f64>) -> Result<UnitOfP> {
             Ok(VendorSource::open(path, &VendorOptions { rate_hz, ..VendorOptions::default() })?.layout().unit)
         }
         _ => Ok(UnitOfP::COUNT),
+    }
+}
+
+/// Opens `spec` for a body whose taxels have `ids`, and says what its lines of text are taken for.
+fn open(spec: &SourceSpec, ids: &[u32], arguments: &Arguments) -> Result<Box<dyn Source + Send>> {
+    let options =
+        VendorOptions { rate_hz: arguments.rate, text: arguments.text.options()?, ..VendorOptions::default() };
+    match spec {
+        SourceSpec::Text(place) => {
+            spec.check_options(&options)?;
+            Ok(Box::new(TextSource::open(place, &options, &mut |what| say(what))?.for_body(ids)?))
+        }
+        spec => spec.open(ids, &options),
     }
 }
 

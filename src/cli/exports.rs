@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use somatic::Result;
 use somatic::scene::file::SceneFile;
-use somatic::source::{SourceSpec, VendorFormat, VendorOptions, VendorSource};
+use somatic::source::{SourceSpec, TextSource, VendorFormat, VendorOptions, VendorSource};
 
-use super::first_source::{Export, Found};
+use super::first_source::{Export, Found, Text};
 use super::scene::{Asked, in_flags, one_of};
+use super::stdio::say;
 
 /// What is said of a recording beside what its file says.
 #[derive(Args, Clone, Debug, Default)]
@@ -56,6 +57,28 @@ impl ExportFlags {
 }
 
 impl Asked {
+    /// What `look` sees of the lines of text that are listened to, if there are any.
+    fn text<T>(&self, look: impl FnOnce(&mut Text) -> T) -> Result<Option<T>> {
+        Ok(self.found(|found| Ok(found.text(self.quiet)?.map(look)))?.flatten())
+    }
+
+    /// The lines of text that are listened to, for a body whose taxels have `ids`, if there are any and they have not been taken
+    /// before.
+    pub(super) fn take_text(&self, ids: &[u32]) -> Result<Option<TextSource>> {
+        let source = self.text(|text| text.source.take())?.flatten();
+        source.map(|source| source.for_body(ids)).transpose()
+    }
+
+    /// The body that is made for lines of text, where none is named.
+    pub(super) fn text_body(&self) -> Result<Option<(String, Vec<u8>)>> {
+        let made = self.text(|text| (text.body.clone(), text.about_body.clone()))?;
+        let Some((body, about)) = made.filter(|_| self.body.is_none()) else { return Ok(None) };
+        if !self.quiet {
+            say(&about);
+        }
+        Ok(Some(("text".to_owned(), body?)))
+    }
+
     /// What `look` sees of the first source, which is found out once.
     fn found<T>(&self, look: impl FnOnce(&mut Found) -> Result<T>) -> Result<Option<T>> {
         let Some(source) = self.sources.first() else { return Ok(None) };

@@ -52,7 +52,7 @@ impl FilesRead {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => files.files([path]),
             SourceSpec::Ros2Mcap(bag) => files.bag(bag),
             SourceSpec::Sim(path) => files.files(SimulatedSource::files(path)),
-            SourceSpec::Stdin | SourceSpec::CsvStdin => files.files(["/dev/stdin"]),
+            spec if spec.is_stdin() => files.files(["/dev/stdin"]),
             _ => files,
         })
     }

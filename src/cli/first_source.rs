@@ -4,8 +4,10 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use somatic::source::{SourceSpec, VendorOptions, VendorSource};
+use somatic::source::{Source as _, SourceSpec, TextSource, VendorOptions, VendorSource};
 use somatic::{Error, Result};
+
+use super::stdio::say;
 
 /// The source `text` as one of `kinds`, and what its content says that it is.
 pub(super) fn source_of(text: &str, kinds: &[&str], options: &VendorOptions) -> Result<SourceSpec> {
@@ -37,6 +39,15 @@ pub(super) struct Found {
     options: VendorOptions,
     pub(super) spec: SourceSpec,
     export: Option<Export>,
+    lines: Option<Text>,
+}
+
+/// Lines of text that are listened to, and the body that is made for them.
+pub(super) struct Text {
+    pub(super) body: Result<Vec<u8>>,
+    pub(super) about_body: String,
+    /// Until it is read.
+    pub(super) source: Option<Box<TextSource>>,
 }
 
 /// What an export says of itself, and its frames.
@@ -63,7 +74,7 @@ impl FirstSource {
             Some(found) if found.asked == *asked && found.options == options => found,
             _ => {
                 let spec = with_content(asked.clone(), &options)?;
-                Found { asked: asked.clone(), options, spec, export: None }
+                Found { asked: asked.clone(), options, spec, export: None, lines: None }
             }
         };
         look(known.insert(found))
@@ -77,6 +88,19 @@ impl fmt::Debug for FirstSource {
 }
 
 impl Found {
+    /// The lines of text, listened to if the source is such. What they were taken for is said at once, before a table fills the terminal,
+    /// unless `quiet`.
+    pub(super) fn text(&mut self, quiet: bool) -> Result<Option<&mut Text>> {
+        if let (SourceSpec::Text(place), None) = (&self.spec, &self.lines) {
+            self.spec.check_options(&self.options)?;
+            let mut source = TextSource::open(place, &self.options, &mut |what| say(what))?;
+            source.notices().iter().filter(|_| !quiet).for_each(|notice| say(notice));
+            let (body, about_body) = (source.body(), source.about_body());
+            self.lines = Some(Text { body, about_body, source: Some(Box::new(source)) });
+        }
+        Ok(self.lines.as_mut())
+    }
+
     /// The export, opened if it is one.
     pub(super) fn export(&mut self) -> Result<Option<&mut Export>> {
         if let (SourceSpec::Vendor(path), None) = (&self.spec, &self.export) {

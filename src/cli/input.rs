@@ -57,13 +57,14 @@ impl Input {
             };
         };
         let Some(spec) = asked.first_source()? else { unreachable!("a source is named") };
-        if matches!(spec, SourceSpec::Stdin | SourceSpec::CsvStdin) {
+        if spec.is_stdin() {
             check_input()?;
         }
         let name = match &spec {
             SourceSpec::Ros2Mcap(bag) => bag.to_string(),
             file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),
             SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
+            SourceSpec::Text(place) => place.to_string(),
             SourceSpec::Ros2 { topic, .. } => format!("ros2:{topic}"),
             SourceSpec::Zenoh(_) if asked.sources.len() > 1 => format!("{} limbs", asked.sources.len()),
             _ if asked.sources.len() > 1 => format!("{} serial lines", asked.sources.len()),
@@ -101,6 +102,10 @@ impl Input {
                 Some((name, bytes)) => Body::from_bytes(&name, &bytes),
                 None => load_body("hand"),
             },
+            (None, Some(SourceSpec::Text(_))) => match asked.text_body()? {
+                Some((name, bytes)) => Body::from_bytes(&name, &bytes),
+                None => load_body("hand"),
+            },
             (None, _) => load_body("hand"),
         }
     }
@@ -118,8 +123,8 @@ impl Input {
     }
 
     pub(super) fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Zenoh};
-        !matches!(self.spec, Some(Stdin | CsvStdin | Serial { .. } | Ros2 { .. } | Zenoh(_)))
+        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Text, Zenoh};
+        !matches!(self.spec, Some(Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Zenoh(_)))
     }
 
     /// Whether several boards or limbs are merged.
@@ -128,7 +133,7 @@ impl Input {
     }
 
     pub(super) fn is_stdin(&self) -> bool {
-        self.spec == Some(SourceSpec::Stdin)
+        self.spec.as_ref().is_some_and(|spec| spec.is_stdin() && *spec != SourceSpec::CsvStdin)
     }
 
     /// Identifies the recording: path, topic, length and modification time. `None` for live input.
@@ -177,6 +182,9 @@ impl Input {
         #[cfg(feature = "ros2")]
         if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
             return Ok(Box::new(somatic::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(asked)?)?));
+        }
+        if let Some(source) = asked.take_text(ids)? {
+            return Ok(Box::new(source));
         }
         let cut = Cut {
             from_s: asked.from_s.unwrap_or(Cut::WHOLE.from_s),

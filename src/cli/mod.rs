@@ -50,6 +50,7 @@ mod screen;
 mod simulate;
 mod stdio;
 mod table;
+mod text_flags;
 mod tradeoff;
 mod tune;
 mod unfit;

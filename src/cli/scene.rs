@@ -23,6 +23,7 @@ pub(super) use self::flags::{LIVE, first, grouped, one_of};
 pub(super) use self::in_flags::in_flags;
 pub(super) use self::outputs::{output, outputs_help, outputs_or_usual};
 use super::first_source::FirstSource;
+use super::text_flags::TextFlags;
 
 /// What `somatic run` is asked to do by flags. Each has the name of its key in a scene file, by which [`in_flags`] finds it: with `_` for
 /// `-` and the unit in it; of `--force` and `--speed` keys say more: `overwrite`, `playback_speed`. Flags come before keys.
@@ -34,7 +35,7 @@ pub(super) struct RunFlags {
     pub(super) body: Option<String>,
 
     /// Where touch frames come from: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a bag of ROS 2, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
-    /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// .asc, .txt), one or more serial:PORT[@BAUD], text:PORT[@BAUD] (also text:tcp://HOST:PORT, text:udp://:PORT, text:-) for a board that prints numbers, ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[arg(id = "source", long = "source", value_name = "SOURCE")]
     pub(super) sources: Vec<String>,
 
@@ -199,6 +200,9 @@ pub(super) struct RunFlags {
     #[arg(long = "board-rate", help_heading = LIVE, value_name = "HZ")]
     pub(super) board_rate_hz: Option<f64>,
 
+    #[command(flatten)]
+    pub(super) text: TextFlags,
+
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
     #[arg(long, help_heading = LIVE, value_name = "FILE.json5")]
     pub(super) zenoh_config: Option<PathBuf>,
@@ -340,6 +344,7 @@ impl RunFlags {
             file.sinks = self.sinks.iter().map(|text| text.parse()).collect::<Result<_>>()?;
         }
         file.accuracy = self.accuracy.keys().over(file.accuracy);
+        file.text = self.text.keys().over(file.text);
         Ok(file)
     }
 }

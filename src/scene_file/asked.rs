@@ -138,7 +138,7 @@ impl SceneFile {
     /// What is said of a pressure system's export beside what its file says.
     ///
     /// # Errors
-    /// A usage error: a grid, a pitch or a unit is none.
+    /// A usage error: a grid, a pitch or a unit is none, or a key of text is not written so.
     pub fn export_options(&self) -> Result<VendorOptions> {
         Ok(VendorOptions {
             format: self.format,
@@ -147,6 +147,7 @@ impl SceneFile {
             pitch_m: self.pitch.as_deref().map(VendorOptions::pitch_of).transpose()?,
             unit: self.unit.as_deref().map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("`unit`"))?,
             layout: self.layout.clone(),
+            text: self.text.options()?,
         })
     }
 }

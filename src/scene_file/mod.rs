@@ -9,6 +9,7 @@ mod joints_delay;
 mod lines;
 mod states;
 mod target;
+mod text;
 mod touches;
 mod within;
 
@@ -26,6 +27,7 @@ pub use self::joints_delay::JointsDelay;
 pub use self::lines::LineKeys;
 pub use self::states::StatesSpec;
 pub use self::target::{Target, angle, length, time};
+pub use self::text::TextKeys;
 pub use self::touches::TouchKeys;
 use crate::backend::BackendKind;
 use crate::body::Up;
@@ -50,7 +52,7 @@ pub struct SceneFile {
     pub body: Option<String>,
 
     /// Where touch frames come from: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a bag of ROS 2, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
-    /// .asc, .txt), one or more serial:PORT[@BAUD], ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// .asc, .txt), one or more serial:PORT[@BAUD], text:PORT[@BAUD] (also text:tcp://HOST:PORT, text:udp://:PORT, text:-) for a board that prints numbers, ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
     #[serde(rename = "source", deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub sources: Vec<SourceSpec>,
@@ -199,6 +201,13 @@ pub struct SceneFile {
     /// Tell the boards to send frames at this rate, in Hz; 0 is as fast as the line allows [default: leave them as they
     /// are].
     pub board_rate_hz: Option<f64>,
+
+    /// How lines of `text:` are written, where that is not to be found out.
+    #[cfg_attr(
+        feature = "cli",
+        schemars(description = "How lines of `text:` are written, where that is not to be found out.")
+    )]
+    pub text: TextKeys,
 
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
     pub zenoh_config: Option<PathBuf>,

@@ -11,6 +11,7 @@
 
 mod figure;
 mod file;
+pub mod known;
 pub mod tuning;
 mod which_way;
 

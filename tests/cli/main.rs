@@ -1,5 +1,6 @@
 //! The command, driven as people and scripts drive it: the real binary, its output and its exit code.
 
+mod arduino;
 mod author;
 mod bags;
 mod bags_merged;
@@ -63,6 +64,8 @@ mod simulate;
 mod skins;
 mod sources;
 mod tables;
+#[cfg(unix)]
+mod text;
 mod touches;
 mod touches_accuracy;
 mod touches_oracle;

@@ -18,6 +18,24 @@ pub(super) fn file(path: &str) -> Vec<u8> {
     std::fs::read(format!("{ROOT}/{path}")).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
+/// Lines of text in each of the ways that boards print them.
+pub(super) fn text() -> Vec<String> {
+    let rows = |line: &dyn Fn(usize) -> String| (0..24).map(|row| line(row) + "\n").collect::<String>();
+    let mat = |end: &'static str| rows(&|row| format!("{row},0,0\n0,{},7\n{end}", row % 5));
+    vec![
+        rows(&|row| format!("{},300,{}", 512 - row % 7, row % 3)),
+        format!("boot v1.2\ntime_ms;a;b\n{}", rows(&|row| format!("{};{},5;3", 20 * row, row % 7))),
+        rows(&|row| format!("{}\t-2.5\tnan\t", row * 16)),
+        rows(&|row| format!("A0: {}, A1: 7", row % 9)),
+        rows(&|row| format!("s{}={}", row % 3, row)),
+        rows(&|row| format!(r#"{{"t":{},"values":{{"4":{},"5":null}}}}"#, 0.02 * row as f64, row % 4)),
+        rows(&|row| format!("[[1,2],[3,{row}]]")),
+        rows(&|row| format!("2031-05-06T07:08:{row:02}Z,1,{}", row % 3)),
+        mat(""),
+        mat("--"),
+    ]
+}
+
 pub(super) const URDF: &str = r#"<?xml version="1.0"?>
 <robot name="r">
   <link name="base"><visual><origin xyz="0 0 0.1" rpy="0 0.1 0"/><geometry><box size="0.2 0.2 0.2"/></geometry></visual></link>

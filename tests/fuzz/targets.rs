@@ -12,7 +12,7 @@ use somatic::robot::messages::{Float32MultiArray, JointState, Message, PointClou
 use somatic::signal::Wiring;
 use somatic::sink::SinkSpec;
 use somatic::source::{
-    CsvSource, JointStates, NdjsonSource, SimulatedSource, Source, SourceSpec, VendorFormat, VendorOptions,
+    CsvSource, JointStates, NdjsonSource, SimulatedSource, Source, SourceSpec, TextSource, VendorFormat, VendorOptions,
     VendorSource,
 };
 use somatic::wire::{Decoder, Event};
@@ -92,6 +92,27 @@ pub(super) fn ndjson() -> Target {
             }
             read => told(read),
         }
+    })
+}
+
+pub(super) fn text() -> Target {
+    target("text", "a.txt", seeds::text(), |case| {
+        let mut source = match TextSource::from_bytes(case.bytes, &VendorOptions::default()) {
+            Ok(source) => source,
+            Err(e) => return told::<()>(Err(e)),
+        };
+        told(source.body())?;
+        let understood = source.understood();
+        let (frames, losses) = frames(&mut source).map_err(|e| e.to_string())?;
+        let skipped: usize = losses.iter().filter_map(|loss| loss.split(' ').nth(1)?.parse::<usize>().ok()).sum();
+        let cells = |line: &str| line.split([',', ';', ' ', '\t', '|']).all(|cell| cell.parse::<f64>().is_ok());
+        let lines = case.text().split(['\n', '\r']).filter(|line| cells(line.trim())).count();
+        let is_a_line_each =
+            understood.starts_with("column") && !understood.contains(" lines ") && !understood.contains("is between");
+        if is_a_line_each && frames.len() + skipped < lines {
+            return Err(format!("{} frames and {skipped} skipped of {lines} lines: {understood}", frames.len()));
+        }
+        Ok(!frames.is_empty())
     })
 }
 

@@ -25,6 +25,7 @@ pub mod send_rate;
 mod serial;
 mod simulated;
 mod spec;
+mod text;
 mod time_column;
 mod unknown_taxels;
 mod vendor;
@@ -46,6 +47,7 @@ pub use serial::{SerialOptions, SerialSource};
 pub use simulated::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 pub use simulated::{SimulatedSource, Truth, write_recording, write_recording_with_progress};
 pub use spec::SourceSpec;
+pub use text::{FrameEnd, TextColumns, TextIds, TextOptions, TextPlace, TextSource, TextTime, TimeColumnName};
 pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};
 
 use std::time::Instant;

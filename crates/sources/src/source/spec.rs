@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::bag_name::BagName;
-use super::{CsvSource, NdjsonSource, SimulatedSource, Source, VendorOptions, VendorSource};
+use super::{CsvSource, NdjsonSource, SimulatedSource, Source, TextPlace, TextSource, VendorOptions, VendorSource};
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 10] = [
+const FORMS: [(&str, &str); 11] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
+    ("text", "text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers"),
     ("ros2", "ros2:/TOPIC[@TYPE]"),
     ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
@@ -38,6 +39,8 @@ pub enum SourceSpec {
         /// Its speed, where one is given.
         baud: Option<u32>,
     },
+    /// `text:PORT[@BAUD]`, `text:tcp://HOST:PORT`, `text:udp://:PORT` or `text:-`: lines of text.
+    Text(TextPlace),
     /// `ros2:/TOPIC[@TYPE]`: a topic of ROS 2.
     Ros2 {
         /// Its name, from `/` on.
@@ -98,7 +101,7 @@ fn is_port(text: &str) -> bool {
 }
 
 impl SourceSpec {
-    /// Parses a source of one of `kinds`: `csv`, `serial`, `ros2`, `zenoh`, `mcap`, `ros2-mcap`, `sim`, `-` and `csv:-`.
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `text`, `ros2`, `zenoh`, `mcap`, `ros2-mcap`, `sim`, `-` and `csv:-`.
     ///
     /// # Errors
     /// A usage error that lists the syntax of these kinds.
@@ -111,7 +114,9 @@ impl SourceSpec {
         let bad = |what: String| Err(Error::usage(what));
         let ending = |wanted: &str| Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
         if kinds.contains(&"serial") && is_port(text) {
-            return bad(format!("a serial port is written serial:{text}"));
+            return bad(format!(
+                "a serial port is written text:{text} where its board prints numbers, and serial:{text} where that speaks somatic's protocol"
+            ));
         }
         let (kind, rest) = match text.split_once(':') {
             Some(("csv", "-")) => ("csv:-", text),
@@ -148,6 +153,7 @@ impl SourceSpec {
             },
             "export" => Self::Vendor(rest.into()),
             "sim" => Self::Sim(rest.into()),
+            "text" => Self::Text(rest.parse()?),
             "zenoh" => Self::Zenoh(crate::limb::checked_key(rest)?),
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
@@ -177,7 +183,7 @@ impl SourceSpec {
     /// Whether it is read from standard input.
     #[must_use]
     pub fn is_stdin(&self) -> bool {
-        matches!(self, Self::Stdin | Self::CsvStdin)
+        matches!(self, Self::Stdin | Self::CsvStdin | Self::Text(TextPlace::Stdin))
     }
 
     /// What it is by the content of its file, and by what is said of that: a `.csv` may be an export.
@@ -196,7 +202,9 @@ impl SourceSpec {
         match self {
             Self::Csv(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => Some(path),
             Self::Ros2Mcap(name) => Some(&name.path),
-            Self::Serial { .. } | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => None,
+            Self::Serial { .. } | Self::Text(_) | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => {
+                None
+            }
         }
     }
 
@@ -206,9 +214,16 @@ impl SourceSpec {
     /// A usage error if they do.
     pub fn check_options(&self, options: &VendorOptions) -> Result<()> {
         if !matches!(self, Self::Vendor(_)) {
-            options.check_unused()?;
+            options.check_unused(matches!(self, Self::Text(_)))?;
         }
-        if options.rate_hz.is_some() && !matches!(self, Self::Csv(_) | Self::CsvStdin | Self::Vendor(_)) {
+        if let Some(flag) = options.text.given().filter(|_| !matches!(self, Self::Text(_))) {
+            return Err(Error::usage(format!("{flag} is for lines of text; add --source text:PORT, or leave it out")));
+        }
+        let is_text_stdin = matches!(self, Self::Text(TextPlace::Stdin));
+        if options.rate_hz.is_some()
+            && !is_text_stdin
+            && !matches!(self, Self::Csv(_) | Self::CsvStdin | Self::Vendor(_))
+        {
             return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
         }
         Ok(())
@@ -233,6 +248,7 @@ impl SourceSpec {
                 Err(Error::failed("this build reads no MCAP; build with feature `mcap`").at(path.display()))
             }
             Self::Vendor(path) => Ok(Box::new(VendorSource::open(path, options)?)),
+            Self::Text(place) => Ok(Box::new(TextSource::open(place, options, &mut |_| {})?.for_body(taxels)?)),
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
             Self::Ros2Mcap(name) => {
                 let what = if cfg!(feature = "mcap") {
@@ -327,7 +343,7 @@ mod tests {
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, serial:PORT[@BAUD], ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();
@@ -340,8 +356,11 @@ mod tests {
         assert!(why("serial:a@fast").contains("baud"));
         for port in ["/dev/ttyUSB0", "/dev/ttyACM0@9600", "/dev/serial/by-path/pci-0:1.0-port0", "/dev/cu.usb1", "COM3"]
         {
-            let written = format!("source `{port}`: a serial port is written serial:{port}");
-            assert_eq!(why(port), written);
+            let why = why(port);
+            assert!(
+                why.contains(&format!("text:{port} where")) && why.contains(&format!("serial:{port} where")),
+                "{why}"
+            );
         }
         assert!(why("COM3.pdf").contains("csv:FILE"));
     }

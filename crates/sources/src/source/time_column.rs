@@ -66,7 +66,7 @@ const LONG_STEP: f64 = 5.0;
 
 impl TimeUnit {
     /// The seconds in one; calendar times are in seconds.
-    fn seconds(self) -> f64 {
+    pub(super) fn seconds(self) -> f64 {
         match self {
             Self::Seconds | Self::Calendar => 1.0,
             Self::Milliseconds => 1e3,

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
 
+pub(super) use self::port::explained;
 use self::session::{LineConfig, Session};
 use super::Source;
 use super::boards::{Lines, Merge, Merged, Pace, Shared};

@@ -47,7 +47,7 @@ fn open(session: &Session) -> serialport::Result<Box<dyn SerialPort>> {
 }
 
 /// Why the port `name` could not be opened, and what to do.
-fn explained(name: &str, error: &serialport::Error) -> Error {
+pub(in crate::source) fn explained(name: &str, error: &serialport::Error) -> Error {
     let what = match error.kind {
         serialport::ErrorKind::Io(ErrorKind::NotFound) => format!("there is no such port; {}", ports()),
         serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {

@@ -2,11 +2,13 @@
 //! No I/O, no clock.
 
 mod board_checks;
+mod text_heard;
 mod wipers;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use self::text_heard::TextHeard;
 use super::super::boards::{BoardFrame, BoardState, Shared, Verdict};
 use crate::error::Error;
 use crate::signal::{RawValue, Wiring};
@@ -67,6 +69,7 @@ struct LineState {
     /// Bytes since the line was opened, without echoes.
     bytes: u64,
     version: Option<u8>,
+    text: TextHeard,
     /// The last message about a line without a usable board.
     said: Option<String>,
     /// The identified board, as an index in the wiring.
@@ -96,6 +99,7 @@ impl Session {
             since: Duration::ZERO,
             bytes: 0,
             version: None,
+            text: TextHeard::default(),
             said: None,
             board: None,
             joined: None,
@@ -155,6 +159,9 @@ impl Session {
     pub(super) fn receive(&mut self, bytes: &[u8], now: Duration, read_at: Instant) {
         self.line.bytes += bytes.len() as u64;
         let baud = self.line.baud;
+        if self.line.stage != Stage::Speaking {
+            self.line.text.hear(bytes, baud);
+        }
         self.decoder.push(bytes, |event| self.line.on(&event, now, read_at));
         if self.line.baud != baud {
             self.decoder.rejoin();
@@ -234,6 +241,8 @@ impl LineState {
             Stage::Identifying if over(IDENTIFY_TIMEOUT) => self.probe(0, now),
             Stage::Probing(index) if over(PROBE_TIMEOUT + bits_duration(self.baud)) => self.probe(index + 1, now),
             Stage::NothingFound if over(PROBE_INTERVAL) => self.set_stage(Stage::Identifying, self.config.baud, now),
+            // It is said once.
+            Stage::NothingFound if self.text.is_heard() => self.report_nothing_found(),
             Stage::Speaking => {
                 self.set_wipers(now);
                 self.watch(now);
@@ -257,6 +266,8 @@ impl LineState {
         let baud = self.config.baud;
         if let Some(version) = self.version {
             self.bad(format!("the board speaks version {version} of the protocol; this program speaks version 1"));
+        } else if let Some(what) = self.text.words(&self.config.port) {
+            self.bad(what);
         } else if self.bytes > 0 {
             self.bad(format!(
                 "bytes arrive, but no valid packets at {baud} baud or any usual rate; \

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::super::text::TextOptions;
 use super::format::VendorFormat;
 use crate::error::{Error, Result};
 use crate::length::Length;
@@ -22,6 +23,8 @@ pub struct VendorOptions {
     pub unit: Option<UnitOfP>,
     /// A table of the sensors' places, for pedar: `id,x,y`, with `area` and `link` (`left`, `right`) where they are known.
     pub layout: Option<PathBuf>,
+    /// How lines of text are written, where that is not to be found out.
+    pub text: TextOptions,
 }
 
 impl VendorOptions {
@@ -56,12 +59,12 @@ impl VendorOptions {
         }
     }
 
-    /// Refuses what is only for exports.
-    pub(in crate::source) fn check_unused(&self) -> Result<()> {
+    /// Refuses what is only for exports; of lines of text what these do not have either.
+    pub(in crate::source) fn check_unused(&self, is_text: bool) -> Result<()> {
         let given = [
             ("--format", self.format.is_some()),
-            ("--grid", self.grid.is_some()),
-            ("--pitch", self.pitch_m.is_some()),
+            ("--grid", self.grid.is_some() && !is_text),
+            ("--pitch", self.pitch_m.is_some() && !is_text),
             ("--unit", self.unit.is_some()),
             ("--layout", self.layout.is_some()),
         ];

@@ -1,0 +1,347 @@
+//! Lines of text from boards and programs, live: numbers with anything between them, `name: value`, JSON, tables with a header,
+//! frames of several lines.
+//!
+//! How lines are written is found out from the first second of them ([`recognise`]), and said; options say it instead. Then
+//! lines become frames one by one ([`assembler`]). Lines that are anything else are skipped and counted by kind ([`skipped`]).
+
+mod assembler;
+mod body;
+mod cells;
+mod form;
+mod link;
+mod opening;
+mod options;
+mod place;
+mod recognise;
+mod skipped;
+mod splitter;
+mod stamps;
+
+use std::time::{Duration, Instant};
+
+pub use self::options::{FrameEnd, TextColumns, TextIds, TextOptions, TextTime, TimeColumnName};
+pub use self::place::TextPlace;
+
+use self::assembler::Assembler;
+use self::form::Form;
+use self::link::{Came, Link};
+use self::opening::{Opened, listen};
+use self::recognise::Known;
+use self::splitter::Splitter;
+use self::stamps::Stamps;
+use super::Source;
+use super::vendor::VendorOptions;
+use crate::error::{Error, Result, failed};
+use crate::signal::{Frame, RawValue};
+
+/// Nothing for so long, and for so many times the usual, means that the board is silent.
+const SILENT_AFTER: Duration = Duration::from_secs(1);
+const SILENT_PERIODS: f64 = 5.0;
+
+/// Frames of a board or program that sends lines of text.
+///
+/// Times are those of its column of times, else those of arrival, in seconds since it was opened. A line that is no frame is
+/// skipped and counted; a connection that is gone is opened again. While nothing comes, one frame has all its values
+/// [`RawValue::STALE`].
+pub struct TextSource {
+    name: String,
+    link: Link,
+    splitter: Splitter,
+    assembler: Assembler,
+    form: Form,
+    ids: Vec<u32>,
+    pitch_m: Option<[f64; 2]>,
+    start: Instant,
+    stamps: Stamps,
+    rate_hz: Option<f64>,
+    frames: u64,
+    read_at: Option<Instant>,
+    /// When the last frame came, and its time; before the first there is none.
+    last: Option<(Instant, f64)>,
+    is_stale: bool,
+    has_stale: bool,
+    is_gone: bool,
+    is_ended: bool,
+    told_restarts: u64,
+    notices: Vec<String>,
+}
+
+impl TextSource {
+    /// Opens `place` and listens until its lines are understood, a second from the first numbers on, as `options` say it: `text`,
+    /// `grid`, `pitch_m`, and of standard input `rate_hz`. `tell` is called with what people should know while that takes long.
+    ///
+    /// # Errors
+    /// It cannot be opened; what comes is no text, or not what the options say.
+    pub fn open(place: &TextPlace, options: &VendorOptions, tell: &mut dyn FnMut(&str)) -> Result<Self> {
+        if options.rate_hz.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
+            return Err(Error::usage("--rate is not a frame rate; give a positive number of Hz"));
+        }
+        if options.rate_hz.is_some() && *place != TextPlace::Stdin {
+            return Err(Error::usage("--rate is for recordings; lines that come live are stamped when they arrive"));
+        }
+        Self::listen(place, Link::open(place)?, options, tell)
+    }
+
+    /// Reads `bytes` as lines of text that come all at once.
+    ///
+    /// # Errors
+    /// They are no text, or not what the options say.
+    pub fn from_bytes(bytes: impl Into<Vec<u8>>, options: &VendorOptions) -> Result<Self> {
+        Self::listen(&TextPlace::Stdin, Link::given(bytes.into()), options, &mut |_| {})
+    }
+
+    fn listen(place: &TextPlace, mut link: Link, options: &VendorOptions, tell: &mut dyn FnMut(&str)) -> Result<Self> {
+        let start = Instant::now();
+        let grid = options.grid.map(|[rows, columns]| [rows as usize, columns as usize]);
+        let is_joined = link.joins_midway();
+        let known = Known { options: &options.text, grid, is_joined, has_rate: options.rate_hz.is_some() };
+        let Opened { form, kept, is_ended } = listen(&mut link, place, start, known, tell).map_err(|e| e.at(place))?;
+        let ids = form.ids.clone().unwrap_or_else(|| (0..form.sensors() as u32).collect());
+        let mut source = Self {
+            name: place.to_string(),
+            link,
+            splitter: Splitter::default(),
+            assembler: Assembler::new(form.clone(), is_joined),
+            ids,
+            pitch_m: options.pitch_m,
+            start,
+            stamps: Stamps::default(),
+            rate_hz: options.rate_hz,
+            frames: 0,
+            read_at: None,
+            last: None,
+            is_stale: false,
+            has_stale: false,
+            is_gone: false,
+            is_ended,
+            told_restarts: 0,
+            notices: Vec::new(),
+            form,
+        };
+        source.notices.push(source.understood());
+        for (at, bytes) in kept {
+            source.take(&bytes, at.as_secs_f64());
+        }
+        if is_ended {
+            source.end();
+        }
+        Ok(source)
+    }
+
+    /// What its lines were taken for, on a line.
+    #[must_use]
+    pub fn understood(&self) -> String {
+        let speed = self.link.baud().filter(|_| !self.name.contains('@')).map(|baud| format!(" (at {baud} baud)"));
+        let advice = self.form.advice().map_or_else(String::new, |advice| format!("; {advice}"));
+        format!("{}{}{advice}", self.form.words(self.rate_hz.is_some()), speed.unwrap_or_default())
+    }
+
+    /// Rows and columns of its sensors; one row where it is not known that they are a grid.
+    fn size(&self) -> [usize; 2] {
+        self.form.grid.unwrap_or([1, self.form.sensors()])
+    }
+
+    /// A body for it, a `.glb`: a grid, or a row of sensors, as far apart as the options say, else 10 mm.
+    ///
+    /// # Errors
+    /// Two of its sensors have the same id, or it has too many.
+    pub fn body(&self) -> Result<Vec<u8>> {
+        body::glb(&self.ids, self.size(), self.pitch_m.unwrap_or([body::USUAL_PITCH_M; 2]))
+            .map_err(|e| e.at(&self.name))
+    }
+
+    /// What is to be said of [`TextSource::body`], whose places nobody has measured.
+    #[must_use]
+    pub fn about_body(&self) -> String {
+        let [rows, columns] = self.size();
+        let what = match rows {
+            1 => format!("a row of {columns}, as nobody says where they are"),
+            _ => format!("a grid of {rows} × {columns}"),
+        };
+        let pitch = match self.pitch_m {
+            None => "10 mm apart, which is made up (--pitch says how far, --body where)".to_owned(),
+            Some([rows, columns]) if rows == columns => format!("{} mm apart", rows * 1e3),
+            Some([rows, columns]) => format!("{} mm and {} mm apart", rows * 1e3, columns * 1e3),
+        };
+        format!("the body is made for it: sensors in {what}, {pitch}")
+    }
+
+    /// Makes its taxels those of a body that has `taxels`: where neither names nor flags say which they are, they are the body's in
+    /// ascending order of their ids.
+    ///
+    /// # Errors
+    /// It has another number of sensors than the body has taxels, or the body lacks a taxel.
+    pub fn for_body(mut self, taxels: &[u32]) -> Result<Self> {
+        if self.form.ids.is_none() {
+            let mut ids = taxels.to_vec();
+            ids.sort_unstable();
+            if ids.len() != self.ids.len() {
+                let what = format!(
+                    "a frame has {} sensors, and the body {} taxels; --ids says which these are, --columns which columns are sensors",
+                    self.ids.len(),
+                    ids.len()
+                );
+                return Err(Error::failed(what).at(&self.name));
+            }
+            self.ids = ids;
+        }
+        match self.ids.iter().find(|id| !taxels.contains(id)) {
+            Some(id) => {
+                let what = failed!(
+                    "the body has no taxel {id}; is it the right body? --ids says which taxels the sensors are"
+                );
+                Err(what.at(&self.name))
+            }
+            None => Ok(self),
+        }
+    }
+
+    /// Takes `bytes`, which came at `now_s`.
+    fn take(&mut self, bytes: &[u8], now_s: f64) {
+        let before = self.assembler.ready.len();
+        take(&self.link, bytes, &mut self.splitter, &mut self.assembler);
+        self.stamp(before, now_s);
+    }
+
+    /// Stamps the frames from the one at `before` on, which came at `now_s`.
+    fn stamp(&mut self, before: usize, now_s: f64) {
+        let ready = &mut self.assembler.ready;
+        let count = ready.len() - before;
+        if let Some(rate_hz) = self.rate_hz {
+            for (frame, _) in ready.iter_mut().skip(before) {
+                frame.t_s = self.frames as f64 / rate_hz;
+                self.frames += 1;
+            }
+            return;
+        }
+        self.stamps.stamp(count, now_s, |index, t_s| {
+            let (frame, has_time) = &mut ready[before + index];
+            if !*has_time {
+                frame.t_s = t_s;
+            }
+        });
+    }
+
+    fn end(&mut self) {
+        self.is_ended = true;
+        let before = self.assembler.ready.len();
+        let assembler = &mut self.assembler;
+        self.splitter.flush(&mut |line| assembler.take(line));
+        self.assembler.end();
+        self.stamp(before, self.start.elapsed().as_secs_f64());
+    }
+
+    /// Makes `frame` one in which nothing is known, if none was since the last values.
+    fn stale(&mut self, frame: &mut Frame) -> bool {
+        let Some((at, t_s)) = self.last else { return false };
+        if std::mem::replace(&mut self.is_stale, true) {
+            return false;
+        }
+        frame.clear();
+        frame.values.clear();
+        frame.values.resize(self.ids.len(), RawValue::STALE);
+        frame.t_s = t_s + at.elapsed().as_secs_f64();
+        (self.has_stale, self.read_at) = (true, None);
+        true
+    }
+
+    fn is_silent(&self) -> bool {
+        let usual_s = self.stamps.period_s().unwrap_or(0.0) * SILENT_PERIODS;
+        let limit = SILENT_AFTER.max(Duration::try_from_secs_f64(usual_s).unwrap_or(SILENT_AFTER));
+        !self.is_stale && self.last.is_some_and(|(at, _)| at.elapsed() > limit)
+    }
+
+    fn say(&mut self, what: &str) {
+        self.notices.push(what.to_owned());
+    }
+
+    /// The next frame that is whole, if one is.
+    fn ready(&mut self, frame: &mut Frame) -> bool {
+        let Some((next, _)) = self.assembler.ready.pop_front() else { return false };
+        self.assembler.give_back(std::mem::replace(frame, next));
+        self.last = Some((Instant::now(), frame.t_s));
+        if std::mem::take(&mut self.is_stale) && !self.is_gone {
+            self.say("lines come again");
+        }
+        true
+    }
+}
+
+/// Gives the lines of `bytes`, which came by `link`, to `assembler`.
+fn take(link: &Link, bytes: &[u8], splitter: &mut Splitter, assembler: &mut Assembler) {
+    splitter.push(bytes, &mut |line| assembler.take(line));
+    if link.is_in_datagrams() {
+        splitter.flush(&mut |line| assembler.take(line));
+    }
+}
+
+impl Source for TextSource {
+    fn taxels(&self) -> &[u32] {
+        &self.ids
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        loop {
+            if self.ready(frame) {
+                return Ok(true);
+            }
+            if self.is_ended {
+                return Ok(false);
+            }
+            self.read_at = None;
+            match self.link.read() {
+                Came::Bytes(count) => {
+                    let read_at = Instant::now();
+                    self.read_at = Some(read_at);
+                    let (before, assembler) = (self.assembler.ready.len(), &mut self.assembler);
+                    take(&self.link, self.link.bytes(count), &mut self.splitter, assembler);
+                    self.stamp(before, (read_at - self.start).as_secs_f64());
+                }
+                Came::Nothing if self.is_silent() => {
+                    self.say("no lines come");
+                    if self.stale(frame) {
+                        return Ok(true);
+                    }
+                }
+                Came::Nothing => {}
+                Came::Gone => {
+                    self.is_gone = true;
+                    self.say("gone; waiting for it to come back");
+                    if self.splitter.clear() {
+                        self.assembler.skipped.add(skipped::Wrong::Torn, "");
+                    }
+                    self.assembler.join();
+                    if self.stale(frame) {
+                        return Ok(true);
+                    }
+                }
+                Came::Back => {
+                    self.is_gone = false;
+                    self.say("is back");
+                }
+                Came::End => self.end(),
+            }
+        }
+    }
+
+    fn has_stale(&self) -> bool {
+        self.has_stale
+    }
+
+    fn read_at(&mut self) -> Option<Instant> {
+        self.read_at
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        let restarts = self.assembler.restarts;
+        if restarts > std::mem::replace(&mut self.told_restarts, restarts) && restarts.is_power_of_two() {
+            self.say("its time went back; has the board started again?");
+        }
+        let new = self.assembler.skipped.take_notices();
+        self.notices.drain(..).chain(new).map(|what| format!("{}: {what}", self.name)).collect()
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.assembler.skipped.losses().into_iter().map(|what| format!("{}: {what}", self.name)).collect()
+    }
+}
