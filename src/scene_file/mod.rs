@@ -278,8 +278,8 @@ impl SceneFile {
     /// It cannot be read; a usage error with line and column if it is no scene.
     pub fn load(path: &Path) -> Result<Self> {
         let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
-        let asked = Self::parse(&text).map_err(|e| e.at(path.display()))?;
-        Ok(asked.within(path.parent().unwrap_or(Path::new(""))))
+        let scene = Self::parse(&text).map_err(|e| e.at(path.display()))?;
+        Ok(scene.within(path.parent().unwrap_or(Path::new(""))))
     }
 
     /// What the scene file `text` asks for, its paths as they are written.
@@ -287,8 +287,8 @@ impl SceneFile {
     /// # Errors
     /// A usage error with line and column if it is no scene.
     pub fn parse(text: &str) -> Result<Self> {
-        let asked: Self = parse_toml(text).map_err(Error::into_usage)?;
-        asked.check_accuracy().map_err(|(key, e)| Accuracy::placed(text, key, e))?;
-        Ok(asked)
+        let scene: Self = parse_toml(text).map_err(Error::into_usage)?;
+        scene.check_accuracy().map_err(|(key, e)| Accuracy::placed(text, key, e))?;
+        Ok(scene)
     }
 }

@@ -3,7 +3,7 @@
 use clap::{Args as _, Command};
 use somatic::Error;
 
-use super::RunFlags;
+use super::run_flags::RunFlags;
 
 /// `error` with flags in the place of keys, if it is of what was asked for: `--max-gap 0` for `` `max_gap_s = 0` ``.
 pub(in crate::cli) fn in_flags(error: Error) -> Error {

@@ -80,6 +80,7 @@ impl fmt::Display for SourceSpec {
             Self::Csv(path) => write!(f, "csv:{}", path.display()),
             Self::Serial { port, baud: None } => write!(f, "serial:{port}"),
             Self::Serial { port, baud: Some(baud) } => write!(f, "serial:{port}@{baud}"),
+            Self::Text(place) => place.fmt(f),
             Self::Ros2 { topic, kind: None } => write!(f, "ros2:{topic}"),
             Self::Ros2 { topic, kind: Some(kind) } => write!(f, "ros2:{topic}@{kind}"),
             Self::Zenoh(key) => write!(f, "zenoh:{key}"),

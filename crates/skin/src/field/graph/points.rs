@@ -1,8 +1,8 @@
 //! Edges by places alone, between taxels of one link that no surface connects.
 //!
 //! Two taxels have an edge if no other is strictly inside the ball that has the line between them as its diameter (Gabriel and
-//! Sokal 1969), if they are at most 2 √(the larger cell) apart, and if their normals are within 120°. Those of two faces at a box's
-//! edge are, and at the sharper edges of covers; those of the two sides of a plate are not.
+//! Sokal 1969), if they are at most 2 √(the larger cell) apart, and if their normals are within 90°: those of two faces at a box's
+//! edge are.
 
 use glam::DVec3;
 
@@ -14,8 +14,8 @@ const INSIDE_SHARE: f64 = 1e-5;
 /// Limit of an edge's length over the root of the larger cell.
 pub(super) const LENGTH_PER_ROOT: f64 = 2.0;
 
-/// cos 120°. Within 90° half of the presses over an edge of Go2's covers were two touches.
-const MIN_NORMAL_COSINE: f64 = -0.5;
+/// cos 90°, with a tolerance for normals that a file has in single precision.
+const MIN_NORMAL_COSINE: f64 = -1e-6;
 
 /// A taxel of a link.
 pub(super) struct LinkPoint {
