@@ -74,9 +74,13 @@ pub(super) fn count(cells: &[Cell<'_>]) -> usize {
     cells.len() - usize::from(cells.len() > 1 && cells.last() == Some(&Cell::Blank))
 }
 
-/// The pairs of a line such as `A0: 512, A1: 300` or `left=3 right=4`; `false` if it is anything else.
+/// The pairs of a line such as `A0: 512, A1: 300` or `left=3 right=4`; `false` if it is anything else, as a message that ends in a colon.
 pub(super) fn pairs<'a>(line: &'a str, each: &mut dyn FnMut(&'a str, Cell<'a>)) -> bool {
-    let mut some = false;
+    let mut has_number = false;
+    let each = &mut |name, cell| {
+        has_number |= matches!(cell, Cell::Number(_));
+        each(name, cell);
+    };
     for piece in line.split([',', ';', '\t', '|']).map(str::trim).filter(|piece| !piece.is_empty()) {
         let signs = piece.matches([':', '=']).count();
         let is_good = match signs {
@@ -95,9 +99,8 @@ pub(super) fn pairs<'a>(line: &'a str, each: &mut dyn FnMut(&'a str, Cell<'a>)) 
         if !is_good {
             return false;
         }
-        some = true;
     }
-    some
+    has_number
 }
 
 /// Pairs with nothing but spaces between them.

@@ -52,7 +52,11 @@ impl Column {
         let ends = text.split_once(['-', '–']).and_then(|(low, high)| Some((number(low)?, number(high)?)));
         match ends {
             Some((low, high)) => (low <= high).then_some(Self::Numbers(low, high)),
-            None => (!text.is_empty() && text.parse::<f64>().is_err()).then(|| Self::Name(text.to_owned())),
+            None => {
+                // Digits and dashes alone are a range that is wrong, not a name.
+                let is_name = text.chars().any(|c| !(c.is_ascii_digit() || matches!(c, '-' | '–' | ' ')));
+                (is_name && text.parse::<f64>().is_err()).then(|| Self::Name(text.to_owned()))
+            }
         }
     }
 

@@ -74,7 +74,7 @@ mod tests {
         assert_eq!(made(0.5, 0.02, 20), Rising::Time(TimeUnit::Seconds, false));
         assert_eq!(made(7e6, 20_000.0, 20), Rising::Time(TimeUnit::Microseconds, false));
         assert_eq!(made(1.0, 1.0, 20), Rising::Count);
-        assert_eq!(made(1.0, 16.0, 20), Rising::Unknown);
+        assert_eq!(made(1.0, 12.0, 20), Rising::Unknown);
         assert_eq!(made(40.0, 20.0, 0), Rising::Time(TimeUnit::Milliseconds, true));
         assert_eq!(made(0.0, 0.02, 0), Rising::Time(TimeUnit::Seconds, true));
         assert_eq!(made(1_768_494_979_568.0, 20.0, 0), Rising::Time(TimeUnit::Milliseconds, false));
