@@ -88,7 +88,7 @@ mod tests {
     fn lines(pieces: &[&[u8]]) -> Vec<String> {
         let (mut splitter, mut lines) = (Splitter::default(), Vec::new());
         let mut each = |line: Line<'_>| {
-            lines.push(if let Line::Text(text) = line { text.to_owned() } else { format!("{line:?}") })
+            lines.push(if let Line::Text(text) = line { text.to_owned() } else { format!("{line:?}") });
         };
         pieces.iter().for_each(|piece| splitter.push(piece, &mut each));
         splitter.flush(&mut each);
