@@ -9,9 +9,7 @@ use super::gpu;
 use super::{Backend, BackendKind, BackendState, RawBatch, Rows, Step, cpu, reference};
 #[cfg(not(feature = "gpu"))]
 use crate::error::Error;
-#[cfg(feature = "gpu")]
-use crate::error::ErrorKind;
-use crate::error::Result;
+use crate::error::{ErrorKind, Result};
 use crate::percept::{Flags, Percepts, Precision};
 use crate::scene::Plan;
 use crate::signal::RawValue;
