@@ -3,9 +3,34 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::{Findings, Found, median};
+use somatic::error::{Error, Result};
+use somatic::signal::UnitOfP;
+
+use super::known::{KnownForce, PressedOn};
+use super::{Findings, Found, median, rounded};
 
 impl Findings {
+    /// Gives the sensors gains with which the presses of the survey were `force` on what it pressed on. A sensor that was not
+    /// pressed has the middle one of the others' gains.
+    ///
+    /// # Errors
+    /// No sensor was pressed.
+    pub fn know(&mut self, KnownForce(newtons): KnownForce, on: PressedOn) -> Result<()> {
+        let mut travels: Vec<f64> = self.sensors.iter().filter_map(|found| found.travel).collect();
+        let Some(usual) = median(&mut travels) else {
+            return Err(Error::failed("no sensor was pressed, so that nothing is known of the force"));
+        };
+        let whole: f64 = travels.iter().sum();
+        for found in &mut self.sensors {
+            found.gain = rounded(match on {
+                PressedOn::Taxel => newtons / found.travel.unwrap_or(usual),
+                PressedOn::Field => newtons / whole,
+            });
+        }
+        self.unit = "N".parse::<UnitOfP>()?;
+        Ok(())
+    }
+
     /// The calibration, as `docs/calibration.md` describes it, for the body called `body`. What most sensors share stands
     /// under `[all]`, the rest under each taxel.
     #[must_use]

@@ -5,8 +5,6 @@ use std::str::FromStr;
 use somatic::error::{Error, Result};
 use somatic::signal::{Quantity, UnitOfP};
 
-use super::Findings;
-
 /// A force in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownForce(pub f64);
@@ -50,29 +48,6 @@ impl FromStr for PressedOn {
             "field" => Ok(Self::Field),
             _ => Err(Error::usage(format!("there is no `{text}`; taxel or field"))),
         }
-    }
-}
-
-impl Findings {
-    /// Gives the sensors gains with which the presses of the survey were `force` on what it pressed on. A sensor that was not
-    /// pressed has the middle one of the others' gains.
-    ///
-    /// # Errors
-    /// No sensor was pressed.
-    pub fn know(&mut self, KnownForce(newtons): KnownForce, on: PressedOn) -> Result<()> {
-        let mut travels: Vec<f64> = self.sensors.iter().filter_map(|found| found.travel).collect();
-        let Some(usual) = super::median(&mut travels) else {
-            return Err(Error::failed("no sensor was pressed, so that nothing is known of the force"));
-        };
-        let whole: f64 = travels.iter().sum();
-        for found in &mut self.sensors {
-            found.gain = super::rounded(match on {
-                PressedOn::Taxel => newtons / found.travel.unwrap_or(usual),
-                PressedOn::Field => newtons / whole,
-            });
-        }
-        self.unit = UnitOfP::from_str("N")?;
-        Ok(())
     }
 }
 

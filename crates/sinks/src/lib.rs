@@ -6,7 +6,6 @@
 #![warn(unreachable_pub)]
 
 // Its macros `setters!` and `words!`.
-#[cfg(feature = "mcap")]
 #[macro_use]
 extern crate somatic_skin;
 
