@@ -45,6 +45,11 @@ use crate::source::{SourceSpec, VendorFormat};
 #[serde(default, deny_unknown_fields)]
 #[cfg_attr(feature = "cli", derive(JsonSchema))]
 #[cfg_attr(feature = "cli", schemars(title = "somatic scene", description = "What `somatic run SCENE` is asked to do"))]
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    rustdoc::invalid_html_tags,
+    reason = "the documentation of keys is the schema's too, and shows what is left out in brackets"
+)]
 #[non_exhaustive]
 pub struct SceneFile {
     /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
