@@ -129,7 +129,7 @@ impl PlanField {
 }
 
 impl Plan {
-    /// What places in the world are said to be in: `world`, or the link of [`Scene::relative_to`].
+    /// What places in the world are said to be in: `world`, or the link of [`Scene::relative_to`](super::Scene::relative_to).
     #[must_use]
     pub fn world(&self) -> &str {
         self.relative_to().unwrap_or(WORLD)
