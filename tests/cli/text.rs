@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, UdpSocket};
 use std::path::Path;
-use std::process::{Child, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -123,7 +123,7 @@ fn a_board_that_prints_numbers_is_read_with_one_line() {
     assert_eq!(output.status.code(), Some(3), "{said}");
     assert!(said.contains("columns 1–3 are a row of 3 sensors, time is that of arrival"), "{said}");
     assert!(said.contains("1 line skipped, too few values: `512,30`"), "{said}");
-    assert!(said.contains("the body is made for it: sensors in a row of 3"), "{said}");
+    assert!(said.contains("a body is made: a row of 3 sensors, 10 mm apart"), "{said}");
     let totals = totals(&output);
     assert!(totals.len() > 100, "{} frames: {said}", totals.len());
     assert!(totals.windows(2).all(|pair| pair[1].0 > pair[0].0), "time goes on");
@@ -310,6 +310,13 @@ fn connections_and_datagrams_are_read_and_a_connection_is_made_again() {
     assert!(said.contains("nobody answers there"), "{said}");
 }
 
+/// A run that prints the totals of what `source` sends, with `more` flags.
+fn totals_of(source: &str, more: &[&str]) -> Command {
+    let mut run = somatic(&["run", "--backend", "cpu", "--source", source, "--sink", "-", "--outputs", "total"]);
+    run.args(more).stdout(Stdio::piped());
+    run
+}
+
 #[test]
 fn a_board_that_is_unplugged_is_waited_for_and_goes_on() {
     let folder = tempfile::tempdir().unwrap();
@@ -318,24 +325,7 @@ fn a_board_that_is_unplugged_is_waited_for_and_goes_on() {
     let first = Board::start(Duration::from_millis(10), line);
     std::os::unix::fs::symlink(&first.name, &link).unwrap();
     let source = format!("text:{}", text_of(&link));
-    let mut child = somatic(&[
-        "run",
-        "--backend",
-        "cpu",
-        "--source",
-        &source,
-        "--sink",
-        "-",
-        "--outputs",
-        "total",
-        "--for",
-        "5s",
-        "--all-fields",
-    ])
-    .stdout(Stdio::piped())
-    .stderr(Stdio::piped())
-    .spawn()
-    .unwrap();
+    let mut child = totals_of(&source, &["--for", "5s", "--all-fields"]).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     for _ in 0..150 {
         lines.next().unwrap().unwrap();
@@ -375,22 +365,7 @@ fn latency_at_a_thousand_frames_a_second() {
     let seconds: u64 = std::env::var("SOMATIC_SOAK_SECONDS").map_or(10, |text| text.parse().unwrap());
     let (mut device, name) = pty();
     let source = format!("text:{name}");
-    let mut child = somatic(&[
-        "run",
-        "--backend",
-        "cpu",
-        "--source",
-        &source,
-        "--columns",
-        "2-65",
-        "--sink",
-        "-",
-        "--outputs",
-        "total",
-    ])
-    .stdout(Stdio::piped())
-    .spawn()
-    .unwrap();
+    let mut child = totals_of(&source, &["--columns", "2-65"]).spawn().unwrap();
     let out = BufReader::new(child.stdout.take().unwrap());
     let heard = thread::spawn(move || {
         out.lines().map_while(Result::ok).map(|line| (Instant::now(), line)).collect::<Vec<(Instant, String)>>()

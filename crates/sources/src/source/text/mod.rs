@@ -155,15 +155,17 @@ impl TextSource {
     pub fn about_body(&self) -> String {
         let [rows, columns] = self.size();
         let what = match rows {
-            1 => format!("a row of {columns}, as nobody says where they are"),
-            _ => format!("a grid of {rows} × {columns}"),
+            1 => format!("a row of {columns} sensors"),
+            _ => format!("a grid of {rows} × {columns} sensors"),
         };
         let pitch = match self.pitch_m {
-            None => "10 mm apart, which is made up (--pitch says how far, --body where)".to_owned(),
+            None => {
+                "10 mm apart. This distance is a guess: --pitch sets it, and --body names a body of yours".to_owned()
+            }
             Some([rows, columns]) if rows == columns => format!("{} mm apart", rows * 1e3),
             Some([rows, columns]) => format!("{} mm and {} mm apart", rows * 1e3, columns * 1e3),
         };
-        format!("the body is made for it: sensors in {what}, {pitch}")
+        format!("a body is made: {what}, {pitch}")
     }
 
     /// Makes its taxels those of a body that has `taxels`: where neither names nor flags say which they are, they are the body's in
