@@ -68,6 +68,7 @@ pub mod picture;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod plot;
+pub mod run;
 mod scene_file;
 #[cfg(feature = "cli")]
 pub mod tradeoff;

@@ -2,11 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use somatic::output::OutputPaths;
-use somatic::sink::{Flow, SinkSpec};
+use somatic::run::{Feed, FrameInfo, Observer, ReadMode, Remark, Run as Running, RunOptions};
+use somatic::sink::SinkSpec;
 use somatic::source::{Cut, SourceSpec, VendorOptions};
 use somatic::{BackendKind, Engine, Error, Frame};
 
@@ -64,7 +67,7 @@ pub(crate) fn run<'py>(
     let (given, calibration) = (body.as_ref().map(Bound::get), calibration.as_ref().map(Bound::get));
     let mut raised = None;
     let done = free(py, || {
-        let (mut source, own, text) = open(&spec, given, &options, Cut::WHOLE)?;
+        let (source, own, text) = open(&spec, given, &options, Cut::WHOLE)?;
         let body = given.or(own.as_ref());
         let Some(body) = body else {
             return Err(Error::usage("it has no body; give body=").at(file.display()));
@@ -90,32 +93,18 @@ pub(crate) fn run<'py>(
         let mut session = about.session(&label, all_fields, true);
         session.is_recorded = true;
         let target = sink.target(&mut OutputPaths::new(force, [&file]), &[], about.tables(false))?;
-        let mut sink = target.open(&session)?;
-        let mut frames = vec![Frame::missing(0.0, source.taxels().len()); BATCH];
-        let mut count = 0;
-        loop {
-            let mut filled = 0;
-            while filled < BATCH && source.next_frame(&mut frames[filled])? {
-                filled += 1;
-            }
-            let (Flow::Open | Flow::Closed) = sink.write(engine.process(&frames[..filled])?)?;
-            count += filled;
-            let notice = engine.notice();
-            let heard = Python::attach(|py| {
-                py.check_signals()?;
-                warn(py, notice)?;
-                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (count,)).map(drop))
-            });
-            if let Err(error) = heard {
-                raised = Some(error);
-                return Ok(None);
-            }
-            if filled < BATCH {
-                break;
-            }
+        let sink = target.open(&session)?;
+        let feed = Feed::start(source, ReadMode { most: BATCH, gather: true, speed: None });
+        let mut run = Running::new(engine, feed, vec![sink], RunOptions::default());
+        let stop = AtomicBool::new(false);
+        let mut caller = Caller { progress, frames: 0, stop: &stop, raised: None };
+        let ending = run.run(&mut caller, || stop.load(Ordering::Relaxed))?;
+        raised = caller.raised;
+        if raised.is_some() {
+            return Ok(None);
         }
-        sink.finish()?;
-        Ok(Some((count, source.losses())))
+        let outcome = run.finish(ending)?;
+        Ok(Some((outcome.frames, outcome.losses)))
     });
     match done.or_raise_of(py, &file)? {
         None => Err(interrupted(raised)),
@@ -125,6 +114,51 @@ pub(crate) fn run<'py>(
             told.set_item("losses", losses)?;
             Ok(told)
         }
+    }
+}
+
+/// Who has called `run`, and is told how it goes.
+struct Caller<'a> {
+    progress: Option<Py<PyAny>>,
+    frames: usize,
+    /// Ends the run.
+    stop: &'a AtomicBool,
+    /// What the caller has raised meanwhile.
+    raised: Option<PyErr>,
+}
+
+impl Caller<'_> {
+    fn heed(&mut self, told: PyResult<()>) {
+        if let Err(error) = told {
+            self.stop.store(true, Ordering::Relaxed);
+            self.raised.get_or_insert(error);
+        }
+    }
+}
+
+impl Observer for Caller<'_> {
+    fn remark(&mut self, kind: Remark, text: &str) {
+        if kind == Remark::Warning {
+            let told = Python::attach(|py| warn(py, Some(text.to_owned())));
+            self.heed(told);
+        }
+    }
+
+    fn computed(&mut self, _: &Engine, frames: &[Frame], _: &FrameInfo) {
+        self.frames += frames.len();
+    }
+
+    fn written(&mut self, _: &[Instant]) {
+        let told = Python::attach(|py| {
+            let frames = self.frames;
+            self.progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (frames,)).map(drop))
+        });
+        self.heed(told);
+    }
+
+    fn turned(&mut self) {
+        let told = Python::attach(|py| py.check_signals());
+        self.heed(told);
     }
 }
 

@@ -16,9 +16,8 @@ use somatic::tradeoff::length;
 use somatic::{Body, Calibration, Error, Result};
 
 use super::bodies::{in_body, load_body};
-use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
-use super::interrupt::{left_out, stop_on_signal};
+use super::interrupt::stop_on_signal;
 use super::plot_file::PlotFile;
 use super::ports::LineFlags;
 use super::scene::one_of;
@@ -26,6 +25,7 @@ use super::stdio::{print, say, tell_losses};
 use super::table::{more, plain, shown};
 use super::text_flags::TextFlags;
 use super::words::{bullet, count};
+use somatic::run::{Arrival, Feed, ReadMode, left_out};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -17,10 +17,11 @@ use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::files::FilesRead;
 use super::first_source::source_of;
-use super::interrupt::{left_out, stop_soon_on_signal};
+use super::interrupt::stop_soon_on_signal;
 use super::overlaid::{How, overlaid};
 use super::stdio::{say, tell_losses};
 use super::words::count;
+use somatic::run::left_out;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -14,7 +14,6 @@ use somatic::{Error, Result};
 #[cfg(unix)]
 use super::keys;
 use super::stdio::{FAILED, say};
-use super::words::count;
 
 /// Exit code after the second signal: that of shells for a command that Ctrl-C has ended.
 const KILLED: u8 = 130;
@@ -54,23 +53,6 @@ pub(super) fn stop_on_signal() -> Result<Arc<AtomicBool>> {
 pub(super) fn stop_soon_on_signal() -> Result<Arc<AtomicBool>> {
     HEED.fetch_max(HASTE, Ordering::SeqCst);
     Ok(Arc::clone(&STOP))
-}
-
-/// What is said of a recording that was left before its end: after so many frames, the last one at `t_s`; and of files that are not
-/// there for this reason.
-pub(super) fn left_out(recording: &str, frames: u64, t_s: f64, progress: Option<f64>, absent: &[String]) -> String {
-    let mut text = match frames {
-        0 => format!("{recording}: interrupted before its first frame"),
-        frames => format!("{recording} after t = {t_s} s: interrupted after {}", count(frames, "frame")),
-    };
-    if let Some(progress) = progress.filter(|_| frames > 0) {
-        text += &format!(", {:.0} % of it", 100.0 * progress);
-    }
-    let are = if absent.len() == 1 { "is" } else { "are" };
-    if !absent.is_empty() {
-        text += &format!("; {} {are} not written", absent.join(", "));
-    }
-    text
 }
 
 fn on_signal() {

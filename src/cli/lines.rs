@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 use console::style;
 use serde_json::{Value, json};
 use somatic::output::OutputPath;
+use somatic::run::Repeats;
 use somatic::signal::BoardHealth;
 use somatic::sink::News;
 use somatic::source::{BoardAccount, BoardState, Lines};
 use somatic::{Error, Result};
 
 use super::latency::Latency;
-use super::repeats::Repeats;
 use super::stdio::say;
 use super::words::count;
 

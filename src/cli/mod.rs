@@ -20,7 +20,6 @@ mod expected;
 #[cfg(feature = "page")]
 mod explanation;
 mod exports;
-mod feed;
 mod files;
 mod first_source;
 mod help;
@@ -43,7 +42,6 @@ mod plot_file;
 mod ports;
 #[cfg(feature = "gpu")]
 mod render;
-mod repeats;
 mod run;
 mod scene;
 mod screen;
@@ -53,7 +51,6 @@ mod table;
 mod text_flags;
 mod tradeoff;
 mod tune;
-mod unfit;
 mod verify;
 #[cfg(feature = "page")]
 mod view;

@@ -14,10 +14,11 @@ use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::files::FilesRead;
 use super::input::{Input, RECORDED_BATCH};
-use super::interrupt::{left_out, stop_soon_on_signal};
+use super::interrupt::stop_soon_on_signal;
 use super::plot_file::PlotFile;
 use super::scene::{Asked, output};
 use super::stdio::{DONE, say, tell_losses};
+use somatic::run::left_out;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -195,11 +195,8 @@ impl Survey {
                 "no sensor delivered anything at rest; is the source connected and the rest long enough?",
             ));
         }
-        let step = if self.whole_numbers { 1.0 } else { 0.0 };
-        let dead_band = |noise: f64| {
-            let band = DEAD_BAND_MARGIN * noise;
-            if self.whole_numbers { band.ceil() } else { rounded(band) }
-        };
+        let step = self.step();
+        let dead_band = |noise: f64| self.dead_band(noise);
         // The two travels of each sensor: downwards and upwards.
         let travels: Vec<[f64; 2]> =
             at_rest.iter().zip(&self.pressed).map(|(rest, pressed)| travels(rest, pressed)).collect();
@@ -215,26 +212,9 @@ impl Survey {
         // Where nothing was pressed, what was seen of the range is no measure.
         let is_range_known = raw_range.is_some() || falling + rising > 0;
         let range = raw_range.map_or_else(|| self.seen_range(), |[low, high]| high - low);
-        let moved: Vec<bool> = (0..self.ids.len())
-            .map(|sensor| {
-                let Some((baseline, noise)) = at_rest[sensor] else { return false };
-                let movement = movement_of(&self.rest[sensor], baseline);
-                let by_chance = MAX_NOISE_SIGMAS * chance_of(&self.rest[sensor], step);
-                (dead_band(movement) > WIDE_NOISE_SHARE * range && movement > by_chance)
-                    || (is_range_known && dead_band(noise) > WIDE_SHARE * range)
-            })
-            .collect();
+        let moved = self.moved(&at_rest, range, is_range_known);
         if moved.contains(&true) && !wishes.mask_moved {
-            let widest = (0..self.ids.len()).filter(|&sensor| moved[sensor]).filter_map(|sensor| at_rest[sensor]);
-            let widest = widest.map(|(_, noise)| dead_band(noise)).fold(0.0, f64::max);
-            let ids: Vec<u32> = self.ids.iter().zip(&moved).filter(|(_, moved)| **moved).map(|(id, _)| *id).collect();
-            return Err(Error::failed(format!(
-                "{} of {} sensors moved during the rest: {}; their dead bands would be up to {widest} of a raw range of \
-                 {range}. Keep everything off the robot until the rest is over; --mask-moved leaves broken sensors out",
-                ids.len(),
-                self.ids.len(),
-                several(&ids)
-            )));
+            return Err(self.not_at_rest(&at_rest, &moved, range));
         }
         let invert = self.falls(&at_rest, &travels, &moved, goes)?;
         let side = usize::from(!invert);
@@ -278,6 +258,44 @@ impl Survey {
             }
         });
         Ok(Findings { sensors: sensors.collect(), invert, raw_range, missing: Vec::new(), unit: UnitOfP::COUNT })
+    }
+
+    /// The step between raw values: 1 for whole numbers.
+    fn step(&self) -> f64 {
+        if self.whole_numbers { 1.0 } else { 0.0 }
+    }
+
+    /// The dead band for sensors that stray by `noise` at rest.
+    fn dead_band(&self, noise: f64) -> f64 {
+        let band = DEAD_BAND_MARGIN * noise;
+        if self.whole_numbers { band.ceil() } else { rounded(band) }
+    }
+
+    /// Which sensors moved during the rest, of a raw `range`.
+    fn moved(&self, at_rest: &[AtRest], range: f64, is_range_known: bool) -> Vec<bool> {
+        let moved = |(at_rest, rest): (&AtRest, &Vec<f32>)| {
+            let Some((baseline, noise)) = *at_rest else { return false };
+            let movement = movement_of(rest, baseline);
+            let by_chance = MAX_NOISE_SIGMAS * chance_of(rest, self.step());
+            (self.dead_band(movement) > WIDE_NOISE_SHARE * range && movement > by_chance)
+                || (is_range_known && self.dead_band(noise) > WIDE_SHARE * range)
+        };
+        at_rest.iter().zip(&self.rest).map(moved).collect()
+    }
+
+    /// The error that names the sensors that `moved`.
+    fn not_at_rest(&self, at_rest: &[AtRest], moved: &[bool], range: f64) -> Error {
+        let those = || (0..self.ids.len()).filter(|&sensor| moved[sensor]);
+        let bands = those().filter_map(|sensor| at_rest[sensor]).map(|(_, noise)| self.dead_band(noise));
+        let widest = bands.fold(0.0, f64::max);
+        let ids: Vec<u32> = those().map(|sensor| self.ids[sensor]).collect();
+        Error::failed(format!(
+            "{} of {} sensors moved during the rest: {}; their dead bands would be up to {widest} of a raw range of {range}. Keep \
+             everything off the robot until the rest is over; --mask-moved leaves broken sensors out",
+            ids.len(),
+            self.ids.len(),
+            several(&ids)
+        ))
     }
 
     /// How far apart the raw values of all sensors were, at rest and pressed.

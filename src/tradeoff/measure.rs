@@ -35,6 +35,10 @@ const TURN_TIME: Duration = Duration::from_micros(1500);
 /// Minimum number of rounds; the first one warms up.
 const MIN_ROUNDS: usize = 4;
 
+/// The shares of all work that are done when all engines are made, and when all errors are known.
+const PROGRESS_BUILT: f64 = 0.1;
+const PROGRESS_COMPARED: f64 = 0.3;
+
 /// A combination that is being measured.
 struct Trial {
     way: CallMode,
@@ -112,9 +116,6 @@ pub fn measure(
     if options.scene.outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) && !can_fit(options) {
         report.left_out.push("fits: no calibration says what the layer is; add [layer] with sigma_m to it".to_owned());
     }
-    const PROGRESS_BUILT: f64 = 0.1;
-    const PROGRESS_COMPARED: f64 = 0.3;
-    let stopped = || Error::failed("stopped before everything had been measured once");
     let combinations: Vec<(CallMode, Combination)> = measure_options
         .ways
         .iter()
@@ -138,9 +139,7 @@ pub fn measure(
             }
             Err(e) => return Err(e),
         }
-        if !progress(PROGRESS_BUILT * (index + 1) as f64 / combinations.len() as f64) {
-            return Err(stopped());
-        }
+        go_on(progress, PROGRESS_BUILT * (index + 1) as f64 / combinations.len() as f64)?;
     }
     // Errors, once.
     let right = ReferencePercepts::new(body, options, played)?;
@@ -160,33 +159,47 @@ pub fn measure(
             let recharted = &charted[trial.combination.knobs.charts.word()];
             trial.truth = Some(truth.errors(trial.combination, recharted, geometry, authored)?);
         }
-        if !progress(PROGRESS_BUILT + (PROGRESS_COMPARED - PROGRESS_BUILT) * (index + 1) as f64 / count as f64) {
-            return Err(stopped());
-        }
+        let done = (PROGRESS_COMPARED - PROGRESS_BUILT) * (index + 1) as f64 / count as f64;
+        go_on(progress, PROGRESS_BUILT + done)?;
     }
-    // Times, in turns.
-    let start = Instant::now();
-    let mut rounds = 0;
-    loop {
-        for trial in &mut trials {
-            trial.turn(&mut calls[trial.way as usize])?;
-        }
-        rounds += 1;
-        if rounds == 1 {
-            trials.iter_mut().for_each(|trial| trial.times_us.clear());
-        }
-        let share = (start.elapsed().as_secs_f64() / measure_options.seconds).min(1.0);
-        let go_on = progress(PROGRESS_COMPARED + (1.0 - PROGRESS_COMPARED) * share);
-        if rounds < 2 && !go_on {
-            return Err(stopped());
-        }
-        if !go_on || (rounds >= MIN_ROUNDS && share >= 1.0) {
-            break;
-        }
-    }
+    take_turns(&mut trials, &mut calls, measure_options.seconds, progress)?;
     report.rows = trials.into_iter().map(Trial::row).collect();
     report.find_front();
     Ok(report)
+}
+
+/// Reports that the share `done` is done, unless that is where it stops.
+fn go_on(progress: &mut dyn FnMut(f64) -> bool, done: f64) -> Result<()> {
+    match progress(done) {
+        true => Ok(()),
+        false => Err(Error::failed("stopped before everything had been measured once")),
+    }
+}
+
+/// Times all trials in turns for some seconds. The first turn, in which memory is fetched, does not count.
+fn take_turns(
+    trials: &mut [Trial],
+    calls: &mut [Calls; 2],
+    seconds: f64,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Result<()> {
+    let start = Instant::now();
+    for round in 1.. {
+        for trial in &mut *trials {
+            trial.turn(&mut calls[trial.way as usize])?;
+        }
+        if round == 1 {
+            trials.iter_mut().for_each(|trial| trial.times_us.clear());
+        }
+        let share = (start.elapsed().as_secs_f64() / seconds).min(1.0);
+        let told = go_on(progress, PROGRESS_COMPARED + (1.0 - PROGRESS_COMPARED) * share);
+        if round < 2 {
+            told?;
+        } else if told.is_err() || (round >= MIN_ROUNDS && share >= 1.0) {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Whether contacts can be fitted to touches.

@@ -69,6 +69,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("picture", vec!["error", "percept", "signal", "body", "field", "backend", "engine", "ink", "colours"]),
         ("figure", vec!["error", "ink"]),
         ("plot", vec!["error", "percept", "signal", "body", "field", "engine", "ink", "colours"]),
+        ("run", vec!["error", "percept", "signal", "engine", "source", "sink"]),
         ("scene_file", [&below_backend[..], &["backend", "bundled", "engine", "touch", "source", "sink"]].concat()),
     ])
 }

@@ -18,11 +18,11 @@ use somatic::{Error, Frame, Result, bundled};
 
 use self::station::{LineSettings, Station};
 use super::bodies::load_body;
-use super::feed::{Arrival, Feed, ReadMode};
 use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
 use super::stdio::{DONE, print};
 use super::words;
+use somatic::run::{Arrival, Feed, ReadMode};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -12,10 +12,11 @@ use toml_edit::{DocumentMut, Item, Table, value};
 
 use crate::cli::bar::Bar;
 use crate::cli::bodies::in_body;
-use crate::cli::interrupt::{left_out, stop_soon_on_signal};
+use crate::cli::interrupt::stop_soon_on_signal;
 use crate::cli::stdio::{print, say, tell_losses};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, count};
+use somatic::run::left_out;
 
 /// Frames that are taken at once.
 const BATCH: usize = 256;

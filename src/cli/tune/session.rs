@@ -11,9 +11,9 @@ use somatic::signal::Wiring;
 use somatic::source::{BoardState, Lines, SerialSource};
 use somatic::{Error, Frame, Result};
 
-use crate::cli::feed::{Arrival, Feed};
 use crate::cli::stdio::{for_terminal, say};
 use crate::cli::words;
+use somatic::run::{Arrival, Feed};
 
 /// Boards without progress for this long are given up.
 const BOARD_TIMEOUT: Duration = Duration::from_secs(6);

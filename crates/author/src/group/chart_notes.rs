@@ -86,6 +86,15 @@ impl Kind {
     }
 }
 
+/// The note of `count` fields whose surface was too fine to measure all ways on it.
+pub(super) fn bounded(count: usize) -> String {
+    format!(
+        "{} in smaller parts, or without a chart, as their surface is too fine, or its triangles too thin, to measure all ways on it; \
+         simplify the mesh, or for a robot try --geometry collision",
+        if count == 1 { "1 field is".to_owned() } else { format!("{count} fields are") }
+    )
+}
+
 /// `why` without its own advice.
 pub(super) fn plain(why: &NoChart) -> String {
     why.to_string().trim_end_matches("; split it").to_owned()

@@ -56,12 +56,7 @@ impl Grouper<'_> {
     pub(crate) fn finish_while(mut self, progress: Progress<'_>) -> Result<Grouping, (usize, Error)> {
         let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
         let members = unions(&specs);
-        // Without a surface: only the origin of a plane chart depends on it, which is not stored.
-        let Body { name, links, taxels, .. } = self.body;
-        let (name, links, taxels) = (name.clone(), links.clone(), taxels.clone());
-        let (surfaces, fields, edges, findings) = (Vec::new(), Vec::new(), None, Vec::new());
-        let mut bare = Body { name, links, taxels, surfaces, fields, edges, findings };
-        bare.fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
+        let mut bare = self.bare(&specs);
         let planes: Vec<_> =
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
         let parents: BTreeSet<&str> = specs.iter().filter_map(|spec| spec.parent.as_deref()).collect();
@@ -142,16 +137,19 @@ impl Grouper<'_> {
             }
         }
         bounded += usize::from(*self.unroller.windows_left() == Some(0));
-        if bounded > 0 {
-            self.notes.push(format!(
-                "{} in smaller parts, or without a chart, as their surface is too fine, or its triangles too thin, to measure \
-                 all ways on it; simplify the mesh, or for a robot try --geometry collision",
-                if bounded == 1 { "1 field is".to_owned() } else { format!("{bounded} fields are") }
-            ));
-        }
+        self.notes.extend((bounded > 0).then(|| chart_notes::bounded(bounded)));
         notes.poor = std::mem::take(&mut self.poor);
         self.notes.extend(notes.lines());
         Ok(Grouping { fields, notes: self.notes })
+    }
+
+    /// The body with fields `specs`, each with a plane chart, and without a surface: only the origin of a plane chart depends on that,
+    /// which is not stored.
+    fn bare(&self, specs: &[FieldSpec]) -> Body {
+        let Body { name, links, taxels, .. } = self.body;
+        let (name, links, taxels) = (name.clone(), links.clone(), taxels.clone());
+        let fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
+        Body { name, links, taxels, surfaces: Vec::new(), fields, edges: None, findings: Vec::new() }
     }
 
     /// `whole`, the field `made` with all its members as own members, with the chart that `made` requests; `plane` is its

@@ -241,16 +241,7 @@ impl BoundedReference {
             }
         }
         if field.charted && plan.stages().filter && cell.advances {
-            let clock = filter::Clock::new(cell.step.dt_s, cell.step.flags);
-            let in_metres = motion::Centroid { place: touched.place * unit, ..touched };
-            let off = doubt.place * unit;
-            let limit = match field.filter.over_s {
-                Some(over_s) => doubt.difference.follow(&field.filter, over_s, clock, in_metres, off),
-                None => doubt.filter.follow(&field.filter, clock, in_metres, off),
-            };
-            bound.in_doubt |= limit.in_doubt;
-            bound.set(limit.limits());
-            bound.may_remember.filter = limit.may_remember;
+            followed(&mut bound, field, cell, touched, doubt);
         }
         if plan.stages().sigma {
             let sigmas = sigma::of_field(plan, field, cell.raw.0, cell.raw.1);
@@ -275,6 +266,21 @@ impl BoundedReference {
             bound.in_doubt |= axis.line.in_doubt;
         }
     }
+}
+
+/// Adds the bounds of filtered motion, and follows the doubt about `touched` on.
+fn followed(bound: &mut CellBound, field: &PlanField, cell: &Cell<'_>, touched: motion::Centroid, doubt: &mut Doubt) {
+    let unit = f64::from(field.unit_m);
+    let clock = filter::Clock::new(cell.step.dt_s, cell.step.flags);
+    let in_metres = motion::Centroid { place: touched.place * unit, ..touched };
+    let off = doubt.place * unit;
+    let limit = match field.filter.over_s {
+        Some(over_s) => doubt.difference.follow(&field.filter, over_s, clock, in_metres, off),
+        None => doubt.filter.follow(&field.filter, clock, in_metres, off),
+    };
+    bound.in_doubt |= limit.in_doubt;
+    bound.set(limit.limits());
+    bound.may_remember.filter = limit.may_remember;
 }
 
 /// Adds the bounds of motion to `now`, a centroid with its bound as the one before has `before`.

@@ -1,7 +1,5 @@
 //! A source whose frames get poses of links from joint states.
 
-use std::time::Instant;
-
 use glam::{DAffine3, DQuat};
 
 use super::joint_remarks::JointRemarks;
@@ -319,6 +317,14 @@ impl Source for JointedSource {
         self.source.taxels()
     }
 
+    fn wrapped(&self) -> Option<&dyn Source> {
+        Some(&*self.source)
+    }
+
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        Some(&mut *self.source)
+    }
+
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         // Sources empty their frames, and names would be allocated for each.
         let names = if self.options.states.is_some() { std::mem::take(&mut frame.joints) } else { Vec::new() };
@@ -328,26 +334,6 @@ impl Source for JointedSource {
         self.put_poses(names, frame);
         self.counts.see(frame);
         Ok(true)
-    }
-
-    fn progress(&self) -> Option<f64> {
-        self.source.progress()
-    }
-
-    fn skip_to(&mut self, t_s: f64) {
-        self.source.skip_to(t_s);
-    }
-
-    fn report_stale(&mut self) {
-        self.source.report_stale();
-    }
-
-    fn has_stale(&self) -> bool {
-        self.source.has_stale()
-    }
-
-    fn read_at(&mut self) -> Option<Instant> {
-        self.source.read_at()
     }
 
     fn notices(&mut self) -> Vec<String> {

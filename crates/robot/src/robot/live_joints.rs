@@ -144,6 +144,14 @@ impl Source for LiveJoints {
         self.source.taxels()
     }
 
+    fn wrapped(&self) -> Option<&dyn Source> {
+        Some(&*self.source)
+    }
+
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        Some(&mut *self.source)
+    }
+
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         if !self.source.next_frame(frame)? {
             return Ok(false);
@@ -163,26 +171,6 @@ impl Source for LiveJoints {
         Ok(true)
     }
 
-    fn progress(&self) -> Option<f64> {
-        self.source.progress()
-    }
-
-    fn skip_to(&mut self, t_s: f64) {
-        self.source.skip_to(t_s);
-    }
-
-    fn report_stale(&mut self) {
-        self.source.report_stale();
-    }
-
-    fn has_stale(&self) -> bool {
-        self.source.has_stale()
-    }
-
-    fn read_at(&mut self) -> Option<Instant> {
-        self.source.read_at()
-    }
-
     fn notices(&mut self) -> Vec<String> {
         let mut notices = self.source.notices();
         notices.extend(self.notice.take());
@@ -199,10 +187,6 @@ impl Source for LiveJoints {
             closing.extend(self.nothing_came());
         }
         closing
-    }
-
-    fn losses(&self) -> Vec<String> {
-        self.source.losses()
     }
 }
 

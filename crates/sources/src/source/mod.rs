@@ -66,39 +66,57 @@ pub trait Source {
     /// The input is invalid; the message names the place.
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool>;
 
-    /// The share of the input that has been read, 0..=1, if known.
-    fn progress(&self) -> Option<f64> {
+    /// The source that this one changes, if it is one around another: what it does not do itself is done by that.
+    fn wrapped(&self) -> Option<&dyn Source> {
         None
     }
 
+    /// As [`wrapped`](Self::wrapped); both or neither.
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        None
+    }
+
+    /// The share of the input that has been read, 0..=1, if known.
+    fn progress(&self) -> Option<f64> {
+        self.wrapped()?.progress()
+    }
+
     /// Lets the source skip frames before `t_s`, if it can do so without reading them.
-    fn skip_to(&mut self, _t_s: f64) {}
+    fn skip_to(&mut self, t_s: f64) {
+        if let Some(source) = self.wrapped_mut() {
+            source.skip_to(t_s);
+        }
+    }
 
     /// From now on delivers stale values as [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE) instead of as missing, for engines that track them.
-    fn report_stale(&mut self) {}
+    fn report_stale(&mut self) {
+        if let Some(source) = self.wrapped_mut() {
+            source.report_stale();
+        }
+    }
 
     /// Whether any value so far was stale.
     fn has_stale(&self) -> bool {
-        false
+        self.wrapped().is_some_and(Source::has_stale)
     }
 
     /// When the last byte of the last frame was read, if known; call it once per frame.
     fn read_at(&mut self) -> Option<Instant> {
-        None
+        self.wrapped_mut()?.read_at()
     }
 
     /// Messages about the frames since the last call, a line each.
     fn notices(&mut self) -> Vec<String> {
-        Vec::new()
+        self.wrapped_mut().map_or_else(Vec::new, Source::notices)
     }
 
     /// What is to be said if no further frame is read, a line each.
     fn closing(&self) -> Vec<String> {
-        Vec::new()
+        self.wrapped().map_or_else(Vec::new, Source::closing)
     }
 
     /// Input that was never processed, such as a truncated last row; reported to the user, exit code 3.
     fn losses(&self) -> Vec<String> {
-        Vec::new()
+        self.wrapped().map_or_else(Vec::new, Source::losses)
     }
 }

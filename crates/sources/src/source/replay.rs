@@ -100,6 +100,14 @@ impl Source for Replay {
         &self.taxels
     }
 
+    fn wrapped(&self) -> Option<&dyn Source> {
+        Some(&*self.source)
+    }
+
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        Some(&mut *self.source)
+    }
+
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             if !self.source.next_frame(frame)? {
@@ -154,6 +162,9 @@ impl Source for Replay {
         Some((done / self.cut.times as f64).min(1.0))
     }
 
+    /// It skips by itself: its times are not those of the source.
+    fn skip_to(&mut self, _: f64) {}
+
     fn report_stale(&mut self) {
         self.marks_stale = true;
         self.source.report_stale();
@@ -161,14 +172,6 @@ impl Source for Replay {
 
     fn has_stale(&self) -> bool {
         self.had_stale || self.source.has_stale()
-    }
-
-    fn notices(&mut self) -> Vec<String> {
-        self.source.notices()
-    }
-
-    fn closing(&self) -> Vec<String> {
-        self.source.closing()
     }
 
     fn losses(&self) -> Vec<String> {

@@ -6,8 +6,10 @@
 //! device memory. On the device a taxel's frames lie side by side, four to a vector, so that neighbouring invocations
 //! read neighbouring words.
 
+mod across;
 pub(crate) mod adapter;
 mod bus;
+mod calibrating;
 mod capacity;
 mod columns;
 mod members;
@@ -30,21 +32,28 @@ use bytemuck::cast_slice;
 use glam::DVec2;
 pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 
+use self::across::{Cells, across_frames};
 use self::adapter::Device;
+use self::calibrating::{Calibrated, Calibrating};
 use self::capacity::FRAMES_A_BLOCK;
-use self::columns::{Columns, NOTHING};
+use self::columns::Columns;
 use self::over_fields::{Bound, OverFields};
 use self::pack::{Form, HEADER, Packer, STEP};
 use self::ring::{SETS, Set};
 use self::shaders::Values;
 use self::shares::Shares;
-use self::stage::{Over, Stage, table};
+use self::stage::{Stage, table};
 use super::{Backend, BackendState, FieldState, RawBatch};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
 use crate::stage::{layout, motion};
+
+/// How buffers are used that stages read and write, and what stages are told of a batch.
+const WORKING: wgpu::BufferUsages =
+    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC).union(wgpu::BufferUsages::COPY_DST);
+const UNIFORM: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM.union(wgpu::BufferUsages::COPY_DST);
 
 /// The backend, with everything it needs on the device.
 pub(crate) struct Gpu {
@@ -98,14 +107,9 @@ impl Gpu {
         let shares = Shares::new(plan, of_part, most);
         let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
         let frames = capacity as u64;
-        let working = |name: &str, size: u64| {
-            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-            device.buffer(name, size, usage)
-        };
-        let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let batch = device.buffer("batch", HEADER, uniform);
+        let working = |name: &str, size: u64| device.buffer(name, size, WORKING);
+        let batch = device.buffer("batch", HEADER, UNIFORM);
         let steps = working("steps", frames * STEP);
-        let row = layout::padded_channels(plan.channels()) as u64 * 4;
         let plain = is_plain(plan);
         let direct = plain && !plan.has_changes() && !plan.stages().pressures && plan.calibrated() == plan.channels();
         let form = match (direct, capacity) {
@@ -128,31 +132,15 @@ impl Gpu {
         let wanted = plan.stages();
         let (curves, knots) =
             (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
-        let buffers = [&batch, &taxels, &raw, &pressures, &statuses, &curves, &knots];
-        let (entry, used) = if plan.curves.curves.is_empty() { ("main", 5) } else { ("curved", 7) };
-        let calibrated = |plain: bool| {
-            let signals = (plan.calibrated() / plan.channels()) as f64;
-            let told = [("SIGNALS", signals), ("PLAIN", f64::from(u8::from(plain)))];
-            Stage::new(&device, &shaders::CALIBRATE, entry, Over::Calibrated, &told, &buffers[..used])
+        let over = Calibrated {
+            batch: &batch,
+            steps: &steps,
+            taxels: &taxels,
+            raw: &raw,
+            curves: [&curves, &knots],
+            to: [&pressures, &statuses],
         };
-        let mut stages = if direct { Vec::new() } else { vec![calibrated(plain)] };
-        // For a plan that ceases to be plain.
-        let mut fallback: Vec<Stage> = plain.then(|| calibrated(false)).into_iter().collect();
-        // What changes needs the frame before the batch's first: its raw values, calibrated as these are.
-        let before = plan.has_changes().then(|| working("raw before", row));
-        if let Some(before) = &before {
-            let one = device.buffer("one frame", HEADER, uniform);
-            device.queue.write_buffer(&one, 0, bytemuck::bytes_of(&header(plan, 1)));
-            let calibrated = plan.calibrated() as u64;
-            let pressed = working("pressures before", calibrated * 16);
-            let statuses_before = working("statuses before", calibrated * 4);
-            let buffers = [&one, &taxels, before, &pressed, &statuses_before, &curves, &knots];
-            for stages in [&mut stages, &mut fallback].into_iter().filter(|stages| !stages.is_empty()) {
-                stages.push(stages[0].again(&device, Over::CalibratedOnce, &buffers[..used]));
-            }
-            let buffers = [&batch, &taxels, &steps, &pressed, &statuses_before, &pressures, &statuses];
-            stages.push(Stage::new(&device, &shaders::CHANGE, "main", Over::Changes, NOTHING, &buffers));
-        }
+        let Calibrating { mut stages, mut fallback, before } = Calibrating::new(&device, plan, (plain, direct), &over);
         let tables = OverFields::new(&device, plan, &shares, &columns, capacity);
         let over_fields = |direct: bool| {
             let (values, at) = match direct {
@@ -171,22 +159,12 @@ impl Gpu {
         };
         let fallback = (replaced, fallback);
         stages.extend(over_fields(direct));
-        if wanted.hysteresis {
-            let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| f.thresholds.rounded()).collect();
-            let buffers = [&batch, &table(&device, "thresholds", &thresholds), &results, &touched];
-            let told = columns.of_hysteresis();
-            stages.push(Stage::new(&device, &shaders::HYSTERESIS, "main", Over::Fields, &told, &buffers));
-        }
-        if wanted.motion {
-            let still: Vec<layout::Still> = plan.fields.iter().map(|field| field.still).collect();
-            let still = table(&device, "still", &still);
-            let told = columns.of_motion();
-            let main = [&batch, &steps, &still, &results, &last];
-            stages.push(Stage::new(&device, &shaders::MOTION, "main", Over::Cells, &told, &main));
-            let keep = [(0, &batch), (3, &results), (4, &last)];
-            let keep = keep.map(|(binding, buffer)| (binding, buffer.as_entire_binding()));
-            stages.push(Stage::bound(&device, &shaders::MOTION, "keep", Over::Fields, &told, &keep));
-        }
+        stages.extend(across_frames(
+            &device,
+            plan,
+            &columns,
+            &Cells { batch: &batch, steps: &steps, results: &results, touched: &touched, last: &last },
+        ));
 
         let back = frames * fields * 4 * columns.read().len() as u64;
         let back = back + if wanted.pressures { quads * slots * 16 } else { 0 };

@@ -92,6 +92,13 @@ pub struct Cells {
     pub surface: Vec<(u32, [DVec3; 3])>,
 }
 
+/// Memory that is used again for each triangle.
+#[derive(Default)]
+struct Scratch {
+    polygon: Vec<Side>,
+    spare: Vec<Side>,
+}
+
 impl Cells {
     /// The cells of `places` on `topology`. Where a surface is too fine or too rough for windows,
     /// areas are within 2 % if its triangles are about as long as wide; on fans of long triangles single ones are off by 17 %.
@@ -234,7 +241,7 @@ impl Cells {
         }
         // Per edge the point that all of it belongs to on this side, if it is no border yet.
         let mut owner = vec![NONE; topology.across.len()];
-        let (mut candidates, mut polygon, mut spare) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut candidates, mut scratch) = (Vec::new(), Scratch::default());
         let mut from = 0;
         for triangle in 0..topology.triangles.len() as u32 {
             let part = topology.part[triangle as usize] as usize;
@@ -253,40 +260,11 @@ impl Cells {
             } else {
                 reaching(&waves, triangle, &mut candidates);
             }
-            let corners = topology.corners(triangle);
-            let area = if is_skin(triangle) { area_vector(corners).length() / 2.0 } else { 0.0 };
-            if candidates.is_empty() {
-                // Rounding hides it, as between needles.
-                if is_skin(triangle) {
-                    self.pieces.push(Piece::of(corners));
-                }
-                continue;
-            }
-            if let [candidate] = candidates[..] {
-                self.areas[candidate.site as usize] += area;
-                if let Some(parts) = parts.as_deref_mut() {
-                    parts.add_whole(triangle, candidate.site);
-                }
-                if is_skin(triangle) {
-                    (0..3).for_each(|side| owner[3 * triangle as usize + side] = candidate.site);
-                }
-                continue;
-            }
-            for own in &candidates {
-                nearest_part(own, &candidates, &mut polygon, &mut spare);
-                let share = share(&polygon);
-                if share > MIN_SHARE && is_skin(triangle) {
-                    self.areas[own.site as usize] += share * area;
-                    if let Some(parts) = parts.as_deref_mut() {
-                        parts.add_polygon(triangle, own.site, &polygon);
-                    }
-                    self.take_borders(own, corners, &polygon);
-                    for (index, side) in polygon.iter().enumerate().filter(|(_, side)| side.beyond.is_none()) {
-                        if let Some(edge) = whole_side(side.from, polygon[(index + 1) % polygon.len()].from) {
-                            owner[3 * triangle as usize + edge] = own.site;
-                        }
-                    }
-                }
+            let owner = &mut owner[3 * triangle as usize..][..3];
+            if is_skin(triangle) {
+                self.share_out(topology, triangle, &candidates, owner, parts.as_deref_mut(), &mut scratch);
+            } else if let ([candidate], Some(parts)) = (&candidates[..], parts.as_deref_mut()) {
+                parts.add_whole(triangle, candidate.site);
             }
         }
         let least_m = |edge: u32, vertex: u32| match is_marched[topology.part[edge as usize / 3] as usize] {
@@ -294,6 +272,51 @@ impl Cells {
             false => waves.arrivals[vertex as usize].distance_m,
         };
         self.take_borders_along_edges(topology, &owner, least_m);
+    }
+
+    /// Shares a triangle of skin out among the points that reach it; each edge that is a point's alone gets it as `owner`.
+    fn share_out(
+        &mut self,
+        topology: &Topology,
+        triangle: u32,
+        candidates: &[Candidate],
+        owner: &mut [u32],
+        mut parts: Option<&mut Parts>,
+        scratch: &mut Scratch,
+    ) {
+        let corners = topology.corners(triangle);
+        let area = area_vector(corners).length() / 2.0;
+        match candidates {
+            // Rounding hides it, as between needles.
+            [] => self.pieces.push(Piece::of(corners)),
+            [candidate] => {
+                self.areas[candidate.site as usize] += area;
+                if let Some(parts) = parts {
+                    parts.add_whole(triangle, candidate.site);
+                }
+                owner.fill(candidate.site);
+            }
+            _ => {
+                for own in candidates {
+                    let Scratch { polygon, spare } = scratch;
+                    nearest_part(own, candidates, polygon, spare);
+                    let share = share(polygon);
+                    if share <= MIN_SHARE {
+                        continue;
+                    }
+                    self.areas[own.site as usize] += share * area;
+                    if let Some(parts) = parts.as_deref_mut() {
+                        parts.add_polygon(triangle, own.site, polygon);
+                    }
+                    self.take_borders(own, corners, polygon);
+                    for (index, side) in polygon.iter().enumerate().filter(|(_, side)| side.beyond.is_none()) {
+                        if let Some(edge) = whole_side(side.from, polygon[(index + 1) % polygon.len()].from) {
+                            owner[edge] = own.site;
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// Takes the borders that are edges of the surface.

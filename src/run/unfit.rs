@@ -1,10 +1,8 @@
 //! Which taxels drift compensation leaves out.
 
-use somatic::Engine;
-use somatic::signal::Unfit;
-
-use super::repeats::Repeats;
-use super::stdio::say;
+use super::Repeats;
+use crate::engine::Engine;
+use crate::signal::Unfit;
 
 /// The taxels that are left out, as last reported.
 #[derive(Default)]
@@ -29,8 +27,8 @@ impl UnfitReport {
         messages
     }
 
-    /// Prints how often repeated messages were held back.
-    pub(super) fn print_repeats(&self) {
-        self.repeats.rest().for_each(|message| say(&message));
+    /// How often repeated messages were held back, a line each.
+    pub(super) fn repeats(&self) -> impl Iterator<Item = String> + '_ {
+        self.repeats.rest()
     }
 }

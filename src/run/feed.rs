@@ -1,18 +1,22 @@
-//! Reads a source on its own thread, so that a blocked read holds up neither the table nor a clean end.
+//! Reads a source on its own thread, so that a blocked read holds up neither who watches nor a clean end.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use somatic::source::{Lines, Source};
-use somatic::{Error, Frame};
+use crate::error::Error;
+use crate::signal::Frame;
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+use crate::source::Lines;
+use crate::source::Source;
 
 /// What a source delivers.
-pub(super) enum Arrival {
+pub enum Arrival {
     /// The next frames, and information on them.
     Frames(Vec<Frame>, FrameInfo),
     /// The end; a line per kind of loss.
     End(Ending),
+    /// It cannot go on.
     Failed(Error),
     /// Something came that is no frame: percepts of a limb.
     Woken,
@@ -20,46 +24,47 @@ pub(super) enum Arrival {
 
 /// What a source says at its end.
 #[derive(Debug, Default)]
-pub(super) struct Ending {
+pub struct Ending {
     /// What was never processed.
-    pub(super) losses: Vec<String>,
+    pub losses: Vec<String>,
     /// The last messages for the user.
-    pub(super) notices: Vec<String>,
+    pub notices: Vec<String>,
     /// Whether a recording was left before its end.
-    pub(super) is_early: bool,
+    pub is_early: bool,
 }
 
 /// Information on frames.
 #[derive(Debug, Default)]
-pub(super) struct FrameInfo {
+pub struct FrameInfo {
     /// The share of the source that has been read, if known.
-    pub(super) progress: Option<f64>,
+    pub progress: Option<f64>,
     /// When the last byte of each frame was read, if known.
-    pub(super) read_at: Vec<Instant>,
+    pub read_at: Vec<Instant>,
     /// Whether any value so far was stale.
-    pub(super) has_stale: bool,
+    pub has_stale: bool,
     /// Messages for the user.
-    pub(super) notices: Vec<String>,
+    pub notices: Vec<String>,
     /// What has been lost so far, if requested.
-    pub(super) losses: Vec<String>,
+    pub losses: Vec<String>,
     /// What is to be said if these are the last frames.
-    pub(super) closing: Vec<String>,
+    pub closing: Vec<String>,
 }
 
-#[derive(Clone, Copy)]
-pub(super) struct ReadMode {
+/// How a source is read.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadMode {
     /// Maximum number of frames per arrival.
-    pub(super) most: usize,
+    pub most: usize,
     /// Wait for `most` frames; else pass on those that are there.
-    pub(super) gather: bool,
+    pub gather: bool,
     /// Playback at this many times the recorded speed; `None` is as fast as possible.
-    pub(super) speed: Option<f64>,
+    pub speed: Option<f64>,
 }
 
 type Queue = (SyncSender<Arrival>, Receiver<Arrival>);
 
 /// A source being read.
-pub(super) struct Feed {
+pub struct Feed {
     arrivals: Receiver<Arrival>,
     spare: Sender<Vec<Frame>>,
     next: Option<Arrival>,
@@ -67,17 +72,22 @@ pub(super) struct Feed {
 }
 
 impl Feed {
-    pub(super) fn start(source: Box<dyn Source + Send>, mode: ReadMode) -> Self {
+    /// Starts to read `source`.
+    #[must_use]
+    pub fn start(source: Box<dyn Source + Send>, mode: ReadMode) -> Self {
         Self::read_by(source, mode, sync_channel(if mode.gather { 4 } else { 1024 }), true)
     }
 
     /// Starts to read `source`, which itself drops and reports late frames, at most `most` frames at once.
-    pub(super) fn start_live(source: Box<dyn Source + Send>, most: usize) -> Self {
+    #[must_use]
+    pub fn start_live(source: Box<dyn Source + Send>, most: usize) -> Self {
         Self::read_by(source, ReadMode { most, gather: false, speed: None }, sync_channel(1), false)
     }
 
     /// The same, and percepts of limbs on its `lines` wake who waits.
-    pub(super) fn start_woken(source: Box<dyn Source + Send>, most: usize, lines: &Lines) -> Self {
+    #[cfg(any(feature = "serial", feature = "zenoh"))]
+    #[must_use]
+    pub fn start_woken(source: Box<dyn Source + Send>, most: usize, lines: &Lines) -> Self {
         let (sender, arrivals) = sync_channel(1);
         let waker = sender.clone();
         // Where a frame waits already, there is no need.
@@ -98,7 +108,7 @@ impl Feed {
     }
 
     /// The next arrival, if it comes within `wait`.
-    pub(super) fn next(&mut self, wait: Duration) -> Option<Arrival> {
+    pub fn next(&mut self, wait: Duration) -> Option<Arrival> {
         let first = match self.next.take() {
             Some(arrival) => arrival,
             None => match self.arrivals.recv_timeout(wait) {
@@ -129,7 +139,8 @@ impl Feed {
         Some(Arrival::Frames(frames, info))
     }
 
-    pub(super) fn give_back(&self, frames: Vec<Frame>) {
+    /// Gives `frames` back, so that their memory is used again.
+    pub fn give_back(&self, frames: Vec<Frame>) {
         let _ = self.spare.send(frames);
     }
 }
@@ -216,7 +227,7 @@ impl Clock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use somatic::source::CsvSource;
+    use crate::source::CsvSource;
 
     const ROWS: &str = "t,4\n0,1\n1,2\n2,3\n3,4\n4,oops\n";
 

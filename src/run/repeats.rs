@@ -8,6 +8,7 @@ const FIRST_WAIT_S: f64 = 10.0;
 const LONGEST_WAIT_S: f64 = 640.0;
 
 /// A message, and how often it came and was shown.
+#[derive(Debug)]
 struct Repeated {
     times: u64,
     /// How many of these the user knows of.
@@ -17,14 +18,14 @@ struct Repeated {
 }
 
 /// The messages so far.
-#[derive(Default)]
-pub(super) struct Repeats {
+#[derive(Debug, Default)]
+pub struct Repeats {
     messages: BTreeMap<String, Repeated>,
 }
 
 impl Repeats {
     /// The line to show now that `text` came at `at_s`, if any.
-    pub(super) fn tell(&mut self, at_s: f64, text: &str) -> Option<String> {
+    pub fn tell(&mut self, at_s: f64, text: &str) -> Option<String> {
         let Some(told) = self.messages.get_mut(text) else {
             let first = Repeated { times: 1, told: 1, told_at_s: at_s, wait_s: FIRST_WAIT_S };
             self.messages.insert(text.to_owned(), first);
@@ -40,7 +41,7 @@ impl Repeats {
     }
 
     /// The final counts of messages that came more often than was shown.
-    pub(super) fn rest(&self) -> impl Iterator<Item = String> + '_ {
+    pub fn rest(&self) -> impl Iterator<Item = String> + '_ {
         let untold = self.messages.iter().filter(|(_, told)| told.times > told.told);
         untold.map(|(text, told)| format!("{text}: {} times in all", told.times))
     }
