@@ -70,6 +70,9 @@ pub mod picture;
 pub mod plot;
 pub mod run;
 mod scene_file;
+#[cfg(feature = "scenes")]
+#[doc(hidden)]
+pub mod setup;
 #[cfg(feature = "cli")]
 pub mod tradeoff;
 

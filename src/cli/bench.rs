@@ -14,11 +14,11 @@ use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 use somatic_engine::shape::Shape;
 
 use super::bar::Bar;
-use super::files::FilesRead;
 use super::interrupt::stop_soon_on_signal;
 use super::scene::{one_of, output, outputs_help, outputs_or_usual};
 use super::stdio::{DONE, print, say};
 use super::words::count;
+use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -15,8 +15,6 @@ use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, Vend
 use somatic::tradeoff::length;
 use somatic::{Body, Calibration, Error, Result};
 
-use super::bodies::{in_body, load_body};
-use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
 use super::plot_file::PlotFile;
 use super::ports::LineFlags;
@@ -26,6 +24,8 @@ use super::table::{more, plain, shown};
 use super::text_flags::TextFlags;
 use super::words::{bullet, count};
 use somatic::run::{Arrival, Feed, ReadMode, left_out};
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::{in_body, load_body};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -12,16 +12,17 @@ use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
 use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Frame, Result};
 
-use super::attached::{self, body_bytes, file_name};
 use super::bar::Bar;
 use super::exports::ExportFlags;
-use super::files::FilesRead;
-use super::first_source::source_of;
 use super::interrupt::stop_soon_on_signal;
-use super::overlaid::{How, overlaid};
+use super::scene::said;
 use super::stdio::{say, tell_losses};
 use super::words::count;
 use somatic::run::left_out;
+use somatic::setup::FilesRead;
+use somatic::setup::attached::{self, body_bytes, file_name};
+use somatic::setup::overlaid::{How, overlaid};
+use somatic::setup::source_of;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -207,12 +208,12 @@ fn files(
         let own = match (export, from) {
             (Some(export), _) => export.calibration().map(|text| (export.path().to_owned(), text)),
             (None, SourceSpec::Mcap(file)) if arguments.body.is_none() => {
-                attached::calibration(file, false)?.map(|text| (file.clone(), text))
+                attached::calibration(file, &said())?.map(|text| (file.clone(), text))
             }
             _ => None,
         };
         let text = match own {
-            Some((of, own)) => overlaid(&of, &own, path, &given, How::Laid, false)?,
+            Some((of, own)) => overlaid(&of, &own, path, &given, How::Laid, &said())?,
             None => given,
         };
         files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), text.into_bytes()));

@@ -10,13 +10,14 @@ use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
 use somatic::{Body, Calibration, Error, Frame, Result};
 
 use self::contacts::Contacts;
-use super::attached;
 use super::bar::Bar;
 use super::exports::ExportFlags;
-use super::first_source::source_of;
+use super::scene::said;
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
 use super::words::{between_s, number, one_line, size_words, span, title};
+use somatic::setup::attached;
+use somatic::setup::source_of;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -166,7 +167,7 @@ fn recorded(path: &std::path::Path) -> Result<Option<Contacts>> {
     let Some((name, bytes)) = attached::body(path)? else { return Ok(None) };
     let Ok(body) = Body::from_bytes(&name, &bytes) else { return Ok(None) };
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let calibration = attached::calibration(path, false)?.map(|text| Calibration::parse(&text, &ids)).transpose();
+    let calibration = attached::calibration(path, &said())?.map(|text| Calibration::parse(&text, &ids)).transpose();
     let mut reader = Reader::open(path)?;
     // What cannot be run is described all the same.
     let Ok(Ok(mut contacts)) = calibration.map(|calibration| Contacts::new(&body, calibration, &reader)) else {

@@ -17,9 +17,9 @@ use somatic::robot::{Kinematics, drawn_poses};
 use self::graph::SkinGraph;
 use self::inspection::Inspection;
 use super::bar::Bar;
-use super::bodies::load_body;
 use super::expected;
 use super::stdio::{DONE, FAILED, print};
+use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -64,10 +64,6 @@ impl LineReport {
         }
     }
 
-    pub(super) fn lines(&self) -> &Lines {
-        &self.lines
-    }
-
     /// Percepts that limbs have computed since the last call, a line of NDJSON each.
     /// When each was read is beside them.
     pub(super) fn percepts(&self) -> Option<(Vec<String>, Vec<Instant>)> {

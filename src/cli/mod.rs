@@ -1,13 +1,10 @@
 //! The command line: one file per subcommand, and what they share.
 
-mod attached;
-mod attachments;
 mod author;
 mod bar;
 mod bench;
 #[cfg(unix)]
 mod board;
-mod bodies;
 #[cfg(feature = "page")]
 mod browser;
 mod calibrate;
@@ -20,11 +17,8 @@ mod expected;
 #[cfg(feature = "page")]
 mod explanation;
 mod exports;
-mod files;
-mod first_source;
 mod help;
 mod info;
-mod input;
 mod inspect;
 mod interrupt;
 #[cfg(unix)]
@@ -34,7 +28,6 @@ mod lines;
 mod live;
 mod old_names;
 mod outputs;
-mod overlaid;
 mod paper;
 mod plan;
 mod plot;
@@ -61,6 +54,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use somatic::{Error, Result};
 
+use self::scene::in_flags;
 pub(crate) use self::stdio::say;
 use self::stdio::{DONE, print};
 
@@ -161,19 +155,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         return Ok(DONE);
     };
     match subcommand {
-        Command::Run(arguments) => run::run(arguments),
+        Command::Run(arguments) => run::run(arguments).map_err(in_flags),
         #[cfg(feature = "page")]
-        Command::View(arguments) => view::view(arguments),
+        Command::View(arguments) => view::view(arguments).map_err(in_flags),
         Command::Inspect(arguments) => inspect::inspect(arguments),
         Command::Author(arguments) => author::run(arguments),
         #[cfg(feature = "gpu")]
-        Command::Render(arguments) => render::render(arguments),
-        Command::Plan(arguments) => plan::plan(arguments),
-        Command::Tradeoff(arguments) => tradeoff::tradeoff(arguments),
+        Command::Render(arguments) => render::render(arguments).map_err(in_flags),
+        Command::Plan(arguments) => plan::plan(arguments).map_err(in_flags),
+        Command::Tradeoff(arguments) => tradeoff::tradeoff(arguments).map_err(in_flags),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Info(arguments) => info::info(arguments),
         Command::Convert(arguments) => convert::convert(arguments),
-        Command::Plot(arguments) => plot::plot(arguments),
+        Command::Plot(arguments) => plot::plot(arguments).map_err(in_flags),
         Command::Paper(arguments) => paper::paper(arguments),
         #[cfg(unix)]
         Command::Board(arguments) => board::run(arguments),

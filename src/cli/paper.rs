@@ -8,8 +8,8 @@ use clap::Args;
 use somatic::error::Result;
 
 use super::bar::Bar;
-use super::files::FilesRead;
 use super::stdio::{DONE, print};
+use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

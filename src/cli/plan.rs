@@ -14,10 +14,10 @@ use somatic::{Error, Result};
 
 use self::bill::Bill;
 pub(super) use self::timed::pressed;
-use super::bodies::load_body;
-use super::input::Input;
 use super::scene::{RunFlags, grouped};
 use super::stdio::{DONE, print};
+use somatic::setup::Input;
+use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -12,13 +12,14 @@ use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
 use super::exports::ExportFlags;
-use super::files::FilesRead;
-use super::input::{Input, RECORDED_BATCH};
 use super::interrupt::stop_soon_on_signal;
 use super::plot_file::PlotFile;
-use super::scene::{Asked, output};
+use super::scene::{input, output, set_up};
 use super::stdio::{DONE, say, tell_losses};
 use somatic::run::left_out;
+use somatic::setup::FilesRead;
+use somatic::setup::RECORDED_BATCH;
+use somatic::setup::Setup;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -93,7 +94,7 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
     if arguments.sources.len() > MAX_RECORDINGS {
         return Err(Error::usage(format!("at most {MAX_RECORDINGS} recordings have room side by side")));
     }
-    let runs: Vec<Asked> = match &arguments.sources[..] {
+    let runs: Vec<Setup> = match &arguments.sources[..] {
         [] => vec![asked(arguments, None, wanted)?],
         sources => sources.iter().map(|source| asked(arguments, Some(source), wanted)).collect::<Result<_>>()?,
     };
@@ -118,7 +119,7 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
 }
 
 /// What is run for the recording `source`.
-fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> Result<Asked> {
+fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> Result<Setup> {
     let mut scene = arguments.export.keys();
     scene.body.clone_from(&arguments.body);
     scene.sources = source.map(|source| source.parse()).transpose()?.into_iter().collect();
@@ -127,13 +128,13 @@ fn asked(arguments: &Arguments, source: Option<&String>, wanted: Outputs) -> Res
     scene.calibration.clone_from(&arguments.calibration);
     scene.backend = Some(BackendKind::Cpu);
     (scene.from_s, scene.to_s) = (arguments.from, arguments.to);
-    Ok(scene.into())
+    Ok(set_up(scene))
 }
 
 /// Runs a recording and keeps what is plotted of it, unless it was interrupted and the plot `to` is not drawn; also gives what of
 /// the source was never processed.
-fn gather(asked: &Asked, wanted: Outputs, stop: &AtomicBool, to: &Path) -> Result<(Option<Gathered>, Vec<String>)> {
-    let input = Input::named(asked)?;
+fn gather(asked: &Setup, wanted: Outputs, stop: &AtomicBool, to: &Path) -> Result<(Option<Gathered>, Vec<String>)> {
+    let input = input(asked)?;
     if !input.is_recording() {
         return Err(Error::usage("only recordings are plotted; record what is live with `somatic run`").at(&input.name));
     }

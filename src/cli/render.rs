@@ -12,10 +12,9 @@ use somatic::field::FieldSet;
 use somatic::picture::{self, Options, View};
 use somatic::scene::choose_fields;
 
-use super::bodies::load_body;
-use super::files::FilesRead;
-use super::input::Input;
 use super::stdio::DONE;
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -118,7 +117,7 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     }
     let body = match &asked.body {
         Some(name) => load_body(name)?,
-        None => Input::named(&asked)?.body(&asked)?,
+        None => super::scene::input(&asked)?.body(&asked)?,
     };
     let set = FieldSet::new(&body)?;
     let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));

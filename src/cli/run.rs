@@ -15,14 +15,14 @@ use somatic::{Error, Result};
 use self::console::Console;
 use self::prepared::Prepared;
 use super::describe::describe;
-use super::files::FilesRead;
-use super::input::Input;
 use super::interrupt::stop_on_signal;
 #[cfg(unix)]
 use super::keys::Keys;
 use super::live::View;
-use super::scene::{Asked, LIVE, RunFlags, grouped};
+use super::scene::{LIVE, RunFlags, grouped, input};
 use super::stdio::{DONE, FAILED, print, say, say_lines, tell_losses};
+use somatic::setup::FilesRead;
+use somatic::setup::Setup;
 
 const FIRST_EXAMPLES: &str = "\
 Examples:
@@ -100,7 +100,7 @@ struct Reserved {
 
 impl Arguments {
     /// Checks and reserves what `asked` has written, before anything is read.
-    fn reserve(&self, asked: &Asked) -> Result<Reserved> {
+    fn reserve(&self, asked: &Setup) -> Result<Reserved> {
         let sinks = &asked.sinks;
         let table = asked.tables(self.wide).on_stdout(self.table)?;
         if self.table.is_some() && !sinks.iter().any(SinkSpec::is_table_on_stdout) {
@@ -129,7 +129,7 @@ impl Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
-    let input = Input::named(&asked)?;
+    let input = input(&asked)?;
     let Reserved { targets, summary } = arguments.reserve(&asked)?;
     let view = View::choose(asked.quiet, asked.sinks.iter().any(SinkSpec::is_on_stdout), input.is_recording());
     let prepared = Prepared::open(&asked, &input, view.is_table(), summary, arguments.lasts.as_deref())?;

@@ -1,28 +1,26 @@
 //! What commands are asked to do: flags laid over a scene file.
 
-mod calibrated;
 mod flags;
 mod in_flags;
-mod jointed;
 mod outputs;
 mod run_flags;
 
-use std::ops::Deref;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use somatic::Result;
 use somatic::scene::file::SceneFile;
+use somatic::setup::{Input, Setup, Tell};
 use somatic::source::SourceSpec;
-use somatic::{Body, Options, Result};
 
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
-pub(super) use self::in_flags::in_flags;
+pub(super) use self::in_flags::{in_flags, words_of_flags};
 pub(super) use self::outputs::{output, outputs_help, outputs_or_usual};
 pub(super) use self::run_flags::RunFlags;
-use super::first_source::FirstSource;
+use super::stdio::{check_input, say};
 
 impl RunFlags {
     /// What these flags and the scene file at `scene` ask for together; a flag comes before a key.
-    pub(super) fn with(&self, scene: Option<&Path>) -> Result<Asked> {
+    pub(super) fn with(&self, scene: Option<&Path>) -> Result<Setup> {
         let file = scene.map(SceneFile::load).transpose()?.unwrap_or_default();
         let laid = self.over(file.clone()).and_then(|laid| laid.check().map(|()| laid));
         let laid = laid.map_err(|error| match scene {
@@ -31,44 +29,25 @@ impl RunFlags {
             Some(path) => in_flags(error).at(path.display()),
             None => in_flags(error),
         });
-        laid.map(Asked::from)
+        laid.map(set_up)
     }
 }
 
-/// What a command is asked to do, and what was found out of its first source.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Asked {
-    scene: SceneFile,
-    pub(super) first: FirstSource,
+/// What `scene` asks for; what is found out is said in the words of flags.
+pub(super) fn set_up(scene: SceneFile) -> Setup {
+    Setup::new(scene, said())
 }
 
-impl From<SceneFile> for Asked {
-    fn from(scene: SceneFile) -> Self {
-        Self { scene, first: FirstSource::default() }
-    }
+/// Says what is told, in the words of flags.
+pub(super) fn said() -> Tell {
+    Tell::new(|text| say(&words_of_flags(text)))
 }
 
-impl Deref for Asked {
-    type Target = SceneFile;
-
-    fn deref(&self) -> &SceneFile {
-        &self.scene
+/// The input that `asked` names, if standard input can be read where it is that.
+pub(super) fn input(asked: &Setup) -> Result<Input> {
+    let input = Input::named(asked)?;
+    if input.spec.as_ref().is_some_and(SourceSpec::is_stdin) {
+        check_input()?;
     }
-}
-
-impl Asked {
-    /// The recording whose body and calibration are used, which is so where no body is named.
-    pub(super) fn recording(&self) -> Option<&PathBuf> {
-        match self.sources.first() {
-            Some(SourceSpec::Mcap(path)) if self.body.is_none() => Some(path),
-            _ => None,
-        }
-    }
-
-    /// The engine's options on `body`, whose taxels have `ids`, for calls of `batch` frames.
-    pub(super) fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
-        let calibration = self.calibration_for(body, ids)?;
-        let is_placed = self.body.is_some() || !self.outputs.is_empty() || self.export_is_placed()?.unwrap_or(true);
-        self.engine_options(calibration, is_placed, batch)
-    }
+    Ok(input)
 }

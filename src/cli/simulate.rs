@@ -7,8 +7,8 @@ use somatic::source::{SimulatedSource, write_recording_with_progress};
 use somatic::{Error, Result};
 
 use super::bar::Bar;
-use super::files::FilesRead;
 use super::stdio::{DONE, say};
+use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -16,15 +16,14 @@ use self::measured::{Tested, in_words, measure_options, missed, played, recordin
 use self::settled::driver;
 pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
-use super::bodies::load_body;
-use super::files::FilesRead;
-use super::input::Input;
 use super::interrupt::stop_soon_on_signal;
 use super::plot_file::PlotFile;
 use super::scene::{RunFlags, first, grouped};
 use super::stdio::{DONE, FAILED, print, say};
 use super::table::{plain, shown};
 use super::words::{count, number, one_line, title};
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -102,7 +101,7 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         (Some(path), true) => Some((path, OutputPath::edit(path)?)),
         _ => None,
     };
-    let input = if asked.sources.is_empty() { None } else { Some(Input::named(&asked)?) };
+    let input = if asked.sources.is_empty() { None } else { Some(super::scene::input(&asked)?) };
     if input.as_ref().is_some_and(|input| !input.is_recording()) {
         return Err(Error::usage("a trade is measured on a recording or a simulation; name one as --source"));
     }

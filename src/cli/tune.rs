@@ -13,12 +13,12 @@ use somatic::signal::{FsrCircuit, Wiring};
 use somatic::{Error, Result};
 
 use self::session::{PhaseEnd, PhaseLimit, TuningSession};
-use super::bodies::load_body;
 use super::calibrate::name_of;
-use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
 use super::ports::LineFlags;
 use super::stdio::{DONE, FAILED, print, say};
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -5,19 +5,31 @@
 //! too: [`Run`] hands them to each [`Sink`], a sink makes lines, rows or messages of them, and [`output`](crate::output) writes these.
 
 mod feed;
+#[cfg(feature = "scenes")]
+mod opened;
 mod repeats;
 mod serve;
 mod unfit;
 
 use std::time::{Duration, Instant};
 
-pub use self::feed::{Arrival, Ending, Feed, FrameInfo, ReadMode};
+#[doc(hidden)]
+pub use self::feed::Arrival;
+pub use self::feed::{Ending, Feed, FrameInfo, ReadMode};
+#[cfg(feature = "scenes")]
+#[doc(hidden)]
+pub use self::opened::{Opened, Pace};
+#[doc(hidden)]
 pub use self::repeats::Repeats;
 use self::serve::Sinks;
 use self::unfit::UnfitReport;
 use crate::error::Result;
+#[cfg(feature = "scenes")]
+pub use crate::setup::Tell;
 use crate::signal::Frame;
 use crate::sink::{InputFrames, News, Question, Sink};
+#[cfg(any(feature = "serial", feature = "zenoh"))]
+use crate::source::Lines;
 use crate::{Agreement, Engine, EngineState};
 
 /// How long a run waits for frames before it looks at other things.
@@ -65,6 +77,8 @@ pub trait Observer {
     fn turned(&mut self) {}
 }
 
+impl Observer for () {}
+
 /// How a run goes.
 #[derive(Clone, Debug, Default)]
 pub struct RunOptions {
@@ -93,6 +107,9 @@ pub struct Run {
     progress: Option<f64>,
     /// Frames that were processed.
     frames: u64,
+    /// Boards or limbs whose messages nobody else reads.
+    #[cfg(any(feature = "serial", feature = "zenoh"))]
+    lines: Option<Lines>,
 }
 
 /// What became of a run.
@@ -126,6 +143,8 @@ impl Run {
             heeds_stale: options.tracks_stale,
             progress: None,
             frames: 0,
+            #[cfg(any(feature = "serial", feature = "zenoh"))]
+            lines: None,
             options,
         }
     }
@@ -155,6 +174,10 @@ impl Run {
                 // Nothing comes, but something may be held back.
                 None if self.options.is_live => self.sinks.each(observer, |sink| sink.flush())?,
                 None | Some(Arrival::Woken) => {}
+            }
+            #[cfg(any(feature = "serial", feature = "zenoh"))]
+            for notice in self.lines.iter().flat_map(Lines::notices) {
+                observer.remark(Remark::Note, &notice.text);
             }
             if let Some((lines, read_at)) = observer.percepts_of_limbs() {
                 self.sinks.give_lines(observer, &lines)?;
@@ -225,6 +248,11 @@ impl Run {
     /// An output cannot be completed.
     pub fn finish(mut self, ending: Ending) -> Result<Outcome> {
         let Ending { mut losses, notices, is_early } = ending;
+        #[cfg(any(feature = "serial", feature = "zenoh"))]
+        if let Some(lines) = &self.lines {
+            lines.close();
+            losses = lines.losses();
+        }
         let mut absent = Vec::new();
         for sink in self.sinks.open {
             match is_early {
@@ -252,6 +280,7 @@ impl Run {
 
 /// What is said of a recording that was left before its end: after so many frames, the last one at `t_s`; and of files that are not
 /// there for this reason.
+#[doc(hidden)]
 #[must_use]
 pub fn left_out(recording: &str, frames: u64, t_s: f64, progress: Option<f64>, absent: &[String]) -> String {
     let mut text = match frames {

@@ -69,7 +69,26 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("picture", vec!["error", "percept", "signal", "body", "field", "backend", "engine", "ink", "colours"]),
         ("figure", vec!["error", "ink"]),
         ("plot", vec!["error", "percept", "signal", "body", "field", "engine", "ink", "colours"]),
-        ("run", vec!["error", "percept", "signal", "engine", "source", "sink"]),
+        (
+            "run",
+            vec!["error", "percept", "signal", "body", "engine", "source", "sink", "output", "scene_file", "setup"],
+        ),
+        (
+            "setup",
+            vec![
+                "error",
+                "body",
+                "bundled",
+                "engine",
+                "limits",
+                "output",
+                "recording",
+                "robot",
+                "scene_file",
+                "signal",
+                "source",
+            ],
+        ),
         ("scene_file", [&below_backend[..], &["backend", "bundled", "engine", "touch", "source", "sink"]].concat()),
     ])
 }

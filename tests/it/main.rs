@@ -41,6 +41,7 @@ mod paths;
 mod properties;
 mod real;
 mod recordings;
+mod scene_runs;
 // The skins of `somatic bench`.
 mod drift;
 mod simulated;

@@ -11,13 +11,13 @@ use somatic::expected::{ComparedLayouts, LayoutErrors, TestTouches, compare_layo
 use somatic::{Error, Result};
 
 use super::compare_figure::figure;
-use crate::cli::bodies::load_body;
 use crate::cli::expected;
-use crate::cli::files::FilesRead;
 use crate::cli::plot_file::PlotFile;
 use crate::cli::stdio::{DONE, print};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, millimetres, span, spread, title};
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 
 const HEADING: &str = "Two layouts side by side";
 

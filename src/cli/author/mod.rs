@@ -22,8 +22,8 @@ use self::report::{summary, text};
 use self::skin::SkinArguments;
 use super::bar::Bar;
 use super::expected;
-use super::files::FilesRead;
 use super::stdio::{DONE, print};
+use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

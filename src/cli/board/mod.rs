@@ -17,12 +17,12 @@ use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
 
 use self::station::{LineSettings, Station};
-use super::bodies::load_body;
-use super::files::FilesRead;
 use super::interrupt::stop_on_signal;
 use super::stdio::{DONE, print};
 use super::words;
 use somatic::run::{Arrival, Feed, ReadMode};
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:

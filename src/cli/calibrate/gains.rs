@@ -11,12 +11,12 @@ use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
 
 use crate::cli::bar::Bar;
-use crate::cli::bodies::in_body;
 use crate::cli::interrupt::stop_soon_on_signal;
 use crate::cli::stdio::{print, say, tell_losses};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, count};
 use somatic::run::left_out;
+use somatic::setup::bodies::in_body;
 
 /// Frames that are taken at once.
 const BATCH: usize = 256;

@@ -6,10 +6,10 @@ use somatic::tradeoff::{Combination, ladder};
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result, TouchOutputs, touch};
 
 use super::timed::{Played, measured, pressed};
-use crate::cli::input::{Input, RECORDED_BATCH};
-use crate::cli::scene::Asked;
 use crate::cli::tradeoff::{Settled, settled};
 use crate::cli::words::count;
+use somatic::setup::Setup;
+use somatic::setup::{Input, RECORDED_BATCH};
 
 /// What a scene costs.
 pub(super) struct Bill {
@@ -50,7 +50,7 @@ pub(super) struct Measured {
 }
 
 impl Bill {
-    pub(super) fn of(asked: &Asked, input: Option<&Input>, body: &Body) -> Result<Self> {
+    pub(super) fn of(asked: &Setup, input: Option<&Input>, body: &Body) -> Result<Self> {
         let recorded = input.filter(|input| input.is_recording());
         let gather = recorded.is_some() && asked.playback_speed.is_none();
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
@@ -115,7 +115,7 @@ impl Bill {
 
 /// The frames that `engines` are measured on, and what they are, in words.
 fn played(
-    asked: &Asked,
+    asked: &Setup,
     recorded: Option<&Input>,
     body: &Body,
     batch: usize,

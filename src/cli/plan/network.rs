@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use somatic::sink::{FieldNames, SinkSpec, SkinNames, limb_frame_bytes, limb_percept_bytes};
 use somatic::{Body, Engine, Frame, Result};
 
-use crate::cli::scene::Asked;
+use somatic::setup::Setup;
 
 /// Bytes that a limb sends, without those of Zenoh and of the network.
 pub(super) struct Network {
@@ -17,7 +17,7 @@ pub(super) struct Network {
 impl Network {
     /// On `body`, of `calls`, which `engine` makes percepts of, if they go over a network. Whether their times are real is `is_recorded`.
     pub(super) fn of(
-        (asked, body): (&Asked, &Body),
+        (asked, body): (&Setup, &Body),
         engine: &mut Engine,
         calls: &[Vec<Frame>],
         is_recorded: bool,

@@ -10,9 +10,8 @@ use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
 
 use super::super::bar::Bar;
-use super::super::input::Input;
-use super::super::scene::Asked;
 use super::super::stdio::say;
+use somatic::setup::Setup;
 
 /// Endings of recordings, which bodies do not have.
 const RECORDINGS: [&str; 7] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv"];
@@ -47,7 +46,7 @@ pub(super) struct Flags {
 
 impl Flags {
     /// What is shown: the body `named`, with the source if there is one; or a recording of that name with its own body.
-    pub(super) fn asked(&self, named: Option<&str>) -> Result<Asked> {
+    pub(super) fn asked(&self, named: Option<&str>) -> Result<Setup> {
         let is_recording = |name: &&str| {
             let ending = Path::new(name).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
             name.starts_with("sim:") || ending.is_some_and(|ending| RECORDINGS.contains(&&*ending))
@@ -70,13 +69,13 @@ impl Flags {
         let mut scene = SceneFile::default();
         scene.sources = sources.iter().map(|source| source.parse()).collect::<Result<_>>()?;
         (scene.body, scene.calibration) = (body, self.calibration.clone());
-        Ok(scene.into())
+        Ok(crate::cli::scene::set_up(scene))
     }
 
     /// A PNG of `body` with the touch that is `asked` for.
     pub(super) fn draw(
         &self,
-        asked: &Asked,
+        asked: &Setup,
         body: &Body,
         fields: &[Field],
         options: &Options,
@@ -98,7 +97,7 @@ impl Flags {
             return TouchPicture::new(body, fields, options, ids)?.draw(&moment)?.png();
         }
         let channels: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        let input = Input::named(asked)?;
+        let input = crate::cli::scene::input(asked)?;
         if !input.is_recording() {
             return Err(Error::usage("a picture is of a recording; record the touch first").at(&input.name));
         }

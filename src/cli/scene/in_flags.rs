@@ -20,7 +20,8 @@ pub(in crate::cli) fn in_flags(error: Error) -> Error {
     }
 }
 
-fn words_of_flags(text: &str) -> String {
+/// `text` with flags in the place of keys.
+pub(in crate::cli) fn words_of_flags(text: &str) -> String {
     let command = RunFlags::augment_args(Command::new("run"));
     let flag_of = |key: &str| command.get_arguments().find(|flag| flag.get_id() == key)?.get_long();
     let mut parts = text.split('`');

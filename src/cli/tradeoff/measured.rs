@@ -7,10 +7,10 @@ use somatic::tradeoff::{
 };
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use crate::cli::input::{Input, RECORDED_BATCH};
 use crate::cli::plan::pressed;
-use crate::cli::scene::Asked;
 use crate::cli::words::number;
+use somatic::setup::Setup;
+use somatic::setup::{Input, RECORDED_BATCH};
 
 /// What `pick` misses of `target`, which nothing grants.
 pub(super) fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {
@@ -32,7 +32,7 @@ pub(super) fn software() -> Option<String> {
     None
 }
 
-pub(super) fn measure_options(asked: &Asked, options: &Options, seconds: f64) -> Result<MeasureOptions> {
+pub(super) fn measure_options(asked: &Setup, options: &Options, seconds: f64) -> Result<MeasureOptions> {
     let backends = match options.backend {
         BackendKind::Auto if software().is_some() => vec![BackendKind::Cpu],
         BackendKind::Auto => vec![BackendKind::Cpu, BackendKind::Gpu],
@@ -46,7 +46,7 @@ pub(super) fn measure_options(asked: &Asked, options: &Options, seconds: f64) ->
 }
 
 /// The first frames of `input`, up to `most`, and the truth where it knows it.
-pub(super) fn played(input: &Input, asked: &Asked, body: &Body, most: usize) -> Result<TestFrames> {
+pub(super) fn played(input: &Input, asked: &Setup, body: &Body, most: usize) -> Result<TestFrames> {
     let mut played = TestFrames { source: input.name.clone(), ..TestFrames::default() };
     fn next(played: &mut TestFrames, source: &mut dyn Source) -> Result<bool> {
         if played.frames.is_empty() {

@@ -5,9 +5,9 @@ use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report,
 use somatic::{BackendKind, Body, Error, Options, Result};
 
 use super::measured::{Tested, in_words, made_up, measure_options, missed, played, software};
-use crate::cli::input::Input;
-use crate::cli::scene::Asked;
 use crate::cli::stdio::say;
+use somatic::setup::Input;
+use somatic::setup::Setup;
 
 /// Seconds of a brief measurement, and its frames.
 const BRIEF_S: f64 = 1.0;
@@ -31,7 +31,7 @@ pub(super) fn driver() -> String {
 }
 
 /// The options of `asked` for `body` and calls of `batch` frames, with what it leaves open settled.
-pub(in crate::cli) fn settled(asked: &Asked, input: Option<&Input>, body: &Body, batch: usize) -> Result<Settled> {
+pub(in crate::cli) fn settled(asked: &Setup, input: Option<&Input>, body: &Body, batch: usize) -> Result<Settled> {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(body, &ids, batch)?;
     let target = asked.accuracy.target();

@@ -30,12 +30,12 @@ use self::recording::Recording;
 use self::shared::Shared;
 use self::subject::{Subject, subject};
 use super::browser;
-use super::input::Input;
 use super::interrupt::stop_soon_on_signal;
-use super::scene::{Asked, LIVE, RunFlags, grouped};
+use super::scene::{LIVE, RunFlags, grouped, input};
 use super::stdio::{DONE, LOST, say};
 use super::tradeoff::settled;
 use super::words;
+use somatic::setup::Setup;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -201,8 +201,8 @@ impl Opening<'_> {
     }
 
     /// A recording, from its first frame on.
-    fn recording(&self, asked: &Asked) -> Result<u8> {
-        let input = Input::named(asked)?;
+    fn recording(&self, asked: &Setup) -> Result<u8> {
+        let input = input(asked)?;
         if !input.is_recording() {
             return Err(Error::usage("live frames are for `somatic run --sink page`").at(&input.name));
         }

@@ -5,15 +5,16 @@ use std::path::Path;
 use somatic::source::{BagName, SimulatedSource};
 use somatic::{Body, Error, Result, bundled};
 
-use super::super::bodies::load_body;
-use super::super::scene::{Asked, RunFlags};
+use super::super::scene::RunFlags;
+use somatic::setup::Setup;
+use somatic::setup::bodies::load_body;
 
 /// What is shown.
 pub(super) enum Subject {
     /// A body at rest.
     Body(Body),
     /// A recording, with all that is asked of it.
-    Recording(Box<Asked>),
+    Recording(Box<Setup>),
 }
 
 /// What `what` names, with the flags `asked`.

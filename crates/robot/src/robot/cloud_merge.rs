@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 
 use crate::signal::{Frame, FrameTime, RawValue};
-use crate::source::send_rate::{DEFAULT_PERIOD_S, max_age_s, takes_over, updated_period_s, wait_s};
+use crate::source::send_rate::{DEFAULT_PERIOD_S, leader, max_age_s, updated_period_s, wait_s};
 
 /// How far a recorder may take clouds out of the order of their stamps, s.
 const MAX_DISORDER_S: f64 = 0.5;
@@ -204,13 +204,8 @@ impl CloudMerge {
         self.waiting -= 1;
         let time = cloud.time;
         self.topics[topic].take(cloud);
-        let leads =
-            match self.leader.map(|leader| (leader, &self.topics[leader])) {
-                Some((leader, own)) if own.is_sending(time) => {
-                    if takes_over(self.topics[topic].period_s, own.period_s) { topic } else { leader }
-                }
-                _ => topic,
-            };
+        let is_sending = |leader: usize| self.topics[leader].is_sending(time);
+        let leads = leader(self.leader, topic, is_sending, |topic| self.topics[topic].period_s);
         self.leader = Some(leads);
         if leads == topic {
             self.due.get_or_insert(time);

@@ -35,7 +35,15 @@ pub fn updated_period_s(period_s: f64, step_s: f64) -> f64 {
     if is_period { period_s + STEP_SHARE * (step_s - period_s) } else { period_s }
 }
 
-/// Whether what sends every `period_s` takes over the pace from a leader that sends every `leader_s`.
-pub fn takes_over(period_s: f64, leader_s: f64) -> bool {
-    period_s < TAKEOVER_SHARE * leader_s
+/// Which of several senders sets the pace after a frame of `sender`: the `leader` as long as it sends, unless `sender` is clearly faster.
+pub fn leader(
+    leader: Option<usize>,
+    sender: usize,
+    is_sending: impl Fn(usize) -> bool,
+    period_s: impl Fn(usize) -> f64,
+) -> usize {
+    match leader {
+        Some(leader) if is_sending(leader) && period_s(sender) >= TAKEOVER_SHARE * period_s(leader) => leader,
+        _ => sender,
+    }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::clock::Clock;
 use crate::signal::{Frame, RawValue};
-use crate::source::send_rate::{DEFAULT_PERIOD_S, TAKEOVER_SHARE, max_age_s, takes_over, updated_period_s, wait_s};
+use crate::source::send_rate::{DEFAULT_PERIOD_S, TAKEOVER_SHARE, leader, max_age_s, updated_period_s, wait_s};
 
 /// Period of frames without values while all boards are silent, s.
 const SILENT_PERIOD_S: f64 = 0.1;
@@ -182,13 +182,8 @@ impl Merge {
 
     /// The board that sets the pace after a frame of `board`.
     fn lead(&mut self, board: usize, now_s: f64) -> usize {
-        let leads = match self.leader {
-            Some(leader) if self.boards[leader].is_sending(now_s, self.max_age_s) => {
-                let (own, theirs) = (self.boards[board].period_s, self.boards[leader].period_s);
-                if takes_over(own, theirs) { board } else { leader }
-            }
-            _ => board,
-        };
+        let is_sending = |leader: usize| self.boards[leader].is_sending(now_s, self.max_age_s);
+        let leads = leader(self.leader, board, is_sending, |board| self.boards[board].period_s);
         self.leader = Some(leads);
         leads
     }

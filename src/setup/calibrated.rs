@@ -2,18 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use somatic::limits::{self, MAX_TOML_BYTES};
-use somatic::source::{SimulatedSource, SourceSpec};
-use somatic::{Body, Calibration, Error, Result};
+use super::overlaid::{How, overlaid};
+use super::{Setup, attached};
+use crate::body::Body;
+use crate::error::{Error, Result};
+use crate::limits::{self, MAX_TOML_BYTES};
+use crate::signal::Calibration;
+use crate::source::{SimulatedSource, SourceSpec};
 
-use super::Asked;
-use crate::cli::attached;
-use crate::cli::overlaid::{How, overlaid};
-
-impl Asked {
+impl Setup {
     /// The calibration that comes with what is read, as the text of a file, and what it comes with: a simulation and an export
     /// have one, and a recording may, which is used with its body.
-    pub(in crate::cli) fn own_calibration(&self) -> Result<Option<(PathBuf, String)>> {
+    pub(crate) fn own_calibration(&self) -> Result<Option<(PathBuf, String)>> {
         match self.first_source()? {
             Some(SourceSpec::Sim(path)) => {
                 let text = SimulatedSource::open(&path)?.calibration();
@@ -23,12 +23,12 @@ impl Asked {
             _ => {}
         }
         let Some(recording) = self.recording() else { return Ok(None) };
-        Ok(attached::calibration(recording, self.quiet)?.map(|text| (recording.clone(), text)))
+        Ok(attached::calibration(recording, &self.tell)?.map(|text| (recording.clone(), text)))
     }
 
     /// The text of the calibration that is used, and what it comes with: the named one, laid over the own one of an export or
     /// a recording. A simulation's own is replaced.
-    pub(in crate::cli) fn calibration_text(&self) -> Result<Option<(PathBuf, String)>> {
+    pub(crate) fn calibration_text(&self) -> Result<Option<(PathBuf, String)>> {
         let Some(path) = &self.calibration else { return self.own_calibration() };
         let given = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         Ok(Some((path.clone(), self.over_own(path, given)?)))
@@ -38,7 +38,7 @@ impl Asked {
     fn over_own(&self, path: &Path, given: String) -> Result<String> {
         let Some((of, own)) = self.own_calibration()? else { return Ok(given) };
         let is_replaced = matches!(self.first_source()?, Some(SourceSpec::Sim(_)));
-        let laid = overlaid(&of, &own, path, &given, if is_replaced { How::Replaced } else { How::Laid }, self.quiet)?;
+        let laid = overlaid(&of, &own, path, &given, if is_replaced { How::Replaced } else { How::Laid }, &self.tell)?;
         Ok(if is_replaced { given } else { laid })
     }
 
@@ -62,8 +62,10 @@ impl Asked {
         };
         if let (Some(calibration), [source @ SourceSpec::Sim(_)]) = (&calibration, &self.sources[..]) {
             calibration.check_body(&body.name).map_err(|_| {
-                let what =
-                    format!("it is on another body than `{}`; leave --body out, or change its key `body`", body.name);
+                let what = format!(
+                    "it is on another body than `{}`; leave `body` out, or change that of the simulation",
+                    body.name
+                );
                 Error::usage(what).at(source)
             })?;
         }

@@ -4,13 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use somatic::source::{Source as _, SourceSpec, TextSource, VendorOptions, VendorSource};
-use somatic::{Error, Result};
-
-use super::stdio::say;
+use super::Tell;
+use crate::error::{Error, Result};
+use crate::source::{Source as _, SourceSpec, TextSource, VendorOptions, VendorSource};
 
 /// The source `text` as one of `kinds`, and what its content says that it is.
-pub(super) fn source_of(text: &str, kinds: &[&str], options: &VendorOptions) -> Result<SourceSpec> {
+pub fn source_of(text: &str, kinds: &[&str], options: &VendorOptions) -> Result<SourceSpec> {
     with_content(SourceSpec::one_of(text, kinds)?, options)
 }
 
@@ -89,12 +88,12 @@ impl fmt::Debug for FirstSource {
 
 impl Found {
     /// The lines of text, listened to if the source is such. What they were taken for is said at once, before a table fills the terminal,
-    /// unless `quiet`.
-    pub(super) fn text(&mut self, quiet: bool) -> Result<Option<&mut Text>> {
+    /// to whoever is told.
+    pub(super) fn text(&mut self, tell: &Tell) -> Result<Option<&mut Text>> {
         if let (SourceSpec::Text(place), None) = (&self.spec, &self.lines) {
             self.spec.check_options(&self.options)?;
-            let mut source = TextSource::open(place, &self.options, &mut |what| say(what))?;
-            source.notices().iter().filter(|_| !quiet).for_each(|notice| say(notice));
+            let mut source = TextSource::open(place, &self.options, &mut |what| tell.say(what))?;
+            source.notices().iter().for_each(|notice| tell.say(notice));
             let (body, about_body) = (source.body(), source.about_body());
             self.lines = Some(Text { body, about_body, source: Some(Box::new(source)) });
         }

@@ -2,18 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use somatic::Body;
-use somatic::output::OutputPaths;
-use somatic::scene::file::{SceneFile, StatesSpec};
-use somatic::source::{BagName, SimulatedSource, SourceSpec};
+use crate::body::Body;
+use crate::output::OutputPaths;
+use crate::scene_file::{SceneFile, StatesSpec};
+use crate::source::{BagName, SimulatedSource, SourceSpec};
 
 /// Files that a command reads, whether they are there or not.
-#[derive(Default)]
-pub(super) struct FilesRead(Vec<PathBuf>);
+#[derive(Debug, Default)]
+pub struct FilesRead(Vec<PathBuf>);
 
 impl FilesRead {
     /// Those of `asked`, by flags or by the scene file at `scene`.
-    pub(super) fn of(asked: &SceneFile, scene: Option<&Path>) -> Self {
+    pub fn of(asked: &SceneFile, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
         let named = named.chain(asked.layout.as_deref());
         let named = named.chain(asked.joints.as_deref()).chain(asked.zenoh_config.as_deref());
@@ -25,12 +25,12 @@ impl FilesRead {
         }
     }
 
-    pub(super) fn files(mut self, paths: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
+    pub fn files(mut self, paths: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
         self.0.extend(paths.into_iter().map(|path| path.as_ref().to_owned()));
         self
     }
 
-    pub(super) fn bodies<'a>(self, names: impl IntoIterator<Item = &'a String>) -> Self {
+    pub fn bodies<'a>(self, names: impl IntoIterator<Item = &'a String>) -> Self {
         self.files(names.into_iter().flat_map(Body::files))
     }
 
@@ -41,13 +41,13 @@ impl FilesRead {
     }
 
     /// The files of sources that are named so; an invalid one is reported when it is opened.
-    pub(super) fn named(self, sources: &[String]) -> Self {
+    pub fn named(self, sources: &[String]) -> Self {
         let sources: Vec<SourceSpec> = sources.iter().filter_map(|source| source.parse().ok()).collect();
         self.sources(&sources)
     }
 
     /// The files of `sources`.
-    pub(super) fn sources(self, sources: &[SourceSpec]) -> Self {
+    pub fn sources(self, sources: &[SourceSpec]) -> Self {
         sources.iter().fold(self, |files, source| match source {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => files.files([path]),
             SourceSpec::Ros2Mcap(bag) => files.bag(bag),
@@ -58,7 +58,7 @@ impl FilesRead {
     }
 
     /// Checks for every output of the command.
-    pub(super) fn outputs(self, force: bool) -> OutputPaths {
+    pub fn outputs(self, force: bool) -> OutputPaths {
         OutputPaths::new(force, self.0)
     }
 }

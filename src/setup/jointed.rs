@@ -1,18 +1,16 @@
 //! Joints that move the body's links.
 
-use somatic::body::Up;
-use somatic::robot::{DelayEstimate, JointOptions, JointedSource, Kinematics};
-use somatic::scene::file::{JointsDelay, StatesSpec};
-use somatic::source::{JointStates, Source, SourceSpec};
-use somatic::{Body, Error, Result};
-
-use super::{Asked, in_flags};
-use crate::cli::stdio::say;
+use super::Setup;
+use crate::body::{Body, Up};
+use crate::error::{Error, Result};
+use crate::robot::{DelayEstimate, JointOptions, JointedSource, Kinematics};
+use crate::scene_file::{JointsDelay, StatesSpec};
+use crate::source::{JointStates, Source, SourceSpec};
 
 /// What is added where nothing says which axis points up in the URDF.
-const Z_IS_ASSUMED: &str = "; its z is taken as up, as REP 103 has it: where its y is up, give --up y";
+const Z_IS_ASSUMED: &str = "; its z is taken as up, as REP 103 has it: where its y is up, give `up = \"y\"`";
 
-impl Asked {
+impl Setup {
     /// The delay to go by, s, where the joints come from `states`; an estimate is said.
     fn delay_s(&self, states: Option<&StatesSpec>) -> Result<f64> {
         match self.joints_delay_s {
@@ -22,28 +20,24 @@ impl Asked {
                 let (Some(StatesSpec::Bag(joints)), Some(SourceSpec::Ros2Mcap(frames))) =
                     (states, self.sources.first())
                 else {
-                    return Err(Error::usage("--joints-delay auto is for frames and joint states from one bag"));
+                    return Err(Error::usage(
+                        "`joints_delay_s = \"auto\"` is for frames and joint states from one bag",
+                    ));
                 };
                 let estimate = DelayEstimate::of_bags(frames, joints)?;
-                if !self.quiet {
-                    say(&format!("{}: {estimate}", joints.path.display()));
-                }
+                self.tell.say(&format!("{}: {estimate}", joints.path.display()));
                 Ok(estimate.delay_s())
             }
         }
     }
 
     /// `source`, with poses of the links of `body` where joints are asked for.
-    pub(in crate::cli) fn jointed(
-        &self,
-        source: Box<dyn Source + Send>,
-        body: &Body,
-    ) -> Result<Box<dyn Source + Send>> {
+    pub fn jointed(&self, source: Box<dyn Source + Send>, body: &Body) -> Result<Box<dyn Source + Send>> {
         let Some(urdf) = &self.joints else { return Ok(source) };
         let known_up = self.up.or_else(|| body.urdf_up());
         let robot = Kinematics::load(urdf)?;
         let mut options = JointOptions::new(known_up.unwrap_or(Up::Z));
-        let states = self.states().map_err(in_flags)?;
+        let states = self.states()?;
         options.delay_s = self.delay_s(states.as_ref())?;
         let source = match states {
             None => source,
@@ -54,9 +48,9 @@ impl Asked {
             Some(StatesSpec::Bag(bag)) => {
                 let failed = |e: Error| match self.joint_states {
                     Some(_) => e,
-                    None => Error::failed(format!("{e}; or give joint states of another file: --joint-states FILE")),
+                    None => Error::failed(format!("{e}; or give joint states of another file: `joint_states`")),
                 };
-                options.states = Some(somatic::robot::joint_states_of_bag(&bag).map_err(failed)?);
+                options.states = Some(crate::robot::joint_states_of_bag(&bag).map_err(failed)?);
                 source
             }
             Some(StatesSpec::File(file)) => {
@@ -66,10 +60,8 @@ impl Asked {
         };
         options.max_age_s = self.joints_max_age_s.unwrap_or(options.max_age_s);
         let jointed = JointedSource::new(source, robot, body, options).map_err(|e| e.at(urdf.display()))?;
-        if !self.quiet {
-            let assumed = if known_up.is_none() { Z_IS_ASSUMED } else { "" };
-            say(&format!("{}: {}{assumed}", urdf.display(), jointed.summary()));
-        }
+        let assumed = if known_up.is_none() { Z_IS_ASSUMED } else { "" };
+        self.tell.say(&format!("{}: {}{assumed}", urdf.display(), jointed.summary()));
         Ok(Box::new(jointed))
     }
 }
@@ -83,7 +75,7 @@ fn live(
     delay_s: Option<f64>,
     is_stamped: bool,
 ) -> Result<Box<dyn Source + Send>> {
-    use somatic::robot::{LiveJoints, StatesTime};
+    use crate::robot::{LiveJoints, StatesTime};
     let time = match delay_s {
         Some(delay_s) => StatesTime::Stamp { delay_s },
         None if is_stamped => StatesTime::Auto,

@@ -2,27 +2,27 @@
 
 use std::path::Path;
 
-use somatic::limits::{self, MAX_TOML_BYTES};
-use somatic::recording::{BODY, CALIBRATION, SCENE};
-use somatic::{Body, Error, Result};
-
+use super::Setup;
 use super::attached::{self, body_bytes, file_name};
-use super::scene::Asked;
+use crate::body::Body;
+use crate::error::{Error, Result};
+use crate::limits::{self, MAX_TOML_BYTES};
+use crate::recording::{BODY, CALIBRATION, SCENE};
 
 /// The files to attach to a recording of this run: name, media type, bytes.
-pub(super) fn attachments(asked: &Asked, body: &Body, scene: Option<&Path>) -> Result<Vec<(String, String, Vec<u8>)>> {
+pub fn attachments(setup: &Setup, body: &Body, scene: Option<&Path>) -> Result<Vec<(String, String, Vec<u8>)>> {
     let text = |path: &Path| limits::read(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e));
-    let recording = asked.recording();
+    let recording = setup.recording();
     let inherited = match recording {
         Some(recording) => attached::body(recording)?,
-        None => asked.export_body()?,
+        None => setup.export_body()?,
     };
     let (name, bytes) = match inherited {
         Some(body) => body,
         None => (file_name(&body.name), body_bytes(&body.name)?),
     };
     let mut files = vec![(name, BODY.to_owned(), bytes)];
-    let calibration = asked.calibration_text()?.map(|(_, text)| text.into_bytes());
+    let calibration = setup.calibration_text()?.map(|(_, text)| text.into_bytes());
     let toml = "application/toml".to_owned();
     files.extend(calibration.map(|bytes| (CALIBRATION.to_owned(), toml.clone(), bytes)));
     if let Some(scene) = scene {

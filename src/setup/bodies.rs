@@ -1,13 +1,14 @@
-//! Bodies by their names on the command line.
+//! Bodies by their names.
 
 use std::path::Path;
 
-use somatic::error::nearest;
-use somatic::source::Source;
-use somatic::{Body, Error, Result, bundled};
+use crate::body::Body;
+use crate::bundled;
+use crate::error::{Error, Result, nearest};
+use crate::source::Source;
 
 /// The ids that `source` delivers, each of which `body` must have.
-pub(super) fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
+pub fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
     match source.taxels().iter().find(|id| !body.taxels.iter().any(|taxel| taxel.id == **id)) {
         Some(id) => Err(Error::failed(format!(
             "the source has taxel {id}, and the body has none of that number; is it for another body?"
@@ -18,7 +19,7 @@ pub(super) fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
 }
 
 /// The body in the file `name`, or the bundled one of that name where there is no such file.
-pub(super) fn load_body(name: &str) -> Result<Body> {
+pub fn load_body(name: &str) -> Result<Body> {
     check_body_name(name)?;
     match bundled::body(name) {
         // A link of this name to a serial port is no body.
@@ -28,7 +29,7 @@ pub(super) fn load_body(name: &str) -> Result<Body> {
 }
 
 /// Refuses a `name` that is neither a file nor a bundled body, but nearly one of those.
-pub(super) fn check_body_name(name: &str) -> Result<()> {
+pub fn check_body_name(name: &str) -> Result<()> {
     let near = nearest(name, bundled::BODIES).filter(|&near| near != name && !Path::new(name).is_file());
     near.map_or(Ok(()), |near| {
         Err(Error::failed(format!("no such file; did you mean the bundled body `{near}`?")).at(name))

@@ -1,0 +1,202 @@
+//! A run before its first frame: its source is open, its engine is made, and nothing is written yet.
+
+use std::path::Path;
+
+use super::{Feed, ReadMode, Run, RunOptions};
+use crate::body::Body;
+use crate::engine::{Engine, Options};
+use crate::error::{Error, Result};
+use crate::percept::Precision;
+use crate::scene_file::SceneFile;
+use crate::setup::{FilesRead, Input, RECORDED_BATCH, Setup, Tell, attachments};
+use crate::signal::{Quantity, Wiring};
+use crate::sink::{FieldNames, Session, Sink, SinkSpec, SinkTarget};
+use crate::source::{Lines, Source};
+
+/// How fast frames come, and how many at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Times the recording's own speed; `None` is as fast as possible.
+    pub speed: Option<f64>,
+    /// Whether calls wait for as many frames as they may have.
+    pub gather: bool,
+    /// Frames of a call at most.
+    pub batch: usize,
+    /// Whether a recording ends: what is played until somebody ends it is never a part.
+    pub ends: bool,
+}
+
+impl Pace {
+    /// As `setup` has it; a recording `is_watched` at its own speed.
+    #[must_use]
+    pub fn of(setup: &Setup, input: &Input, is_watched: bool) -> Self {
+        let is_watched = is_watched || (input.is_recording() && setup.sinks.iter().any(SinkSpec::is_watched));
+        let speed = setup.playback_speed.or(is_watched.then_some(1.0));
+        let gather = input.is_recording() && speed.is_none();
+        let ends = input.is_recording() && setup.repeat != Some(0);
+        let batch = setup.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
+        Self { speed, gather, batch, ends }
+    }
+}
+
+/// All that a run has before its sinks are opened.
+pub struct Opened {
+    /// The robot.
+    pub body: Body,
+    /// Knows the source's taxels.
+    pub engine: Engine,
+    /// Its backend: the name, what it runs on, and why it was chosen.
+    pub backend: [String; 3],
+    /// Where frames come from, with poses where joints are asked for.
+    pub source: Box<dyn Source + Send>,
+    /// Boards or limbs, if these are read.
+    pub lines: Option<Lines>,
+    /// Of boards.
+    pub wiring: Option<Wiring>,
+    /// How fast frames come.
+    pub pace: Pace,
+}
+
+impl Opened {
+    /// Opens what `setup` reads, boards last: they speak as soon as their lines are open, and not before somebody can listen. The
+    /// engine gets `options`, and why its backend was chosen where that is known; they are asked for when a recording is open.
+    ///
+    /// # Errors
+    /// The source or the options are invalid, or do not fit the body.
+    pub fn new(
+        setup: &Setup,
+        input: &Input,
+        body: Body,
+        pace: Pace,
+        options: impl FnOnce(&Body) -> Result<(Options, Option<String>)>,
+    ) -> Result<Self> {
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let recorded = if input.is_merged() { None } else { Some(input.open(&ids, setup)?) };
+        let (options, why) = options(&body)?;
+        setup.line_keys().check_wipers(options.calibration.as_ref(), &ids)?;
+        let mut engine = Engine::new(&body, options)?;
+        engine.keep_touch_taxels(setup.sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_))));
+        let (source, lines, wiring) = match recorded {
+            Some(mut source) => {
+                source.report_stale();
+                (source, None, None)
+            }
+            None => {
+                let opened = input.open_lines(&ids, setup)?;
+                engine.track_stale();
+                opened.wiring.iter().for_each(|wiring| engine.wire(wiring));
+                (opened.source, Some(opened.lines), opened.wiring)
+            }
+        };
+        let source = setup.jointed(source, &body)?;
+        engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
+        let (name, device, own) = engine.backend();
+        let backend = [name.to_owned(), device, why.unwrap_or_else(|| own.to_owned())];
+        Ok(Self { body, engine, backend, source, lines, wiring, pace })
+    }
+
+    /// What sinks are told that are opened for `targets`; a recording has the file `scene` in it.
+    ///
+    /// # Errors
+    /// A file that a recording holds cannot be read.
+    pub fn session<'a>(
+        &'a self,
+        setup: &'a Setup,
+        input: &'a Input,
+        targets: &[SinkTarget],
+        scene: Option<&Path>,
+    ) -> Result<Session<'a>> {
+        let plan = self.engine.plan();
+        let records = targets.iter().any(SinkTarget::holds_attached);
+        let [name, device, why] = &self.backend;
+        Ok(Session {
+            names: FieldNames::all_of(plan),
+            all_fields: setup.all_fields,
+            outputs: self.engine.percepts().outputs(),
+            is_double: self.engine.percepts().precision() == Precision::F64,
+            p_unit: plan.common_quantity().map_or("", Quantity::symbol),
+            header: setup.header,
+            taxels: self.source.taxels(),
+            body: Some(&self.body),
+            attached: if records { attachments(setup, &self.body, scene)? } else { Vec::new() },
+            parts: setup.record.clone(),
+            plan: Some(plan),
+            source: &input.name,
+            backend: [name, device, why],
+            is_recorded: self.pace.ends,
+            wiring: self.wiring.as_ref(),
+            zenoh_config: setup.zenoh_config.as_deref(),
+            ros_time: setup.ros_time.unwrap_or_default(),
+        })
+    }
+
+    /// Starts to read, for `sinks`. Of boards or limbs, somebody else reads the lines.
+    #[must_use]
+    pub fn start(self, sinks: Vec<Box<dyn Sink + Send>>, input: &Input, options: RunOptions) -> Run {
+        let Self { engine, source, lines, pace, .. } = self;
+        let feed = match &lines {
+            None => Feed::start(source, ReadMode { most: pace.batch, gather: pace.gather, speed: pace.speed }),
+            Some(lines) => Feed::start_woken(source, pace.batch, lines),
+        };
+        let options = RunOptions {
+            is_live: !pace.gather,
+            tracks_stale: lines.is_some(),
+            recording: pace.ends.then(|| input.name.clone()),
+            ..options
+        };
+        Run::new(engine, feed, sinks, options)
+    }
+}
+
+impl Run {
+    /// A run of all that `scene` asks for: what it reads is open, and so are its sinks. `tell` gets lines about what was found out.
+    ///
+    /// A recording is played as fast as possible unless the scene says otherwise, and nothing is written where it names no sink.
+    ///
+    /// ```
+    /// use somatic::run::{Run, Tell};
+    /// use somatic::scene::file::SceneFile;
+    ///
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let file = folder.path().join("palm.toml");
+    /// # std::fs::write(&file, "fields = \"hand/palm\"\nsink = \"ndjson:palm.ndjson\"").unwrap();
+    /// let mut run = Run::of(SceneFile::load(&file)?, Tell::new(|line| eprintln!("{line}")))?;
+    /// // `()` watches nothing; an `Observer` of your own sees every call, and may end the run.
+    /// let ending = run.run(&mut (), || false)?;
+    /// let outcome = run.finish(ending)?;
+    /// println!("{} frames, lost: {:?}", outcome.frames, outcome.losses);
+    /// # assert!(outcome.frames > 0 && outcome.losses.is_empty() && folder.path().join("palm.ndjson").exists());
+    /// # Ok::<(), somatic::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Something that the scene names is invalid or not there, an output exists and `overwrite` is not set, or it has `within` or
+    /// `budget`, for which the command measures.
+    pub fn of(scene: SceneFile, tell: Tell) -> Result<Self> {
+        if !scene.accuracy.target().is_empty() {
+            let what = "`within` and `budget` are settled by measurements, which `somatic tradeoff --write` makes; it writes what to give \
+                        in their place";
+            return Err(Error::usage(what));
+        }
+        let setup = Setup::new(scene, tell.clone());
+        let input = Input::named(&setup)?;
+        let mut outputs = FilesRead::of(&setup, None).outputs(setup.overwrite);
+        let table = setup.tables(false);
+        let target = |sink: &SinkSpec| sink.target(&mut outputs, &setup.allow_hosts, table);
+        let targets = setup.sinks.iter().map(target).collect::<Result<Vec<SinkTarget>>>()?;
+        let pace = Pace::of(&setup, &input, false);
+        let options = |body: &Body| {
+            let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+            Ok((setup.options(body, &ids, pace.batch)?, None))
+        };
+        let opened = Opened::new(&setup, &input, input.body(&setup)?, pace, options)?;
+        let session = opened.session(&setup, &input, &targets, None)?;
+        let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<Vec<_>>>()?;
+        sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| tell.say(&remark));
+        let verify = setup.verify;
+        let lines = opened.lines.clone();
+        let mut run = opened.start(sinks, &input, RunOptions { verify, ..RunOptions::default() });
+        run.lines = lines;
+        Ok(run)
+    }
+}
