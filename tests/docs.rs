@@ -251,7 +251,10 @@ fn every_command_about_live_topics_of_ros_2_runs() {
 #[test]
 fn every_command_about_limbs_runs() {
     if cfg!(not(feature = "zenoh")) {
-        skip("ZENOH_FEATURE", "this build has no feature `zenoh`, which the commands of docs/how-to/several-computers.md need");
+        skip(
+            "ZENOH_FEATURE",
+            "this build has no feature `zenoh`, which the commands of docs/how-to/several-computers.md need",
+        );
         return;
     }
     assert!(run_all("```sh zenoh", "") >= 1);

@@ -28,7 +28,10 @@ fn it_writes_the_figures_and_what_the_docs_say() {
         assert!(svg.len() < 150_000 && !svg.contains("NaN"), "{name}: {}", svg.len());
         let shown = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/pictures/paper");
         let shown = std::fs::read_to_string(format!("{shown}/{name}.svg")).unwrap();
-        assert!(svg == shown, "docs/pictures/paper/{name}.svg is out of date, see docs/evidence/paper.md for how it is made");
+        assert!(
+            svg == shown,
+            "docs/pictures/paper/{name}.svg is out of date, see docs/evidence/paper.md for how it is made"
+        );
         let png = std::fs::read(out.join(format!("{name}.png"))).unwrap();
         assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
         let side = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());

@@ -266,7 +266,8 @@ mod tests {
 
     #[test]
     fn the_documentation_has_the_table() {
-        let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/limits.md")).unwrap();
+        let page =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/limits.md")).unwrap();
         let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| ") && line.contains('`')).collect();
         let wanted: Vec<String> =
             TABLE.iter().map(|limit| format!("| {} | {limit} | `{}` |", limit.what, limit.name)).collect();
