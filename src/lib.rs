@@ -7,7 +7,7 @@
 //!
 //! # The way through
 //!
-//! 1. A [`Body`] is read from glTF: links, surfaces, taxels, and the outlines of fields. `docs/layout.md` specifies the
+//! 1. A [`Body`] is read from glTF: links, surfaces, taxels, and the outlines of fields. `docs/reference/layout.md` specifies the
 //!    encoding; [`bundled`] has three bodies to try.
 //! 2. A [`Scene`] says what is wanted of it: which fields, which [`Outputs`]. A [`Calibration`] says how one robot's sensors
 //!    answer, and what of their input is not to be believed.

@@ -92,13 +92,20 @@ fn commands_of(page: &str, begin: &str) -> Vec<String> {
 
 fn pages() -> Vec<PathBuf> {
     let mut pages = vec![root().join("README.md"), root().join("CONTRIBUTING.md"), root().join("bodies/README.md")];
-    for entry in std::fs::read_dir(root().join("docs")).unwrap() {
+    pages_below(&root().join("docs"), &mut pages);
+    pages
+}
+
+/// Adds all pages in `folder` and in the folders below it.
+fn pages_below(folder: &Path, pages: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "md") {
+        if path.is_dir() {
+            pages_below(&path, pages);
+        } else if path.extension().is_some_and(|e| e == "md") {
             pages.push(path);
         }
     }
-    pages
 }
 
 /// A folder such as a reader works in: the project's bodies and docs, and a recording of their own for the mat.
@@ -151,7 +158,7 @@ fn shell(command: &str, folder: &Path) -> Output {
 
 #[test]
 fn the_lines_that_are_shown_are_what_the_commands_above_them_print() {
-    for page in ["README.md", "docs/percepts.md"] {
+    for page in ["README.md", "docs/reference/ndjson.md"] {
         let text = std::fs::read_to_string(root().join(page)).unwrap();
         let (above, rest) = text.split_once("```json\n").unwrap();
         let shown: String = rest.split("```").next().unwrap().lines().collect();
@@ -233,7 +240,7 @@ fn every_command_about_files_made_elsewhere_runs() {
 #[test]
 fn every_command_about_live_topics_of_ros_2_runs() {
     if cfg!(not(feature = "ros2")) {
-        skip("ROS2_FEATURE", "this build has no feature `ros2`, which the commands of docs/ros2.md need");
+        skip("ROS2_FEATURE", "this build has no feature `ros2`, which the commands of docs/how-to/ros2.md need");
         return;
     }
     // A domain in which nobody else is.
@@ -244,7 +251,10 @@ fn every_command_about_live_topics_of_ros_2_runs() {
 #[test]
 fn every_command_about_limbs_runs() {
     if cfg!(not(feature = "zenoh")) {
-        skip("ZENOH_FEATURE", "this build has no feature `zenoh`, which the commands of docs/many-machines.md need");
+        skip(
+            "ZENOH_FEATURE",
+            "this build has no feature `zenoh`, which the commands of docs/how-to/several-computers.md need",
+        );
         return;
     }
     assert!(run_all("```sh zenoh", "") >= 1);

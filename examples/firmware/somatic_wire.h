@@ -1,5 +1,5 @@
 /* The wire of somatic, version 1, for a board's firmware: C99, no allocation, no library but stdint and stddef.
- * docs/wire.md specifies the format; docs/wire/vectors.json has packets to check against. */
+ * docs/reference/wire.md specifies the format; docs/wire/vectors.json has packets to check against. */
 #ifndef SOMATIC_WIRE_H
 #define SOMATIC_WIRE_H
 

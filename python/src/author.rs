@@ -16,7 +16,7 @@ use crate::threads::free;
 /// Puts a skin on a mesh, as `somatic author` does, and gives the body.
 ///
 /// `shape` is a file (.glb, .gltf, .stl, .obj, .dae, .ply or .urdf) or a bundled body. Either `recipe`, the path of a file that
-/// docs/authoring.md describes; or `taxels`, how many, `spacing`, such as '8 mm', or both, on the nodes, meshes or links whose names match
+/// docs/reference/recipe.md describes; or `taxels`, how many, `spacing`, such as '8 mm', or both, on the nodes, meshes or links whose names match
 /// one of the globs `regions`. `unit` says what the file's numbers are: 'um', 'mm', 'cm' or 'm'. `even=False` leaves taxels where they
 /// were scattered, `hidden='keep'` places some where nothing can touch them, and `clear`, such as '5 mm', is their least distance from
 /// where a link, a mesh or the surface ends; without them the recipe's hold. `progress` is called with the share that is done, 0 to 1.

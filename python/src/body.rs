@@ -146,7 +146,7 @@ impl PyField {
 
 #[pymethods]
 impl PyBody {
-    /// Reads the body in the file at `path`: a .glb or .gltf with a layout, as docs/layout.md specifies it.
+    /// Reads the body in the file at `path`: a .glb or .gltf with a layout, as docs/reference/layout.md specifies it.
     ///
     /// >>> import somatic_touch as st
     /// >>> st.Body.load("robot.glb")

@@ -10,7 +10,7 @@ use crate::error::OrRaise;
 
 /// How one robot's sensors answer: baselines, gains, units, and which values to reject.
 ///
-/// `text` is a file as docs/calibration.md describes it, made for `body`.
+/// `text` is a file as docs/reference/calibration.md describes it, made for `body`.
 ///
 /// >>> import somatic_touch as st
 /// >>> body = st.Body.bundled("hand")

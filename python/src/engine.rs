@@ -326,7 +326,7 @@ impl PyEngine {
         told(py, &sum)
     }
 
-    /// Shows in a browser what it computes from now on, on the page of docs/view.md: after each call its last frame.
+    /// Shows in a browser what it computes from now on, on the page of docs/reference/view.md: after each call its last frame.
     ///
     /// Open `url` of the `View` that it gives; it is served until it is closed. `listen` is HOST:PORT, where port 0 is any free one,
     /// by default 127.0.0.1:7879 or the next free port, which this machine alone reaches. Others need one of the names `allow_hosts`.
@@ -370,7 +370,7 @@ impl PyEngine {
         &self.run.backend[0]
     }
 
-    /// What is computed, over how much, and why, as docs/scenes.md describes it.
+    /// What is computed, over how much, and why, as docs/reference/scene.md describes it.
     ///
     /// >>> import somatic_touch as st
     /// >>> plan = st.Engine(st.Body.bundled("hand"), {"outputs": ["centroid"]}, backend="cpu").plan()

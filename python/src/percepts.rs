@@ -232,7 +232,7 @@ impl PyPercepts {
         Ok(PySelfContacts { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
     }
 
-    /// Arrow's C stream of the table that docs/tables.md describes: a row per frame and field in contact.
+    /// Arrow's C stream of the table that docs/how-to/tables.md describes: a row per frame and field in contact.
     #[pyo3(signature = (requested_schema = None))]
     fn __arrow_c_stream__<'py>(
         &self,

@@ -283,7 +283,7 @@ pub(crate) fn open(
 ///
 /// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' is the bundled touch. `body` is the robot, for
 /// recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
-/// after its start. The other keywords are those of docs/recordings-of-others.md.
+/// after its start. The other keywords are those of docs/reference/exports.md.
 ///
 /// >>> import somatic_touch as st
 /// >>> st.read("no-such.csv")

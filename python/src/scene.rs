@@ -10,7 +10,7 @@ use crate::error::{OrRaise, usage};
 
 /// What is asked of a body: which fields, which outputs, with which knobs.
 ///
-/// From keywords, or from the text of a scene file; the keys are those of docs/scenes.md. Keys that are the command's alone,
+/// From keywords, or from the text of a scene file; the keys are those of docs/reference/scene.md. Keys that are the command's alone,
 /// such as `source` and `sink`, are refused.
 ///
 /// >>> import somatic_touch as st

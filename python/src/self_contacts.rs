@@ -104,7 +104,7 @@ impl PySelfContacts {
         self.column(py, 1, |(_, contact), to| to.push(contact.angle))
     }
 
-    /// Arrow's C stream of the table that docs/tables.md describes.
+    /// Arrow's C stream of the table that docs/how-to/tables.md describes.
     #[pyo3(signature = (requested_schema = None))]
     fn __arrow_c_stream__<'py>(
         &self,

@@ -133,7 +133,7 @@ impl PySimulation {
     }
 }
 
-/// Simulates the touches in a TOML file, as docs/simulation.md describes it; its truth is in `.truth`.
+/// Simulates the touches in a TOML file, as docs/reference/simulation.md describes it; its truth is in `.truth`.
 ///
 /// `simulation` is the file's path or its text. `body` takes the place of the one that it names.
 ///

@@ -137,7 +137,7 @@ impl PyTouches {
         })
     }
 
-    /// Arrow's C stream of the table that docs/tables.md describes.
+    /// Arrow's C stream of the table that docs/how-to/tables.md describes.
     #[pyo3(signature = (requested_schema = None))]
     fn __arrow_c_stream__<'py>(
         &self,

@@ -1,5 +1,5 @@
-//! Experiments: the paper's figures from simulation, with a table of errors (`docs/paper.md`), and speed on synthetic bodies
-//! (`docs/performance.md`).
+//! Experiments: the paper's figures from simulation, with a table of errors (`docs/evidence/paper.md`), and speed on synthetic bodies
+//! (`docs/evidence/performance.md`).
 
 mod chart_fit;
 pub mod dump;

@@ -31,7 +31,7 @@ impl Findings {
         Ok(())
     }
 
-    /// The calibration, as `docs/calibration.md` describes it, for the body called `body`. What most sensors share stands
+    /// The calibration, as `docs/reference/calibration.md` describes it, for the body called `body`. What most sensors share stands
     /// under `[all]`, the rest under each taxel.
     #[must_use]
     pub fn calibration(&self, body: &str) -> String {

@@ -26,9 +26,12 @@ fn it_writes_the_figures_and_what_the_docs_say() {
         let svg = std::fs::read_to_string(out.join(format!("{name}.svg"))).unwrap();
         words.iter().for_each(|word| assert!(svg.contains(word), "{name} has no {word}"));
         assert!(svg.len() < 150_000 && !svg.contains("NaN"), "{name}: {}", svg.len());
-        let shown = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/paper");
+        let shown = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/pictures/paper");
         let shown = std::fs::read_to_string(format!("{shown}/{name}.svg")).unwrap();
-        assert!(svg == shown, "docs/paper/{name}.svg is out of date, see docs/paper.md for how it is made");
+        assert!(
+            svg == shown,
+            "docs/pictures/paper/{name}.svg is out of date, see docs/evidence/paper.md for how it is made"
+        );
         let png = std::fs::read(out.join(format!("{name}.png"))).unwrap();
         assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
         let side = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
@@ -36,7 +39,7 @@ fn it_writes_the_figures_and_what_the_docs_say() {
         assert!(png.len() > 20_000, "{name} is nearly empty");
     }
 
-    let docs = include_str!("../../docs/paper.md");
+    let docs = include_str!("../../docs/evidence/paper.md");
     let table = std::fs::read_to_string(out.join("table.md")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| line.starts_with('|')).collect();
     // Two heads of two lines, a row for each indenter and signal, one for each angle.
@@ -46,7 +49,7 @@ fn it_writes_the_figures_and_what_the_docs_say() {
     let ways: Vec<&str> = motion.lines().filter(|line| line.starts_with('|')).collect();
     assert_eq!(ways.len(), 2 + 3);
     for row in rows.into_iter().chain(ways).chain([across]) {
-        assert!(docs.contains(row), "docs/paper.md is out of date, see how it is made there: {row}");
+        assert!(docs.contains(row), "docs/evidence/paper.md is out of date, see how it is made there: {row}");
     }
     let shown =
         docs.split("<!-- table -->").nth(1).and_then(|rest| rest.split("<!-- end of table -->").next()).unwrap();

@@ -149,10 +149,10 @@ fn the_schema_that_is_shipped_is_the_one_that_is_printed() {
     // To make it: somatic plan --schema > docs/scene.schema.json
     assert_eq!(std::fs::read_to_string(path).unwrap(), printed);
     let schema: Value = serde_json::from_str(&printed).unwrap();
-    let documented = include_str!("../../docs/scenes.md");
+    let documented = include_str!("../../docs/reference/scene.md");
     let keys = schema["properties"].as_object().unwrap();
     for (key, says) in keys {
-        assert!(documented.contains(&format!("| `{key}` |")), "docs/scenes.md does not tell of `{key}`");
+        assert!(documented.contains(&format!("| `{key}` |")), "docs/reference/scene.md does not tell of `{key}`");
         assert!(says["description"].is_string(), "{key}");
     }
     let accuracy = schema["$defs"]["Accuracy"]["properties"].as_object().unwrap();

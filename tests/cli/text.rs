@@ -358,7 +358,7 @@ fn text_where_packets_belong_is_named() {
     assert!(said.contains("this is a file, and no port"), "{said}");
 }
 
-/// From the last byte of a line to the percept, of a board with 64 values at 1 kHz: figures of `docs/performance.md`.
+/// From the last byte of a line to the percept, of a board with 64 values at 1 kHz: figures of `docs/evidence/performance.md`.
 #[test]
 #[ignore = "a measurement, of SOMATIC_SOAK_SECONDS, 10 unless set"]
 fn latency_at_a_thousand_frames_a_second() {

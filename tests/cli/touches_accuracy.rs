@@ -1,4 +1,4 @@
-//! The programs that measure how true touches are (`docs/touches.md`, `docs/authoring.md`), on a few presses.
+//! The programs that measure how true touches are (`docs/evidence/touches.md`, `docs/evidence/placement.md`), on a few presses.
 
 use std::path::Path;
 use std::process::Command;

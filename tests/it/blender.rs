@@ -15,7 +15,7 @@ use tempfile::TempDir;
 use crate::lint::{Plate, kinds};
 use somatic_testing::skip;
 
-/// Positions are current within this, m, and directions within this, rad; `docs/layout.md` has them.
+/// Positions are current within this, m, and directions within this, rad; `docs/reference/layout.md` has them.
 const NEAR_M: f64 = 1e-6;
 const NEAR_RAD: f64 = 1e-5;
 

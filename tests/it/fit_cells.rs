@@ -1,6 +1,6 @@
 //! Where a fit is given it is not worse than the moments: over gains, layers, edges, pitches and two touches.
 //!
-//! `SOMATIC_SEEDS=30 cargo test --release --test it fit_cells -- --nocapture` prints the table of docs/fit.md.
+//! `SOMATIC_SEEDS=30 cargo test --release --test it fit_cells -- --nocapture` prints the table of docs/evidence/fit.md.
 
 use glam::{DVec2, DVec3};
 use somatic::scene::Scene;

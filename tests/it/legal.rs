@@ -283,7 +283,7 @@ fn fields_without_taxels_are_told_of() {
 
 #[test]
 fn the_example_in_the_specification_is_a_body() {
-    let page = include_str!("../../docs/layout.md");
+    let page = include_str!("../../docs/reference/layout.md");
     let example = page.rsplit("```").nth(1).unwrap().strip_prefix("json").unwrap();
     let mut json: Value = serde_json::from_str(example).unwrap();
     let numbers = [0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 17.0, 18.0, 1.0, 1.0, 0.0, 0.0_f32];

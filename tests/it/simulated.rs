@@ -640,7 +640,7 @@ fn a_body_named_in_the_file_is_found_from_the_files_folder() {
 
 #[test]
 fn the_documentations_own_file_is_sound() {
-    let text = include_str!("../../docs/simulation.md");
+    let text = include_str!("../../docs/reference/simulation.md");
     let example = text.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let mut simulation = SimulatedSource::from_text("docs", example, Path::new("")).unwrap();
     assert_eq!(simulation.frames(), 200);

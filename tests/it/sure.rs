@@ -320,7 +320,7 @@ fn the_truth_lies_within_1_96_sigma_and_a_jump_at_the_threshold_is_unsure() {
 }
 
 #[test]
-#[ignore = "a million frames: run it by name with --nocapture for the table of docs/calibration.md"]
+#[ignore = "a million frames: run it by name with --nocapture for the table of docs/evidence/noise.md"]
 fn the_truth_lies_within_1_96_sigma_in_95_of_100_frames() {
     check(std::env::var("SOMATIC_SURE_FRAMES").ok().and_then(|n| n.parse().ok()).unwrap_or(120_000));
 }

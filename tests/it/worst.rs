@@ -1,4 +1,4 @@
-//! How much of their bounds the backends really use: the table of docs/numerics.md.
+//! How much of their bounds the backends really use: the table of docs/evidence/numerics.md.
 
 use std::collections::BTreeMap;
 

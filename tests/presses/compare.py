@@ -5,7 +5,7 @@
 
 Each touch of the simulation stays at a taxel. `compare` prints a JSON object: per touch how far the place is from the truth's, m,
 the force by the depth in the truth as a share of the force, by how much the taxels' forces differ as a share of the force, and the
-angles of the axis and the direction, degrees. Everything is read and made anew here, from docs/simulation.md: nothing is shared with
+angles of the axis and the direction, degrees. Everything is read and made anew here, from docs/explanation/simulation.md: nothing is shared with
 the crate but the file formats. BODY.glb must have links without scale.
 """
 

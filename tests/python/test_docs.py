@@ -57,7 +57,8 @@ def test_an_example_runs(path, tmp_path) -> None:
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("page", ["README.md", "docs/python.md"])  # many-recordings.md starts processes: test_batch.py
+# many-recordings.md starts processes: test_batch.py
+@pytest.mark.parametrize("page", ["README.md", "docs/how-to/python.md", "docs/reference/python.md"])
 def test_a_page_shows_code_that_runs(page: str, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)

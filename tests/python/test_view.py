@@ -1,4 +1,4 @@
-"""The page shows what an engine computes; docs/page.md has its messages."""
+"""The page shows what an engine computes; docs/reference/page.md has its messages."""
 
 from __future__ import annotations
 

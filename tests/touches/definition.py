@@ -1,4 +1,4 @@
-"""Touches of the whole body, as docs/touches.md and the design define them, written plainly: nothing is shared with the crate.
+"""Touches of the whole body, as docs/explanation/touches.md and the design define them, written plainly: nothing is shared with the crate.
 
 What hangs on a choice that is closer than rounding comes with a doubt: the choice's name.
 """

@@ -29,7 +29,7 @@ are far apart from each other, so that one run per colour gives the distance fro
 each triangle the squared distances are interpolated between the corners. On a flat triangle that is exact if one straight path
 leads to each point. Errors shrink with the size of the triangles: run it with FINE 8, 16 and 32 to see how far they are.
 
-It follows docs/layout.md ("Edges between taxels"). Only the reader of GLB files is shared with another test. All skinned meshes
+It follows docs/reference/layout.md ("Edges between taxels"). Only the reader of GLB files is shared with another test. All skinned meshes
 count as one surface, and no two taxels may be at the same point.
 """
 

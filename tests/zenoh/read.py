@@ -1,4 +1,4 @@
-"""Reads what limbs send, with Zenoh's own package and what docs/many-machines.md says: a line of JSON for each packet."""
+"""Reads what limbs send, with Zenoh's own package and what docs/reference/limbs.md says: a line of JSON for each packet."""
 
 import json
 import struct

@@ -7,7 +7,7 @@ use crate::body::{Body, Hit, Home, Surface, SurfaceIndex};
 /// Transforms of a skinned mesh to the body are equal up to this difference, m: the rounding of inverse bind matrices.
 const SAME_TRANSFORM: f64 = 2e-7;
 
-/// Maximum distance of a taxel on the surface, beside rounding to single precision, m; see `docs/layout.md`.
+/// Maximum distance of a taxel on the surface, beside rounding to single precision, m; see `docs/reference/layout.md`.
 const ON_SURFACE_M: f64 = 1e-6;
 
 /// Relative error of two roundings to single precision, as in the welding of `Topology`.

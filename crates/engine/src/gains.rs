@@ -1,8 +1,8 @@
 //! What ordinary touches tell of a skin: every taxel's gain, and how wide the layer makes a contact.
 //!
 //! A touch of the whole body that moves over the skin is felt by other taxels in each frame. Where a fit of the contact explains them
-//! all but one, that one's gain is off. Contacts are fitted under the gains found so far (`docs/fit.md`), each taxel's gain is moved to
-//! what makes it agree with the contacts that pressed it, and both are repeated:
+//! all but one, that one's gain is off. Contacts are fitted under the gains found so far (`docs/explanation/fit.md`), each
+//! taxel's gain is moved to what makes it agree with the contacts that pressed it, and both are repeated:
 //!
 //! ln γᵢ ← ln γᵢ + Σ w ln(Pᵢ/mᵢ) / (Σ w + 1/s²), w = 1/((σᵢ/mᵢ)² + e²), of the touches that press taxel i
 //!

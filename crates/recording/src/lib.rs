@@ -1,6 +1,6 @@
 //! Recordings in MCAP: frames bit for bit as they came, percepts, and what viewers show, with body and calibration beside.
 //!
-//! `docs/recordings.md` describes topics and schemas. This is the only user of the crate `mcap`, which writes; files are
+//! `docs/reference/recordings.md` describes topics and schemas. This is the only user of the crate `mcap`, which writes; files are
 //! read record by record here, so that a damaged one gives what is whole in it and memory stays bounded.
 
 #![deny(missing_docs)]

@@ -2,7 +2,7 @@
 //!
 //! Files come from anywhere. Whatever one of them says, reading it ends soon, in memory that this table bounds: sizes are
 //! checked before a file is read whole, counts before room is made for them, depths before a parser follows them. What is
-//! beyond a limit is refused in a line that names it. `docs/limits.md` has the same table.
+//! beyond a limit is refused in a line that names it. `docs/reference/limits.md` has the same table.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -26,7 +26,7 @@ macro_rules! limits {
     ($($(#[doc = $what:literal])+ $name:ident: $kind:tt = $value:expr;)+) => {
         $($(#[doc = $what])+ pub const $name: $kind = $value;)+
 
-        /// All limits, in the order of `docs/limits.md`.
+        /// All limits, in the order of `docs/reference/limits.md`.
         pub const TABLE: &[Limit] = &[
             $(Limit {
                 name: stringify!($name),
@@ -208,7 +208,7 @@ pub fn size(bytes: u64) -> String {
 }
 
 impl std::fmt::Display for Limit {
-    /// The most, as `docs/limits.md` has it: `64 MiB`, or `4,000,000`.
+    /// The most, as `docs/reference/limits.md` has it: `64 MiB`, or `4,000,000`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if self.in_bytes {
             return f.write_str(&size(self.most));
@@ -266,11 +266,12 @@ mod tests {
 
     #[test]
     fn the_documentation_has_the_table() {
-        let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/limits.md")).unwrap();
+        let page =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/limits.md")).unwrap();
         let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| ") && line.contains('`')).collect();
         let wanted: Vec<String> =
             TABLE.iter().map(|limit| format!("| {} | {limit} | `{}` |", limit.what, limit.name)).collect();
-        assert_eq!(rows, wanted, "write these rows into docs/limits.md:\n{}", wanted.join("\n"));
+        assert_eq!(rows, wanted, "write these rows into docs/reference/limits.md:\n{}", wanted.join("\n"));
         assert!(wanted[0].ends_with("| 16 MiB | `MAX_TOML_BYTES` |"), "{}", wanted[0]);
     }
 }

@@ -1,6 +1,6 @@
 //! The contents of packets as types. Nothing here needs an allocator or `std`.
 //!
-//! `docs/wire.md` is the specification, byte by byte.
+//! `docs/reference/wire.md` is the specification, byte by byte.
 
 /// The version of the packet format.
 pub const VERSION: u8 = 1;

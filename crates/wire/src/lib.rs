@@ -3,7 +3,7 @@
 //! Nothing here does I/O or reads a clock. [`encode`] writes packets into a buffer without allocation or `std`; a
 //! [`Decoder`] turns bytes into [`Event`]s; a [`Dialogue`] sends commands with retries; a simulated board is in `somatic::wire::board`.
 //!
-//! `docs/wire.md` specifies the format; `examples/firmware/` implements it in C.
+//! `docs/reference/wire.md` specifies the format; `examples/firmware/` implements it in C.
 //!
 //! ```
 //! use somatic_wire::{Bits, Decoder, Event, Head, encode};

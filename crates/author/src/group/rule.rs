@@ -22,7 +22,7 @@ use crate::recipe_values::{Globs, Ids, Length};
 /// A taxel must meet all conditions that are given. A rule makes the field `name`, or with one of `each`, `patches`, `radius`,
 /// `seeds`, `rows` and `columns` children below it, called by `stem` and a number, patches without it by the
 /// side of the body that they are on. Every level of a name is a field.
-/// `docs/authoring.md` describes all keys.
+/// `docs/reference/recipe.md` describes all keys.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]

@@ -41,7 +41,7 @@ use crate::region::Region;
 /// # }
 /// ```
 ///
-/// `docs/authoring.md` describes all keys.
+/// `docs/reference/recipe.md` describes all keys.
 #[derive(Clone, Debug, Default)]
 pub struct Recipe {
     /// The unit of the mesh file's numbers, and its metres.

@@ -127,7 +127,7 @@ pub struct Touch {
     pub(crate) taxels: [u32; 2],
 }
 
-/// The contact that explains best what the taxels of a touch and those beside them feel, as `docs/fit.md` has it.
+/// The contact that explains best what the taxels of a touch and those beside them feel, as `docs/explanation/fit.md` has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchFit {
     /// Its kind.

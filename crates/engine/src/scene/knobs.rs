@@ -11,7 +11,7 @@ use crate::stage::fit;
 
 /// What is traded for what; the default is as accurate as single precision is without pains, and as fast as it is.
 ///
-/// `docs/tradeoff.md` has what each costs and gives, `somatic tradeoff` measures it on one's own body and machine.
+/// `docs/how-to/accuracy.md` has what each costs and gives, `somatic tradeoff` measures it on one's own body and machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[non_exhaustive]
 pub struct Knobs {

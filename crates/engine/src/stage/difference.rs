@@ -8,7 +8,7 @@
 //! a contact is younger there are none, `held`. A step from one frame to the next beyond the window's high end is another touch,
 //! `jumped`; it starts anew there. A frame at the very time of the one before adds nothing, `bad_dt`; where a clock goes back, or
 //! too far on, it starts anew, `bad_dt` too. A displacement that rounding may feign has no direction, `still`. (A Kalman filter
-//! with constant velocity is no better at the same lag: `docs/paper.md` has the figures.)
+//! with constant velocity is no better at the same lag: `docs/evidence/paper.md` has the figures.)
 //!
 //! This stage is the host's, in f64, on every backend, from the backend's own centroid.
 //!

@@ -136,7 +136,7 @@ pub enum Flow {
 pub struct Question {
     /// Its field, as [`Percept::field`](somatic_engine::percept::Percept::field) counts.
     pub field: usize,
-    /// Takes the answer: the message `explain` of `docs/page.md`.
+    /// Takes the answer: the message `explain` of `docs/reference/page.md`.
     pub answer: Box<dyn FnOnce(String) + Send>,
 }
 

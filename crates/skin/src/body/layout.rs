@@ -1,6 +1,6 @@
 //! The layout's encoding in glTF: names of attributes and keys, and the JSON of fields.
 //!
-//! `docs/layout.md` is the specification.
+//! `docs/reference/layout.md` is the specification.
 
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
 //! Bodies: links, surfaces, taxels and field specifications, read from and written to glTF.
 //!
-//! A [`Body`] is the checked content of a glTF file, in metres. `docs/layout.md` specifies the encoding.
+//! A [`Body`] is the checked content of a glTF file, in metres. `docs/reference/layout.md` specifies the encoding.
 //!
 //! **Axes.** A body's are glTF's: y up, facing +z. Everything outside it is in the world, which is z up, x forward, y left:
 //! [`WORLD_FROM_BODY`] takes the one to the other.

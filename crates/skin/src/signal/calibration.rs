@@ -1,6 +1,6 @@
 //! Calibration: converts a robot's raw values to pressures, and says which raw values to reject.
 //!
-//! The file is TOML, and belongs to one robot; `docs/calibration.md` lists its keys. Without a file P is the raw value.
+//! The file is TOML, and belongs to one robot; `docs/reference/calibration.md` lists its keys. Without a file P is the raw value.
 
 mod file;
 mod keys;

@@ -1,4 +1,4 @@
-//! Wiring: the taxel on each channel of each board of one robot; `docs/wire.md` has the file's keys.
+//! Wiring: the taxel on each channel of each board of one robot; `docs/reference/wire.md` has the file's keys.
 
 mod to_toml;
 

@@ -1,6 +1,6 @@
 //! Limbs: parts of a robot on computers of their own, whose frames or percepts go over Zenoh.
 //!
-//! `docs/many-machines.md` specifies what goes over the network, byte by byte.
+//! `docs/reference/limbs.md` specifies what goes over the network, byte by byte.
 
 mod key;
 #[cfg(feature = "zenoh")]

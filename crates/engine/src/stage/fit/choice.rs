@@ -18,7 +18,7 @@ const MISFIT: f64 = 4.0;
 /// A descent has come to rest when it could still lower χ² by this: parameters are within 0.1σ.
 const AT_REST: f64 = 0.01;
 
-/// A contact in the chart of its touch, as `docs/fit.md` has it.
+/// A contact in the chart of its touch, as `docs/explanation/fit.md` has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fit {
     pub(crate) kind: ContactKind,

@@ -1,8 +1,8 @@
 //! **fit**: what presses, as the contact under the skin's own response that explains a touch's taxels best.
 //!
 //! The layer over the sensors blurs a contact's pressure by a Gaussian of σ; a taxel feels the integral over its area, as
-//! `docs/simulation.md` has it. Four kinds of contact are tried: a `point`, a `line` without ends, a `segment` with ends, and
-//! a `blob` with two spreads ([`kinds`]). Each is fitted to the touch's pressed taxels Pᵢ and to their neighbours by least
+//! `docs/explanation/simulation.md` has it. Four kinds of contact are tried: a `point`, a `line` without ends, a `segment`
+//! with ends, and a `blob` with two spreads ([`kinds`]). Each is fitted to the touch's pressed taxels Pᵢ and to their neighbours by least
 //! squares of
 //!
 //! rᵢ = (mᵢ − Pᵢ) / √(σᵢ² + (g·mᵢ)²)

@@ -1,7 +1,7 @@
 //! Limbs on computers of their own, many at once, as one source of frames.
 //!
 //! Their frames are merged as those of boards on serial lines are: by clock and age, missing is missing. Percepts that limbs
-//! have computed pass by the engine ([`super::Lines::percepts`]). `docs/many-machines.md` explains the messages.
+//! have computed pass by the engine ([`super::Lines::percepts`]). `docs/reference/limbs.md` explains the messages.
 
 mod limb;
 

@@ -1,7 +1,7 @@
 //! Boards on serial lines, many at once, as one source of frames.
 //!
 //! One thread per port reads and decodes ([`crate::wire`]) without waiting for the consumer; when the queue is full, the
-//! oldest frames are dropped and counted. Frames of boards are merged into frames of the skin. `docs/live.md`
+//! oldest frames are dropped and counted. Frames of boards are merged into frames of the skin. `docs/reference/boards.md`
 //! explains the messages.
 
 mod port;

@@ -1,6 +1,6 @@
 //! How an indenter's force spreads over the taxels under a compliant skin.
 //!
-//! `docs/simulation.md` has the model: a contact patch after Hertz, spread by the layer over the taxels.
+//! `docs/explanation/simulation.md` has the model: a contact patch after Hertz, spread by the layer over the taxels.
 
 use std::f64::consts::PI;
 

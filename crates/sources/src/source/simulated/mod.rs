@@ -1,6 +1,6 @@
 //! Simulated touches: indenters move over a body's surface; the source delivers the sensors' frames and the truth.
 //!
-//! `docs/simulation.md` has the file's keys and the model. The same file gives the same bytes on every machine.
+//! `docs/reference/simulation.md` has the file's keys and the model. The same file gives the same bytes on every machine.
 
 mod calibration;
 mod contact;
@@ -258,7 +258,7 @@ impl SimulatedSource {
         &self.forces_newton
     }
 
-    /// The calibration of these sensors, as `docs/calibration.md` describes such a file: what they read when untouched
+    /// The calibration of these sensors, as `docs/reference/calibration.md` describes such a file: what they read when untouched
     /// is 0, `ideal` and `linear` ones give newtons (`unit`), `fsr` ones the linear signal, and broken ones are masked. It knows the
     /// layer, and what the sensors cover.
     #[must_use]

@@ -45,7 +45,7 @@ const COLUMNS: [&str; 29] = [
 /// Writes all frames of `simulation` as CSV to `frames` and their truth to `truth`: both files or neither. Returns the
 /// number of frames.
 ///
-/// The truth has a row for each frame and touch that presses; `docs/simulation.md` lists its columns.
+/// The truth has a row for each frame and touch that presses; `docs/reference/simulation.md` lists its columns.
 ///
 /// # Errors
 /// A path leaves the surface, or a file cannot be written; the files are then not there.

@@ -1,4 +1,4 @@
-//! Touches of a whole body: an indenter presses its skin, across links and joints; see `docs/simulation.md`.
+//! Touches of a whole body: an indenter presses its skin, across links and joints; see `docs/reference/simulation.md`.
 //!
 //! All of it happens on the body at rest, in the body's own frame; truth is in the frames of links.
 
