@@ -10,6 +10,7 @@ use clap::Args;
 use serde_json::json;
 use somatic::limits::{self, MAX_SYSTEM_BYTES};
 use somatic::output::OutputFolder;
+use somatic::setup::FilesRead;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
 use somatic_engine::shape::Shape;
 
@@ -18,7 +19,6 @@ use super::interrupt::stop_soon_on_signal;
 use super::scene::{one_of, output, outputs_help, outputs_or_usual};
 use super::stdio::{DONE, print, say};
 use super::words::count;
-use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

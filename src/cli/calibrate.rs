@@ -10,6 +10,8 @@ use crate::survey::known::{KnownForce, PressedOn};
 use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use serde_json::json;
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::{in_body, load_body};
 use somatic::signal::{RawValue, UnitOfP};
 use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, VendorSource};
 use somatic::tradeoff::length;
@@ -24,8 +26,6 @@ use super::table::{more, plain, shown};
 use super::text_flags::TextFlags;
 use super::words::{bullet, count};
 use somatic::run::{Arrival, Feed, ReadMode, left_out};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::{in_body, load_body};
 
 const EXAMPLES: &str = "\
 Examples:

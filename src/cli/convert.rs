@@ -9,6 +9,11 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
+use somatic::run::left_out;
+use somatic::setup::FilesRead;
+use somatic::setup::attached::{self, body_bytes, file_name};
+use somatic::setup::overlaid::{How, overlaid};
+use somatic::setup::source_of;
 use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Frame, Result};
 
@@ -18,11 +23,6 @@ use super::interrupt::stop_soon_on_signal;
 use super::scene::said;
 use super::stdio::{say, tell_losses};
 use super::words::count;
-use somatic::run::left_out;
-use somatic::setup::FilesRead;
-use somatic::setup::attached::{self, body_bytes, file_name};
-use somatic::setup::overlaid::{How, overlaid};
-use somatic::setup::source_of;
 
 const EXAMPLES: &str = "\
 Examples:

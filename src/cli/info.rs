@@ -6,6 +6,8 @@ mod contacts;
 use clap::Args;
 use serde_json::{Value, json};
 use somatic::recording::{Attached, BagSurvey, Reader, Rhythm, Survey};
+use somatic::setup::attached;
+use somatic::setup::source_of;
 use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
 use somatic::{Body, Calibration, Error, Frame, Result};
 
@@ -16,8 +18,6 @@ use super::scene::said;
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
 use super::words::{between_s, number, one_line, size_words, span, title};
-use somatic::setup::attached;
-use somatic::setup::source_of;
 
 const EXAMPLES: &str = "\
 Examples:

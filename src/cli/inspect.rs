@@ -13,13 +13,13 @@ use somatic::author::{DrawnPoses, coverage, lint_with_progress};
 use somatic::error::{Error, Result};
 use somatic::field::{ContactTolerance, FieldSet, TaxelGraph, rest_overlaps};
 use somatic::robot::{Kinematics, drawn_poses};
+use somatic::setup::bodies::load_body;
 
 use self::graph::SkinGraph;
 use self::inspection::Inspection;
 use super::bar::Bar;
 use super::expected;
 use super::stdio::{DONE, FAILED, print};
-use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -155,15 +155,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         return Ok(DONE);
     };
     match subcommand {
-        Command::Run(arguments) => run::run(arguments).map_err(in_flags),
+        Command::Run(arguments) => run::run(arguments),
         #[cfg(feature = "page")]
-        Command::View(arguments) => view::view(arguments).map_err(in_flags),
+        Command::View(arguments) => view::view(arguments),
         Command::Inspect(arguments) => inspect::inspect(arguments),
         Command::Author(arguments) => author::run(arguments),
         #[cfg(feature = "gpu")]
         Command::Render(arguments) => render::render(arguments).map_err(in_flags),
-        Command::Plan(arguments) => plan::plan(arguments).map_err(in_flags),
-        Command::Tradeoff(arguments) => tradeoff::tradeoff(arguments).map_err(in_flags),
+        Command::Plan(arguments) => plan::plan(arguments),
+        Command::Tradeoff(arguments) => tradeoff::tradeoff(arguments),
         Command::Simulate(arguments) => simulate::simulate(arguments),
         Command::Info(arguments) => info::info(arguments),
         Command::Convert(arguments) => convert::convert(arguments),

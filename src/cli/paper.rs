@@ -6,10 +6,10 @@ use std::sync::Mutex;
 use crate::experiments;
 use clap::Args;
 use somatic::error::Result;
+use somatic::setup::FilesRead;
 
 use super::bar::Bar;
 use super::stdio::{DONE, print};
-use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

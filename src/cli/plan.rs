@@ -10,14 +10,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 use somatic::scene::file::SceneFile;
+use somatic::setup::bodies::load_body;
+use somatic::setup::{Input, Setup};
 use somatic::{Error, Result};
 
 use self::bill::Bill;
 pub(super) use self::timed::pressed;
-use super::scene::{RunFlags, grouped};
+use super::scene::{RunFlags, grouped, in_flags};
 use super::stdio::{DONE, print};
-use somatic::setup::Input;
-use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -56,12 +56,16 @@ pub(super) fn plan(arguments: &Arguments) -> Result<u8> {
         return Ok(DONE);
     }
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
-    let input = Input::named_or_none(&asked)?;
+    plan_asked(arguments, &asked).map_err(in_flags)
+}
+
+fn plan_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
+    let input = Input::named_or_none(asked)?;
     let body = match &input {
-        Some(input) => input.body(&asked)?,
+        Some(input) => input.body(asked)?,
         None => load_body(asked.body.as_deref().unwrap_or("hand"))?,
     };
-    let bill = Bill::of(&asked, input.as_ref(), &body)?;
+    let bill = Bill::of(asked, input.as_ref(), &body)?;
     print(&if arguments.json { format!("{}\n", bill.json()) } else { bill.text() })?;
     Ok(DONE)
 }

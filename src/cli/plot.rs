@@ -6,7 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use somatic::percept::Unit;
 use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
+use somatic::run::left_out;
 use somatic::scene::AskedOutputs;
+use somatic::setup::FilesRead;
+use somatic::setup::RECORDED_BATCH;
+use somatic::setup::Setup;
 use somatic::signal::Quantity;
 use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
 
@@ -16,10 +20,6 @@ use super::interrupt::stop_soon_on_signal;
 use super::plot_file::PlotFile;
 use super::scene::{input, output, set_up};
 use super::stdio::{DONE, say, tell_losses};
-use somatic::run::left_out;
-use somatic::setup::FilesRead;
-use somatic::setup::RECORDED_BATCH;
-use somatic::setup::Setup;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -11,10 +11,10 @@ use somatic::error::Result;
 use somatic::field::FieldSet;
 use somatic::picture::{self, Options, View};
 use somatic::scene::choose_fields;
-
-use super::stdio::DONE;
 use somatic::setup::FilesRead;
 use somatic::setup::bodies::load_body;
+
+use super::stdio::DONE;
 
 const EXAMPLES: &str = "\
 Examples:

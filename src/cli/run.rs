@@ -9,6 +9,8 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use somatic::output::{OutputPath, OutputPaths};
 use somatic::run::Run;
+use somatic::setup::FilesRead;
+use somatic::setup::Setup;
 use somatic::sink::{SinkSpec, SinkTarget, TableName};
 use somatic::{Error, Result};
 
@@ -19,10 +21,8 @@ use super::interrupt::stop_on_signal;
 #[cfg(unix)]
 use super::keys::Keys;
 use super::live::View;
-use super::scene::{LIVE, RunFlags, grouped, input};
+use super::scene::{LIVE, RunFlags, grouped, in_flags, input};
 use super::stdio::{DONE, FAILED, print, say, say_lines, tell_losses};
-use somatic::setup::FilesRead;
-use somatic::setup::Setup;
 
 const FIRST_EXAMPLES: &str = "\
 Examples:
@@ -129,15 +129,19 @@ impl Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
-    let input = input(&asked)?;
-    let Reserved { targets, summary } = arguments.reserve(&asked)?;
+    run_asked(arguments, &asked).map_err(in_flags)
+}
+
+fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
+    let input = input(asked)?;
+    let Reserved { targets, summary } = arguments.reserve(asked)?;
     let view = View::choose(asked.quiet, asked.sinks.iter().any(SinkSpec::is_on_stdout), input.is_recording());
-    let prepared = Prepared::open(&asked, &input, view.is_table(), summary, arguments.lasts.as_deref())?;
+    let prepared = Prepared::open(asked, &input, view.is_table(), summary, arguments.lasts.as_deref())?;
 
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
     let targets = if asked.sinks.is_empty() && !view.is_table() { vec![SinkTarget::Stdout] } else { targets };
-    let session = prepared.session(&asked, &input, &targets, arguments.scene.as_deref())?;
+    let session = prepared.session(asked, &input, &targets, arguments.scene.as_deref())?;
     if arguments.describe {
         print(&describe(&asked.sinks, &session, arguments.wide)?)?;
         return Ok(DONE);
@@ -146,7 +150,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     if !asked.quiet {
         sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| say(&remark));
     }
-    let (run, console) = prepared.start(&asked, &input, view, sinks)?;
+    let (run, console) = prepared.start(asked, &input, view, sinks)?;
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]
     let keys = if view.is_table() && !input.is_stdin() { Keys::listen() } else { None };

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use somatic::setup::FilesRead;
 use somatic::source::{SimulatedSource, write_recording_with_progress};
 use somatic::{Error, Result};
 
 use super::bar::Bar;
 use super::stdio::{DONE, say};
-use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

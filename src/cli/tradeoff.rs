@@ -9,6 +9,8 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use console::style;
+use somatic::setup::bodies::load_body;
+use somatic::setup::{FilesRead, Setup};
 use somatic::tradeoff::{CallMode, Errors, Measurement, Pick, Report, Store, TrueErrors, plot_png, plot_svg};
 use somatic::{BackendKind, Engine, Error, OutputPath, Result};
 
@@ -18,12 +20,10 @@ pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
 use super::interrupt::stop_soon_on_signal;
 use super::plot_file::PlotFile;
-use super::scene::{RunFlags, first, grouped};
+use super::scene::{RunFlags, first, grouped, in_flags};
 use super::stdio::{DONE, FAILED, print, say};
 use super::table::{plain, shown};
 use super::words::{count, number, one_line, title};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -86,11 +86,15 @@ pub(super) struct Arguments {
 
 pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
     let asked = arguments.asked.with(arguments.scene.as_deref())?;
+    tradeoff_asked(arguments, &asked).map_err(in_flags)
+}
+
+fn tradeoff_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     let target = asked.accuracy.target();
     if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
         return Err(Error::usage(format!("--seconds {} is not a time span; give seconds over 0", arguments.seconds)));
     }
-    let mut outputs = FilesRead::of(&asked, arguments.scene.as_deref()).outputs(asked.overwrite);
+    let mut outputs = FilesRead::of(asked, arguments.scene.as_deref()).outputs(asked.overwrite);
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
@@ -101,19 +105,18 @@ pub(super) fn tradeoff(arguments: &Arguments) -> Result<u8> {
         (Some(path), true) => Some((path, OutputPath::edit(path)?)),
         _ => None,
     };
-    let input = if asked.sources.is_empty() { None } else { Some(super::scene::input(&asked)?) };
+    let input = if asked.sources.is_empty() { None } else { Some(super::scene::input(asked)?) };
     if input.as_ref().is_some_and(|input| !input.is_recording()) {
         return Err(Error::usage("a trade is measured on a recording or a simulation; name one as --source"));
     }
-    let body = input
-        .as_ref()
-        .map_or_else(|| load_body(asked.body.as_deref().unwrap_or("hand")), |input| input.body(&asked))?;
+    let body =
+        input.as_ref().map_or_else(|| load_body(asked.body.as_deref().unwrap_or("hand")), |input| input.body(asked))?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(&body, &ids, 1)?;
     let most = arguments.frames.map_or_else(|| FRAMES.min(VALUES / ids.len().max(1)).max(8), |frames| frames as usize);
-    let played = input.as_ref().map(|input| played(input, &asked, &body, most)).transpose()?;
+    let played = input.as_ref().map(|input| played(input, asked, &body, most)).transpose()?;
     let tested = Tested::new(&body, &options, played, most)?;
-    let measure_options = measure_options(&asked, &options, arguments.seconds)?;
+    let measure_options = measure_options(asked, &options, arguments.seconds)?;
     let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("measured");
     let report = tested.measure(&body, &measure_options, &mut |share| {

@@ -9,6 +9,8 @@ use std::time::Duration;
 
 use crate::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use clap::Args;
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 use somatic::signal::{FsrCircuit, Wiring};
 use somatic::{Error, Result};
 
@@ -17,8 +19,6 @@ use super::calibrate::name_of;
 use super::interrupt::stop_on_signal;
 use super::ports::LineFlags;
 use super::stdio::{DONE, FAILED, print, say};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:

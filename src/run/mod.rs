@@ -23,6 +23,7 @@ pub use self::opened::{Opened, Pace};
 pub use self::repeats::Repeats;
 use self::serve::Sinks;
 use self::unfit::UnfitReport;
+use crate::engine::{Engine, EngineState};
 use crate::error::Result;
 #[cfg(feature = "scenes")]
 pub use crate::setup::Tell;
@@ -30,7 +31,7 @@ use crate::signal::Frame;
 use crate::sink::{InputFrames, News, Question, Sink};
 #[cfg(any(feature = "serial", feature = "zenoh"))]
 use crate::source::Lines;
-use crate::{Agreement, Engine, EngineState};
+use somatic_engine::Agreement;
 
 /// How long a run waits for frames before it looks at other things.
 const WAIT: Duration = Duration::from_millis(40);

@@ -170,13 +170,13 @@ impl Run {
     /// ```
     ///
     /// # Errors
-    /// Something that the scene names is invalid or not there, an output exists and `overwrite` is not set, or it has `within` or
-    /// `budget`, for which the command measures.
+    /// Something that the scene names is invalid or not there, an output exists and `overwrite` is not set, or it asks for a
+    /// tolerance or a budget, for which the command measures.
     pub fn of(scene: SceneFile, tell: Tell) -> Result<Self> {
         if !scene.accuracy.target().is_empty() {
-            let what = "`within` and `budget` are settled by measurements, which `somatic tradeoff --write` makes; it writes what to give \
-                        in their place";
-            return Err(Error::usage(what));
+            let what = "tolerances and a budget are met by measuring; `somatic tradeoff --write` measures, and writes into a scene what to \
+                        give in their place";
+            return Err(Error::usage(what).at("[accuracy]"));
         }
         let setup = Setup::new(scene, tell.clone());
         let input = Input::named(&setup)?;

@@ -78,7 +78,7 @@ fn errors_of_scenes_speak_of_keys() {
     for (text, says) in [
         ("body = \"mat\"\n", "needs a `source`"),
         ("source = \"-\"\nfrom_s = 1.0\n", "`from_s`, `to_s` and `loop` are for recordings"),
-        ("within_m = 0.003\n", "`within` and `budget` are settled by measurements"),
+        ("[accuracy]\nbudget = \"1 ms\"\n", "tolerances and a budget are met by measuring"),
     ] {
         let error = Run::of(scene(folder.path(), text), Tell::default()).err().unwrap();
         assert_eq!(error.kind(), ErrorKind::Usage, "{error}");

@@ -8,6 +8,8 @@ use serde_json::{Value, json};
 use somatic::author::cell_spread;
 use somatic::body::Body;
 use somatic::expected::{ComparedLayouts, LayoutErrors, TestTouches, compare_layouts};
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 use somatic::{Error, Result};
 
 use super::compare_figure::figure;
@@ -16,8 +18,6 @@ use crate::cli::plot_file::PlotFile;
 use crate::cli::stdio::{DONE, print};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, millimetres, span, spread, title};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
 
 const HEADING: &str = "Two layouts side by side";
 

@@ -13,6 +13,7 @@ use clap::{Args, ValueEnum};
 use somatic::author::{Recipe, author};
 use somatic::body::Original;
 use somatic::error::nearest;
+use somatic::setup::FilesRead;
 use somatic::{Error, Result, bundled};
 
 use self::compare::{CompareArguments, body_output};
@@ -23,7 +24,6 @@ use self::skin::SkinArguments;
 use super::bar::Bar;
 use super::expected;
 use super::stdio::{DONE, print};
-use somatic::setup::FilesRead;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use somatic::output::OutputLink;
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 use somatic::signal::Wiring;
 use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec, VendorOptions};
 use somatic::wire::board::{BoardConfig, Faults, Potentiometers, VirtualBoard};
@@ -21,8 +23,6 @@ use super::interrupt::stop_on_signal;
 use super::stdio::{DONE, print};
 use super::words;
 use somatic::run::{Arrival, Feed, ReadMode};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
 
 const EXAMPLES: &str = "\
 Examples:

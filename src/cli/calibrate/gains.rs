@@ -6,6 +6,8 @@ use std::sync::atomic::Ordering;
 use serde_json::json;
 use somatic::gains::{GainsEstimate, GainsSurvey};
 use somatic::limits::{self, MAX_TOML_BYTES};
+use somatic::run::left_out;
+use somatic::setup::bodies::in_body;
 use somatic::source::{SourceSpec, VendorOptions};
 use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
@@ -15,8 +17,6 @@ use crate::cli::interrupt::stop_soon_on_signal;
 use crate::cli::stdio::{print, say, tell_losses};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{bullet, count};
-use somatic::run::left_out;
-use somatic::setup::bodies::in_body;
 
 /// Frames that are taken at once.
 const BATCH: usize = 256;

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use somatic::author::mesh::urdf_of_skin;
 use somatic::body::{Modality, Taxel, taxel_table};
+use somatic::setup::FilesRead;
+use somatic::setup::bodies::load_body;
 use somatic::{Error, Result, bundled};
 
 use crate::cli::stdio::{DONE, say};
 use crate::cli::words::count;
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
 
 /// Whether `from` names a body rather than a recording.
 pub(super) fn is_body(from: &str) -> bool {

@@ -2,14 +2,14 @@
 
 use somatic::scene::OrientationBy;
 use somatic::scene::PlannedStage;
+use somatic::setup::Setup;
+use somatic::setup::{Input, RECORDED_BATCH};
 use somatic::tradeoff::{Combination, ladder};
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result, TouchOutputs, touch};
 
 use super::timed::{Played, measured, pressed};
 use crate::cli::tradeoff::{Settled, settled};
 use crate::cli::words::count;
-use somatic::setup::Setup;
-use somatic::setup::{Input, RECORDED_BATCH};
 
 /// What a scene costs.
 pub(super) struct Bill {

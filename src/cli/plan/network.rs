@@ -1,10 +1,9 @@
 //! What a limb would send: its frames, or its percepts.
 
 use serde_json::{Value, json};
+use somatic::setup::Setup;
 use somatic::sink::{FieldNames, SinkSpec, SkinNames, limb_frame_bytes, limb_percept_bytes};
 use somatic::{Body, Engine, Frame, Result};
-
-use somatic::setup::Setup;
 
 /// Bytes that a limb sends, without those of Zenoh and of the network.
 pub(super) struct Network {

@@ -7,11 +7,11 @@ use somatic::field::Field;
 use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture};
 use somatic::scene::Coordinates;
 use somatic::scene::file::SceneFile;
+use somatic::setup::Setup;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
 
 use super::super::bar::Bar;
 use super::super::stdio::say;
-use somatic::setup::Setup;
 
 /// Endings of recordings, which bodies do not have.
 const RECORDINGS: [&str; 7] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv"];

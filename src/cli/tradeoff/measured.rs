@@ -1,5 +1,7 @@
 //! What is measured, on which frames, and how a measurement is described.
 
+use somatic::setup::Setup;
+use somatic::setup::{Input, RECORDED_BATCH};
 use somatic::signal::Frame;
 use somatic::source::{SimulatedSource, Source, SourceSpec};
 use somatic::tradeoff::{
@@ -9,8 +11,6 @@ use somatic::{BackendKind, Body, Error, Options, Result};
 
 use crate::cli::plan::pressed;
 use crate::cli::words::number;
-use somatic::setup::Setup;
-use somatic::setup::{Input, RECORDED_BATCH};
 
 /// What `pick` misses of `target`, which nothing grants.
 pub(super) fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {

@@ -1,13 +1,13 @@
 //! What is left to be chosen, settled by measurements: those that are kept, or brief ones.
 
 use somatic::scene::{Coverage, OrientationBy};
+use somatic::setup::Input;
+use somatic::setup::Setup;
 use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, day};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
 use super::measured::{Tested, in_words, made_up, measure_options, missed, played, software};
 use crate::cli::stdio::say;
-use somatic::setup::Input;
-use somatic::setup::Setup;
 
 /// Seconds of a brief measurement, and its frames.
 const BRIEF_S: f64 = 1.0;

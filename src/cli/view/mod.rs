@@ -19,6 +19,7 @@ use somatic::author::lint;
 use somatic::field::FieldSet;
 use somatic::output::PrivateFile;
 use somatic::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
+use somatic::setup::Setup;
 use somatic::source::SourceSpec;
 use somatic::{BackendKind, Body, Engine, Error, Options, Result};
 
@@ -31,11 +32,10 @@ use self::shared::Shared;
 use self::subject::{Subject, subject};
 use super::browser;
 use super::interrupt::stop_soon_on_signal;
-use super::scene::{LIVE, RunFlags, grouped, input};
+use super::scene::{LIVE, RunFlags, grouped, in_flags, input};
 use super::stdio::{DONE, LOST, say};
 use super::tradeoff::settled;
 use super::words;
-use somatic::setup::Setup;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -127,7 +127,7 @@ pub(super) fn view(arguments: &Arguments) -> Result<u8> {
     let opening = Opening { arguments, listen, until: lasts.map(|span| Instant::now() + span) };
     match subject(arguments.what.as_deref(), &arguments.asked)? {
         Subject::Body(body) => opening.body(&body),
-        Subject::Recording(asked) => opening.recording(&asked),
+        Subject::Recording(asked) => opening.recording(&asked).map_err(in_flags),
     }
 }
 

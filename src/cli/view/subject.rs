@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use somatic::setup::Setup;
+use somatic::setup::bodies::load_body;
 use somatic::source::{BagName, SimulatedSource};
 use somatic::{Body, Error, Result, bundled};
 
 use super::super::scene::RunFlags;
-use somatic::setup::Setup;
-use somatic::setup::bodies::load_body;
 
 /// What is shown.
 pub(super) enum Subject {

@@ -2,9 +2,9 @@
 
 use super::adapter::Device;
 use super::columns::NOTHING;
-use super::pack::HEADER;
-use super::stage::{Over, Stage};
-use super::{UNIFORM, WORKING, header, shaders};
+use super::pack::{HEADER, header};
+use super::shaders;
+use super::stage::{Over, Stage, UNIFORM, WORKING};
 use crate::scene::Plan;
 use crate::stage::layout;
 

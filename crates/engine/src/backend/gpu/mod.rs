@@ -38,22 +38,17 @@ use self::calibrating::{Calibrated, Calibrating};
 use self::capacity::FRAMES_A_BLOCK;
 use self::columns::Columns;
 use self::over_fields::{Bound, OverFields};
-use self::pack::{Form, HEADER, Packer, STEP};
+use self::pack::{Form, HEADER, Packer, STEP, header};
 use self::ring::{SETS, Set};
 use self::shaders::Values;
 use self::shares::Shares;
-use self::stage::{Stage, table};
+use self::stage::{Stage, UNIFORM, WORKING, table};
 use super::{Backend, BackendState, FieldState, RawBatch};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::scene::Plan;
 use crate::signal::RawValue;
 use crate::stage::{layout, motion};
-
-/// How buffers are used that stages read and write, and what stages are told of a batch.
-const WORKING: wgpu::BufferUsages =
-    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC).union(wgpu::BufferUsages::COPY_DST);
-const UNIFORM: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM.union(wgpu::BufferUsages::COPY_DST);
 
 /// The backend, with everything it needs on the device.
 pub(crate) struct Gpu {
@@ -347,16 +342,4 @@ fn readback<T: bytemuck::Pod>(device: &Device, buffer: &wgpu::Buffer) -> Result<
 /// Whether raw values are pressures, with nothing to check but that they are numbers.
 fn is_plain(plan: &Plan) -> bool {
     plan.taxels[..plan.calibrated()].iter().all(layout::Taxel::raw_is_pressure)
-}
-
-/// What a dispatch over `frames` frames is told of the plan.
-fn header(plan: &Plan, frames: u32) -> layout::Batch {
-    layout::Batch {
-        frames,
-        channels: plan.channels() as u32,
-        calibrated: plan.calibrated() as u32,
-        changes: (plan.slots() - plan.calibrated()) as u32,
-        fields: plan.fields.len() as u32,
-        lanes_log2: layout::lanes(frames as usize).ilog2(),
-    }
 }

@@ -5,6 +5,7 @@ use bytemuck::{bytes_of, cast_slice, cast_slice_mut};
 
 use crate::backend::cpu::read;
 use crate::backend::{RawBatch, Rows};
+use crate::scene::Plan;
 use crate::signal::RawValue;
 use crate::stage::layout;
 
@@ -99,5 +100,17 @@ fn pack_quads(raw: &RawBatch<'_>, channels: usize, scratch: &mut Vec<RawValue>, 
         }
         let bytes = block * channels * 4;
         mapped.slice(index * bytes..(index + 1) * bytes).copy_from_slice(cast_slice(scratch));
+    }
+}
+
+/// What a dispatch over `frames` frames is told of the plan.
+pub(super) fn header(plan: &Plan, frames: u32) -> layout::Batch {
+    layout::Batch {
+        frames,
+        channels: plan.channels() as u32,
+        calibrated: plan.calibrated() as u32,
+        changes: (plan.slots() - plan.calibrated()) as u32,
+        fields: plan.fields.len() as u32,
+        lanes_log2: layout::lanes(frames as usize).ilog2(),
     }
 }

@@ -6,6 +6,11 @@ use super::adapter::Device;
 use super::shaders::Shader;
 use crate::stage::layout;
 
+/// How buffers are used that stages read and write, and what stages are told of a batch.
+pub(super) const WORKING: wgpu::BufferUsages =
+    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC).union(wgpu::BufferUsages::COPY_DST);
+pub(super) const UNIFORM: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM.union(wgpu::BufferUsages::COPY_DST);
+
 /// Invocations a group, as `shaders/shared/layout.wgsl` has it.
 pub(super) const GROUP: u32 = 64;
 

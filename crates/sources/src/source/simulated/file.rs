@@ -26,8 +26,7 @@ pub(super) struct LayerKeys {
     pub(super) thickness_m: Spanned<f64>,
     pub(super) spread: Option<Spanned<f64>>,
     pub(super) stiffness_pa: Option<Spanned<f64>>,
-    #[serde(default)]
-    pub(super) kernel: KernelName,
+    pub(super) kernel: Option<Spanned<KernelName>>,
     pub(super) contact: Option<Spanned<ContactName>>,
 }
 
@@ -37,6 +36,19 @@ pub(super) enum KernelName {
     #[default]
     Gaussian,
     Boussinesq,
+    Exponential,
+    Bonded,
+}
+
+impl KernelName {
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Gaussian => "gaussian",
+            Self::Boussinesq => "boussinesq",
+            Self::Exponential => "exponential",
+            Self::Bonded => "bonded",
+        }
+    }
 }
 
 #[derive(Clone, Copy, Deserialize, PartialEq)]

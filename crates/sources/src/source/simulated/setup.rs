@@ -12,6 +12,7 @@ use super::layer::Kernel;
 use super::patch::Pressure;
 use super::path::{Path, PathFrame};
 use super::profile::Profile;
+use super::radial::Radial;
 use crate::body::{Body, ChartKind, SurfaceIndex};
 use crate::error::Result;
 use crate::field::{FieldSet, Lift};
@@ -63,16 +64,19 @@ impl Setup<'_> {
         let or = |key: &str, value: &Option<Spanned<f64>>, default: f64| {
             value.as_ref().map_or(Ok(default), |value| self.text.positive(key, value))
         };
-        let kernel = match keys.kernel {
+        let name = keys.kernel.as_ref().map_or(KernelName::Gaussian, |kernel| *kernel.get_ref());
+        let kernel = match name {
             KernelName::Gaussian => Kernel::Gaussian,
-            KernelName::Boussinesq => {
-                self.text.refuse("spread", keys.spread.as_ref(), "beside `kernel = \"boussinesq\"`")?;
-                Kernel::Boussinesq
-            }
+            KernelName::Boussinesq => Kernel::Radial(Radial::Boussinesq),
+            KernelName::Exponential => Kernel::Radial(Radial::Exponential),
+            KernelName::Bonded => Kernel::Radial(Radial::Bonded),
         };
+        if kernel != Kernel::Gaussian {
+            self.text.refuse("spread", keys.spread.as_ref(), &format!("beside `kernel = \"{}\"`", name.word()))?;
+        }
         let contact = match keys.contact.as_ref().map(|contact| (*contact.get_ref(), contact.span())) {
-            Some((ContactName::Gaussian, at)) if kernel == Kernel::Boussinesq => {
-                let what = "`contact` is gaussian; beside `kernel = \"boussinesq\"` it must be hertz";
+            Some((ContactName::Gaussian, at)) if kernel != Kernel::Gaussian => {
+                let what = format!("`contact` is gaussian; beside `kernel = \"{}\"` it must be hertz", name.word());
                 return Err(self.text.wrong(at, what));
             }
             None if kernel == Kernel::Gaussian => Pressure::Gaussian,

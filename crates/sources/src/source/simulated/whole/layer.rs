@@ -2,10 +2,11 @@
 
 use super::super::contact;
 use super::super::layer::Kernel;
+use super::super::radial::Radial;
 
 /// A Gaussian is cut off at this many standard deviations: 4 · 10⁻⁶ of a force lie beyond.
 const CUTOFF_SIGMAS: f64 = 5.0;
-/// Boussinesq's pressure is cut off at this many depths: 0.1 % of a force lie beyond.
+/// Other kernels are cut off at this many depths: 0.1 % of a force lie beyond under Boussinesq's.
 const CUTOFF_DEPTHS: f64 = 10.0;
 /// A layer counts as spreading at least this much, m.
 const MIN_SIGMA_M: f64 = 5e-4;
@@ -29,27 +30,23 @@ pub(super) struct Layer {
 impl Layer {
     /// The layer that the file describes, which has a thickness, over taxels with cells of at least `least_side_m` square.
     pub(super) fn new(given: &contact::Layer, least_side_m: f64) -> Self {
-        let sigma_m = match given.kernel {
-            Kernel::Gaussian => given.sigma_m(),
-            Kernel::Boussinesq => given.thickness_m * contact::Layer::SPREAD,
-        };
         Self {
             kernel: given.kernel,
-            sigma_m: sigma_m.max(MIN_SIGMA_M),
+            sigma_m: given.sigma_m().max(MIN_SIGMA_M),
             stiffness_pa_m: given.stiffness_pa / given.thickness_m,
             max_piece_m: MAX_PIECE_M.max(MAX_PIECE_SHARE * least_side_m),
         }
     }
 
-    fn depth_m(&self) -> f64 {
-        self.sigma_m / contact::Layer::SPREAD
+    fn depth_m(&self, kernel: Radial) -> f64 {
+        self.sigma_m / kernel.spread()
     }
 
     /// How far along the surface a point force is felt, m.
     pub(super) fn reach_m(&self) -> f64 {
         match self.kernel {
             Kernel::Gaussian => CUTOFF_SIGMAS * self.sigma_m,
-            Kernel::Boussinesq => CUTOFF_DEPTHS * self.depth_m(),
+            Kernel::Radial(kernel) => CUTOFF_DEPTHS.min(kernel.reach()) * self.depth_m(kernel),
         }
     }
 
@@ -73,11 +70,7 @@ impl Layer {
                 let sigmas = distance_m / self.sigma_m;
                 libm::exp(-0.5 * sigmas * sigmas)
             }
-            Kernel::Boussinesq => {
-                let depths = distance_m / self.depth_m();
-                let slope = 1.0 / (1.0 + depths * depths);
-                slope * slope * slope.sqrt()
-            }
+            Kernel::Radial(kernel) => kernel.fall(distance_m / self.depth_m(kernel)),
         }
     }
 }

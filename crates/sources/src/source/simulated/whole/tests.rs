@@ -252,7 +252,13 @@ fn a_strap_around_a_cylinder_is_where_it_would_be_unrolled() {
 
 #[test]
 fn boussinesqs_kernel_conserves_the_force_too() {
-    let layer = Layer::new(&contact::Layer { kernel: super::super::layer::Kernel::Boussinesq, ..LAYER }, 0.0);
+    let layer = Layer::new(
+        &contact::Layer {
+            kernel: super::super::layer::Kernel::Radial(super::super::radial::Radial::Boussinesq),
+            ..LAYER
+        },
+        0.0,
+    );
     let body = plane();
     let (surface, cells) = (WholeSurface::new(&body, layer.piece_m()), Cells::new(&body, &[]));
     let spot = surface.nearest(DVec3::ZERO, DVec3::Z).unwrap();
