@@ -224,12 +224,14 @@ fn every_command_that_takes_long_ends_soon_after_ctrl_c() {
                 }
                 return None;
             }
-            Some((child, code, begin.elapsed()))
+            Some((child, code, begin.elapsed(), wait_ms))
         });
-        let (child, code, took) = ended.unwrap_or_else(|| panic!("{command} is over already"));
+        let (child, code, took, wait_ms) = ended.unwrap_or_else(|| panic!("{command} is over already"));
         eprintln!("{command}: exit {code} after {} ms", took.as_millis());
         let said = stderr(&child.wait_with_output().unwrap());
-        assert!(codes.contains(&code), "{command}: {code}: {said}");
+        // So soon a busy machine has not opened all that the command reads; then there is nothing to bring to an end.
+        let may_be_opening = wait_ms <= 80 && code == 1 && said.ends_with("error: interrupted\n");
+        assert!(codes.contains(&code) || may_be_opening, "{command}: {code}: {said}");
         // A second on an idle machine.
         assert!(took < Duration::from_secs(4), "{command}: {took:?}");
         assert!(code == 0 || said.contains("interrupted") || said.contains("stopped"), "{command}: {said}");

@@ -2,7 +2,7 @@
 
 use somatic::scene::{Coverage, Knobs, Scene};
 use somatic::signal::{Unfit, Wiring};
-use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Percept, RawValue};
+use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, RawValue, touch};
 
 use crate::common::{Flat, backends, frame};
 
@@ -290,4 +290,68 @@ fn what_drifts_together_is_the_same_however_it_is_computed() {
     // Without a wiring, the link's untouched taxels tell as much.
     let unwired = on_every_backend_of(&body, None, DRIFTING, &frames);
     assert!(unwired.percepts.last().unwrap().iter().all(|percept| !percept.contact));
+}
+
+/// A grid of eight by eight taxels under one field, as a mat without a layout has it.
+fn mat() -> Body {
+    let places: Vec<[f64; 2]> =
+        (0..64).map(|taxel| [0.01 * f64::from(taxel % 8), 0.01 * f64::from(taxel / 8)]).collect();
+    Flat::new(&places).field("mat", None, 0..64).surface(0.2).body()
+}
+
+/// Shares of 20 minutes in which a touch is felt that is none, and in which a press is not felt.
+fn wrong_shares(calibration: &str, touches: bool, drift: impl Fn(usize, f64) -> f64) -> [f64; 2] {
+    // Two by two taxels for ten minutes, and a tap elsewhere every 15 s.
+    let hold = [18, 19, 26, 27].map(|taxel| Press { taxel, from_s: 60.0, to_s: 660.0, counts: 300.0 });
+    let tap = |tap: u32| {
+        let from_s = 15.0 * f64::from(tap) + 0.31 * f64::from(tap % 5);
+        Press { taxel: (tap * 11 % 16) as usize + 48, from_s, to_s: from_s + 2.0, counts: 80.0 }
+    };
+    let presses: Vec<Press> = hold.into_iter().chain((1..78).map(tap)).collect();
+    let body = mat();
+    let ids: Vec<u32> = (0..64).collect();
+    let scene = Scene::default().outputs(Outputs::TOTAL);
+    let scene = if touches { scene.touches(touch::Options::default()) } else { scene };
+    let calibration = Some(Calibration::parse(calibration, &ids).unwrap());
+    let options = Options::default().scene(scene).backend(BackendKind::Cpu).calibration(calibration);
+    let mut engine = Engine::new(&body, options).unwrap();
+    engine.keep_touch_taxels(true);
+    let (mut phantoms, mut missed, frames) = (0, 0, (1200.0 * HZ) as u32);
+    for tick in 0..frames {
+        let t = f64::from(tick) / HZ;
+        let pressed =
+            |taxel: usize| presses.iter().filter(|press| press.taxel == taxel).map(|press| press.at(t)).sum::<f64>();
+        let noise = |taxel: usize| ((tick as usize * 31 + taxel * 17) % 7) as f64 / 3.0 - 1.0;
+        let raw = |taxel: usize| (1000.0 + drift(taxel, t) + noise(taxel) + pressed(taxel)).round();
+        let percepts = engine.process(&[frame(t, &(0..64).map(raw).collect::<Vec<_>>())]).unwrap();
+        let is_near = |press: &Press| t > press.from_s - 0.5 && t < press.to_s + 2.0;
+        let at: Vec<usize> = presses.iter().filter(|press| is_near(press)).map(|press| press.taxel).collect();
+        let is_full = presses.iter().filter(|press| press.at(t) == press.counts).count();
+        let felt: Vec<u32> = match percepts.touches(0) {
+            Some(found) => found.touches.iter().flat_map(|touch| found.taxels(touch)).copied().collect(),
+            None => Vec::new(),
+        };
+        if touches {
+            phantoms += usize::from(felt.iter().any(|&node| !at.contains(&(node as usize))));
+            missed += usize::from(is_full > 0 && felt.is_empty());
+        } else {
+            phantoms += usize::from(at.is_empty() && percepts.frame(0).next().unwrap().contact);
+        }
+    }
+    [phantoms, missed].map(|count| count as f64 / f64::from(frames))
+}
+
+#[test]
+fn drift_under_one_field_is_told_by_taxels_away_from_the_touch() {
+    // A warm-up of 40 counts, and a room that warms by 15 counts in 10 minutes and cools again.
+    let own = |taxel: usize| 1.0 + 0.05 * ((taxel * 7 % 11) as f64 / 5.0 - 1.0);
+    let warm_up = |taxel: usize, t: f64| 40.0 * own(taxel) * (1.0 - (-t / 150.0).exp());
+    let room = |taxel: usize, t: f64| 15.0 * own(taxel) * (std::f64::consts::TAU * t / 1200.0).sin();
+    for (name, drift) in [("warm-up", &warm_up as &dyn Fn(usize, f64) -> f64), ("room", &room)] {
+        let [phantoms, missed] = wrong_shares(DRIFTING, true, drift);
+        assert!(phantoms <= 0.01 && missed == 0.0, "{name}: {phantoms} {missed}");
+    }
+    // Negative control: without compensation the warm-up is a touch, for good.
+    let [phantoms, _] = wrong_shares("[all]\nbaseline = 1000\ndead_band = 12\nraw_range = [0, 2000]\n", true, warm_up);
+    assert!(phantoms > 0.5, "{phantoms}");
 }

@@ -163,7 +163,7 @@ impl Cell {
 }
 
 /// The grid lies in its link's x and −z.
-fn flat(p: DVec3) -> DVec2 {
+pub(crate) fn flat(p: DVec3) -> DVec2 {
     DVec2::new(p.x, -p.z)
 }
 
@@ -192,10 +192,10 @@ impl Errors {
 }
 
 /// A stream of numbers in [0, 1).
-struct Random(u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -204,15 +204,15 @@ impl Random {
 }
 
 /// The angle between two lines.
-fn between(a: f64, b: f64) -> f64 {
+pub(crate) fn between(a: f64, b: f64) -> f64 {
     let apart = (a - b).rem_euclid(std::f64::consts::PI);
     apart.min(std::f64::consts::PI - apart)
 }
 
 /// Sensors on either side of the middle.
-const HALF: f64 = 8.0;
+pub(crate) const HALF: f64 = 8.0;
 
-fn grid(pitch_m: f64) -> Body {
+pub(crate) fn grid(pitch_m: f64) -> Body {
     let half = HALF as i32;
     let places: Vec<[f64; 2]> = (-half..=half)
         .flat_map(|i| (-half..=half).map(move |j| [f64::from(i) * pitch_m, f64::from(j) * pitch_m]))

@@ -20,6 +20,7 @@ mod filter;
 mod firmware;
 mod fit;
 mod fit_cells;
+mod fit_layers;
 mod fits_of_touches;
 mod gains;
 mod gate;

@@ -193,6 +193,9 @@ impl Engine {
             kept_charts: recharted.kept,
             plan,
         };
+        if let (Some(drift), Some(on_skin)) = (&mut engine.drift, &engine.on_skin) {
+            drift.follow_touches(on_skin.skin(), layer.map(|layer| layer.sigma_m));
+        }
         engine.pick();
         Ok(engine)
     }

@@ -1,15 +1,21 @@
 //! The drift compensation of an engine's calibration: its state, and what it needs of the plan.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::body::Body;
 use crate::percept::Flags;
 use crate::scene::Plan;
 use crate::signal::{DriftCompensation, DriftKeys, Kept, MIN_UNTOUCHED, RawValue, Receptor, Wiring};
 use crate::stage::{calibrate, layout};
+use crate::touch::Skin;
 
 /// Fields that are looked at to find one that leaves enough taxels untouched.
 const MOST_LOOKED_AT: usize = 16;
+
+/// A touch reaches this many spacings of taxels from a pressed one, or this many σ of the layer, if that is more.
+const RINGS: f64 = 2.2;
+const LAYER_SIGMAS: f64 = 4.0;
 
 /// Drift compensation, and what it needs of the engine.
 #[derive(Clone, Debug)]
@@ -21,9 +27,11 @@ pub(super) struct DriftState {
     groups: Vec<Vec<Option<usize>>>,
     /// Per field, whether it was in contact in this epoch.
     touched: Vec<bool>,
-    /// The channels that no field reads, which only touches of the whole body are found on; and which were pressed in this epoch.
-    alone: Vec<usize>,
-    alone_pressed: Vec<bool>,
+    /// Where pressures of all channels are known, as touches of the whole body are looked for: per channel those that a touch of it may
+    /// reach, itself included. Otherwise all of a field counts as touched.
+    near: Option<Arc<Vec<Vec<u32>>>>,
+    /// Which of them were pressed in this epoch.
+    pressed: Vec<bool>,
     /// Per field, whether the drift of one of its taxels is unknown.
     unknown: Vec<bool>,
 }
@@ -35,10 +43,9 @@ impl DriftState {
     }
 
     fn in_groups(plan: &Plan, keys: DriftKeys, groups: Vec<Vec<Option<usize>>>) -> Option<Self> {
-        let is_read = plan.touched_channels(&vec![true; plan.fields.len()]);
         Some(Self {
-            alone: (0..plan.channels()).filter(|&channel| !is_read[channel]).collect(),
-            alone_pressed: vec![false; plan.channels()],
+            near: None,
+            pressed: vec![false; plan.channels()],
             compensation: DriftCompensation::new(
                 keys,
                 (0..plan.channels()).map(|channel| kept(plan, channel)),
@@ -54,7 +61,33 @@ impl DriftState {
     /// Starts again with the calibration that `plan` has now.
     pub(super) fn restart(&mut self, plan: &Plan) {
         let restarted = Self::in_groups(plan, self.compensation.keys(), self.groups.clone());
+        let near = self.near.take();
         *self = restarted.unwrap_or_else(|| unreachable!("it was on before"));
+        self.near = near;
+    }
+
+    /// Takes what a touch reaches from `skin`, whose nodes are the channels, under a layer of `sigma_m`: from then on only the taxels around
+    /// pressed ones count as touched, whatever the fields.
+    pub(super) fn follow_touches(&mut self, skin: &Skin, sigma_m: Option<f64>) {
+        let around = |node: u32| {
+            let at = skin.taxels()[node as usize].position;
+            let distance_m = |other: u32| skin.taxels()[other as usize].position.distance(at);
+            let beside = skin.beside(node);
+            let spacing_m = beside.iter().map(|&other| distance_m(other)).sum::<f64>() / beside.len().max(1) as f64;
+            let reach_m = (RINGS * spacing_m).max(sigma_m.map_or(0.0, |sigma_m| LAYER_SIGMAS * sigma_m));
+            let mut near = vec![node];
+            let mut from = 0;
+            while from < near.len() {
+                for &other in skin.beside(near[from]) {
+                    if distance_m(other) <= reach_m && !near.contains(&other) {
+                        near.push(other);
+                    }
+                }
+                from += 1;
+            }
+            near
+        };
+        self.near = Some(Arc::new((0..self.pressed.len() as u32).map(around).collect()));
     }
 
     /// Taxels of one board are warmed together more than those of a link; `id_of` gives each channel's taxel.
@@ -72,6 +105,9 @@ impl DriftState {
     pub(super) fn cannot_tell_drift(&self, plan: &Plan) -> bool {
         if self.compensation.keys().time_constant_s.is_none() {
             return false;
+        }
+        if let Some(near) = &self.near {
+            return !near.iter().any(|near| near.len() + MIN_UNTOUCHED <= self.pressed.len());
         }
         let mut touched = vec![false; plan.fields.len()];
         let leaves_enough = |field: usize| {
@@ -98,10 +134,10 @@ impl DriftState {
         }
     }
 
-    /// Notes which channels that no field reads are pressed in a frame, by channel.
+    /// Notes which channels are pressed in a frame, by channel.
     pub(super) fn note_pressed(&mut self, pressures: &[f64]) {
-        for &channel in &self.alone {
-            self.alone_pressed[channel] |= pressures[channel] > 0.0;
+        for (pressed, &pressure) in self.pressed.iter_mut().zip(pressures) {
+            *pressed |= pressure > 0.0;
         }
     }
 
@@ -116,16 +152,19 @@ impl DriftState {
 
     /// Judges the epoch that ends, and puts the outcome into `plan`. Returns whether anything changed in it.
     pub(super) fn close(&mut self, plan: &mut Plan) -> bool {
-        let mut contact = plan.touched_channels(&self.touched);
-        self.alone.iter().for_each(|&channel| contact[channel] = self.alone_pressed[channel]);
+        let contact = match &self.near {
+            Some(near) => reached(near, &self.pressed),
+            None => plan.touched_channels(&self.touched),
+        };
         self.touched.fill(false);
-        self.alone_pressed.fill(false);
-        let alone = &self.alone;
+        self.pressed.fill(false);
+        let near = self.near.as_deref();
         let changed = self.compensation.close(&contact, |pressed| {
+            if let Some(near) = near {
+                return reached(near, pressed);
+            }
             let holds = |field| plan.members_of(field).iter().any(|m| pressed[plan.channel_of(m.slot as usize)]);
-            let mut touched = plan.touched_channels(&plan.fields.iter().map(holds).collect::<Vec<_>>());
-            alone.iter().for_each(|&channel| touched[channel] = pressed[channel]);
-            touched
+            plan.touched_channels(&plan.fields.iter().map(holds).collect::<Vec<_>>())
         });
         let unknown: Vec<bool> = self.compensation.unknown().collect();
         for (flagged, field) in self.unknown.iter_mut().zip(plan.fields.iter()) {
@@ -139,6 +178,15 @@ impl DriftState {
         }
         changed
     }
+}
+
+/// The channels that are near one for which `of` is true.
+fn reached(near: &[Vec<u32>], of: &[bool]) -> Vec<bool> {
+    let mut reached = vec![false; of.len()];
+    for (near, _) in near.iter().zip(of).filter(|(_, of)| **of) {
+        near.iter().for_each(|&channel| reached[channel as usize] = true);
+    }
+    reached
 }
 
 /// What drift compensation is to know of the taxel at `channel`.

@@ -7,14 +7,16 @@ use super::kinds::{Blob, Contact, Kind, Line, Point, Segment};
 use super::objective::Sensor;
 use super::real::Real;
 use super::shape::{Parameter, Shape};
-use super::touch::{Start, Touch};
+use super::touch::{LEAST_PRESSED, Start, Touch};
 use crate::percept::{ContactKind, FitSigma, TouchFlags};
 use crate::stage::angle;
 
 /// What a parameter costs: two more lower χ² by over twice as much in one touch of a hundred by chance, e^−PENALTY.
 pub(super) const PENALTY: f64 = 4.6;
-/// χ² a pressed taxel more than parameters over which a contact does not explain a touch: residuals of 2σ on average.
+/// χ² a pressed taxel more than parameters over which it is doubtful that a contact explains a touch: residuals of 2σ on average.
 const MISFIT: f64 = 4.0;
+/// What a force is off by for a layer that is no Gaussian, as a share of it: the standard deviation over layers.
+const LAYER_SHARE: f64 = 0.04;
 /// A descent has come to rest when it could still lower χ² by this: parameters are within 0.1σ.
 const AT_REST: f64 = 0.01;
 
@@ -116,6 +118,7 @@ fn mapped<R: Copy, T, const K: usize>(fitted: &Fitted<R, K>, of: impl Fn(R) -> T
 struct Candidate {
     kind: ContactKind,
     parameters: usize,
+    floor: f64,
     shape: Shape<f64>,
     cost: f64,
     chi_squared: f64,
@@ -127,14 +130,15 @@ struct Candidate {
 }
 
 impl Candidate {
-    fn of<const K: usize>(kind: ContactKind, free: [Parameter; K], fitted: &Fitted<f64, K>) -> Self {
+    fn of<M: Kind<K>, const K: usize>(kind: ContactKind, fitted: &Fitted<f64, K>) -> Self {
+        let free = M::FREE;
         let mut variances = [0.0; 6];
         for (k, parameter) in free.into_iter().enumerate() {
             variances[parameter as usize] = fitted.covariance[k][k];
         }
         let shared = if free[1] == Parameter::Along { fitted.covariance[1][0] } else { 0.0 };
         let &Fitted { shape, cost, chi_squared, ahead, .. } = fitted;
-        Self { kind, parameters: K, shape, cost, chi_squared, ahead, variances, shared }
+        Self { kind, parameters: K, floor: M::FLOOR, shape, cost, chi_squared, ahead, variances, shared }
     }
 
     fn variance(&self, parameter: Parameter) -> f64 {
@@ -142,12 +146,10 @@ impl Candidate {
     }
 
     fn each(fits: &Fits<f64>) -> impl Iterator<Item = Self> {
-        let short = [
-            Self::of(ContactKind::Point, Point::FREE, &fits.point),
-            Self::of(ContactKind::Line, Line::FREE, &fits.line),
-        ];
+        let short =
+            [Self::of::<Point, 4>(ContactKind::Point, &fits.point), Self::of::<Line, 4>(ContactKind::Line, &fits.line)];
         let long = fits.long.as_ref().map(|[segment, blob]| {
-            [Self::of(ContactKind::Segment, Segment::FREE, segment), Self::of(ContactKind::Blob, Blob::FREE, blob)]
+            [Self::of::<Segment, 6>(ContactKind::Segment, segment), Self::of::<Blob, 6>(ContactKind::Blob, blob)]
         });
         short.into_iter().chain(long.into_iter().flatten())
     }
@@ -183,24 +185,41 @@ impl Touch {
         Some(Explained { felt: self.sensors().iter().map(felt).collect(), width_m })
     }
 
-    /// The kind with the least cost of those that the taxels are enough for.
+    /// The likeliest kind of those that the taxels are enough for; with few taxels a point, whose spread then is the prior's.
     fn best(&self, fits: Option<&Fits<f64>>) -> Option<Candidate> {
-        let candidates = Candidate::each(fits?).filter(|candidate| self.pressed > candidate.parameters);
-        let penalised = |candidate: &Candidate| candidate.cost + 2.0 * PENALTY * candidate.parameters as f64;
+        let is_told = |candidate: &Candidate| {
+            self.pressed > candidate.parameters
+                || (candidate.kind == ContactKind::Point && self.pressed >= LEAST_PRESSED)
+        };
+        let candidates = Candidate::each(fits?).filter(is_told);
+        let penalised = |candidate: &Candidate| {
+            candidate.cost + self.width_of_floor(candidate.floor) + 2.0 * PENALTY * candidate.parameters as f64
+        };
         candidates.min_by(|a, b| penalised(a).total_cmp(&penalised(b)))
     }
 
-    /// The fit of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent.
+    /// Σ ln(D²/(D² − f²)), D and f as in the objective: a likelihood pays for the room that a floor gives.
+    fn width_of_floor(&self, floor: f64) -> f64 {
+        let pressed = self.sensors().iter().filter(|sensor| sensor.pressed > 0.0);
+        let without = |sensor: &Sensor<f64>| sensor.variance + self.gain_variance() * sensor.pressure * sensor.pressure;
+        pressed.map(|sensor| libm::log1p(floor * floor / without(sensor))).sum()
+    }
+
+    /// The fit of the touch that `fits` were made for, if enough taxels are pressed; the flags say why something is absent or
+    /// doubtful.
     pub(crate) fn conclude(&self, fits: Option<&Fits<f64>>) -> (Option<Fit>, TouchFlags) {
         let Some(best) = self.best(fits) else { return (None, TouchFlags::FEW_TAXELS) };
-        let spare = (self.pressed - best.parameters) as f64;
-        // Not a number is not within either. Of a descent that is cut short there is less to ask.
-        let explains = self.steps < 2 || best.chi_squared <= MISFIT * spare;
-        let rests = self.steps < STEPS || best.ahead <= AT_REST;
-        if !(explains && rests) {
+        if !best.chi_squared.is_finite() {
             return (None, TouchFlags::POOR_FIT);
         }
-        self.checked(&best)
+        let spare = self.pressed as f64 - best.parameters as f64;
+        // Of a descent that is cut short there is less to ask.
+        let explains = self.steps < 2 || best.chi_squared <= MISFIT * spare.max(1.0);
+        let rests = self.steps < STEPS || best.ahead <= AT_REST;
+        let (fit, mut flags) = self.checked(&best);
+        flags.set(TouchFlags::POOR_FIT, !(explains && rests));
+        flags.set(TouchFlags::FEW_TAXELS, spare <= 0.0);
+        (fit, flags)
     }
 
     fn checked(&self, best: &Candidate) -> (Option<Fit>, TouchFlags) {
@@ -222,8 +241,11 @@ impl Touch {
         let sides = DVec2::new(-along.y, along.x);
         // Of a line only what it is off across.
         let place_variance = sides * sides * across + along * along * lengthwise + 2.0 * sides * along * best.shared;
+        // What the contact does not explain says that all of it is known less well.
+        let spare = (self.pressed as f64 - best.parameters as f64).max(1.0);
+        let widened = (best.chi_squared / spare).max(1.0);
         // Of what has a logarithm as its parameter the standard deviation is a share.
-        let share_of = |parameter: Parameter| best.variance(parameter).sqrt();
+        let share_of = |parameter: Parameter| (widened * best.variance(parameter)).sqrt();
         let length = match best.kind {
             ContactKind::Point | ContactKind::Line => None,
             ContactKind::Segment => is_whole.then_some(2.0 * half * self.unit_m),
@@ -231,9 +253,9 @@ impl Touch {
         };
         let width = libm::exp(width) * self.unit_m;
         let sigma = FitSigma {
-            place: (place_variance.max(DVec2::ZERO).map(f64::sqrt) * self.unit_m).to_array(),
-            force: force * share_of(Parameter::Force),
-            angle: best.variance(Parameter::Turn).sqrt(),
+            place: ((place_variance * widened).max(DVec2::ZERO).map(f64::sqrt) * self.unit_m).to_array(),
+            force: force * share_of(Parameter::Force).hypot(LAYER_SHARE),
+            angle: share_of(Parameter::Turn),
             width: width * share_of(Parameter::Width),
             length: length.unwrap_or(0.0) * share_of(Parameter::Length),
         };

@@ -4,10 +4,16 @@ use super::mass;
 use super::real::Real;
 use super::shape::{Parameter, Shape};
 
+/// The floors of contacts that have a middle, and of those along a line, whose tails add up.
+const POINT_FLOOR: f64 = 0.01;
+const LINE_FLOOR: f64 = 0.03;
+
 /// A kind of contact, with K parameters.
 pub(crate) trait Kind<const K: usize> {
     /// Its parameters.
     const FREE: [Parameter; K];
+    /// What this kind may be off by at any taxel, as a share of the largest pressure: layers have tails that the Gaussian has not.
+    const FLOOR: f64;
 
     /// What a square taxel with its middle `at` and half a side of `margin` feels, and how that changes with each of [`Self::FREE`].
     fn felt<R: Real>(contact: &Contact<R>, at: [R; 2], margin: R) -> (R, [R; K]);
@@ -34,6 +40,7 @@ pub(crate) struct Point;
 
 impl Kind<4> for Point {
     const FREE: [Parameter; 4] = [Parameter::Across, Parameter::Along, Parameter::Force, Parameter::Width];
+    const FLOOR: f64 = POINT_FLOOR;
 
     #[inline(always)]
     fn felt<R: Real>(contact: &Contact<R>, at: [R; 2], margin: R) -> (R, [R; 4]) {
@@ -51,6 +58,7 @@ pub(crate) struct Line;
 
 impl Kind<4> for Line {
     const FREE: [Parameter; 4] = [Parameter::Across, Parameter::Turn, Parameter::Force, Parameter::Width];
+    const FLOOR: f64 = LINE_FLOOR;
 
     #[inline(always)]
     fn felt<R: Real>(contact: &Contact<R>, at: [R; 2], margin: R) -> (R, [R; 4]) {
@@ -68,6 +76,7 @@ pub(crate) struct Segment;
 
 impl Kind<6> for Segment {
     const FREE: [Parameter; 6] = ALL;
+    const FLOOR: f64 = LINE_FLOOR;
 
     #[inline(always)]
     fn felt<R: Real>(contact: &Contact<R>, at: [R; 2], margin: R) -> (R, [R; 6]) {
@@ -87,6 +96,7 @@ pub(crate) struct Blob;
 
 impl Kind<6> for Blob {
     const FREE: [Parameter; 6] = ALL;
+    const FLOOR: f64 = POINT_FLOOR;
 
     #[inline(always)]
     fn felt<R: Real>(contact: &Contact<R>, at: [R; 2], margin: R) -> (R, [R; 6]) {

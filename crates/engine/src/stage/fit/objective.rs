@@ -72,8 +72,8 @@ impl<R: Real, const K: usize> Objective<R, K> {
             // One that is not pressed says only that it feels no more than its threshold.
             let over = R::choose(zero.is_below(off), one, zero);
             let counts = R::choose(zero.is_below(sensor.pressed), one, over);
-            // r = (m − P)/D with D² = σ² + g²m², so that dr/dm = (1 − r·g²m/D)/D.
-            let per = one / (sensor.variance + gain_variance * felt * felt).sqrt();
+            // r = (m − P)/D with D² = σ² + f² + g²m², so that dr/dm = (1 − r·g²m/D)/D.
+            let per = one / (sensor.variance + gain_variance * felt * felt + M::FLOOR * M::FLOOR).sqrt();
             let r = counts * off * per;
             let slope = counts * per * (one - r * gain_variance * felt * per);
             sum.chi_squared = sum.chi_squared + r * r;

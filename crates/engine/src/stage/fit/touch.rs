@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::kinds::{Blob, Kind as _, Point};
+use super::kinds::{Blob, Kind as _};
 use super::objective::Sensor;
 use super::real::Real;
 use super::shape::Shape;
@@ -81,6 +81,8 @@ impl<R: Real> Start<R> {
     }
 }
 
+/// A point may be told from this many pressed taxels.
+pub(super) const LEAST_PRESSED: usize = 3;
 /// A taxel's noise counts as at least this part of the touch's largest pressure: what it is taken for where it is not known.
 const LEAST_NOISE: f64 = 1e-3;
 const UNKNOWN_NOISE: f64 = 1e-2;
@@ -124,6 +126,11 @@ impl Touch {
     /// Whether there are taxels enough for segments and blobs.
     pub(crate) fn is_long(&self) -> bool {
         self.pressed > Blob::FREE.len()
+    }
+
+    /// Relative variance of what taxels feel by the contact.
+    pub(super) fn gain_variance(&self) -> f64 {
+        self.gain_spread * self.gain_spread
     }
 
     pub(crate) fn sensors(&self) -> &[Sensor<f64>] {
@@ -176,13 +183,13 @@ impl Touch {
         let spread = |moment: f64| 0.5 * libm::log((moment - cell / total).max(1.0));
         let shape = |along, width: f64, length: f64| Shape { place: [0.0; 2], along, force: 0.0, width, length };
         let axis = [libm::cos(turn), libm::sin(turn)];
-        (self.pressed > Point::FREE.len()).then(|| Start {
+        (self.pressed >= LEAST_PRESSED).then(|| Start {
             point: shape([1.0, 0.0], spread(mean), 0.0),
             line: shape(axis, spread(mean - apart), 0.0),
             blob: shape(axis, spread(mean - apart), spread(mean + apart)),
             // An even line has a variance of h²/3.
             half_length: libm::log((6.0 * apart).sqrt().max(SHORTEST_HALF)),
-            gain_variance: self.gain_spread * self.gain_spread,
+            gain_variance: self.gain_variance(),
             steps: self.steps,
             is_long: self.is_long(),
         })

@@ -1,0 +1,225 @@
+//! What a user gets of fits under layers that the fit does not know, on noisy sensors and on quiet ones.
+//!
+//! `SOMATIC_SEEDS=10 cargo test --release --test it fit_layers -- --nocapture` prints the table of docs/evidence/fit.md.
+
+use somatic::percept::TouchFlags;
+use somatic::scene::Scene;
+use somatic::source::{SimulatedSource, Source, Truth};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, TouchOutputs, touch};
+
+use crate::fit_cells::{HALF, Random, between, flat, grid};
+
+/// Presses of a seed and cell.
+const PRESSES: usize = 40;
+const PITCH_M: f64 = 5e-3;
+const SIGMA_M: f64 = 2e-3;
+/// Touches with no more pressed taxels are counted apart.
+const FEW: usize = 4;
+/// What 95 of 100 errors are within, in standard deviations.
+const COVERS: f64 = 1.96;
+
+const LAYERS: [&str; 4] = ["gaussian", "boussinesq", "exponential", "bonded"];
+/// σ of the noise of a sensor, N.
+const NOISES: [f64; 4] = [1e-3, 3e-3, 10e-3, 30e-3];
+
+/// What presses, and where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Pressed {
+    /// Balls and fingertips far from any border.
+    Inside,
+    /// The same within a pitch and a half of an edge of the sheet.
+    AtRim,
+    /// Rods that end on the sheet.
+    Rods,
+}
+
+impl Pressed {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Inside => "inside",
+            Self::AtRim => "at a rim",
+            Self::Rods => "rods",
+        }
+    }
+
+    fn simulation(self, seed: u64, layer: &str, noise: f64) -> String {
+        let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+        let (mut path, mut times, mut forces, mut angles) =
+            (String::new(), String::new(), String::new(), String::new());
+        for t in 0..PRESSES {
+            let edge = HALF * PITCH_M;
+            let [u, v] = match self {
+                Self::AtRim => [edge + PITCH_M * (1.5 * random.next() - 1.0), 0.03 * (random.next() - 0.5)],
+                _ => [0, 1].map(|_| 0.01 * (random.next() - 0.5)),
+            };
+            times += &format!("{t},");
+            path += &format!("[{u}, {v}],");
+            // A rod is as hard on each sensor as a ball, so that it is one touch.
+            let more = if self == Self::Rods { 4.0 } else { 1.0 };
+            forces += &format!("[{t}, {}],", (2.0 + 6.0 * random.next()) * more);
+            angles += &format!("[{t}, {}],", 180.0 * random.next());
+        }
+        let indenter = match (self, seed % 2) {
+            (Self::Rods, _) => format!("indenter = \"rod\"\nradius_m = 0.008\nlength_m = 0.05\nangle_deg = [{angles}]"),
+            (_, 0) => "indenter = \"ball\"\nradius_m = 0.0127".to_owned(),
+            _ => "indenter = \"fingertip\"".to_owned(),
+        };
+        let spread = if layer == "bonded" { 0.460_634_846_4 } else { 3.0_f64.sqrt().recip() };
+        format!(
+            "rate_hz = 1\nduration_s = {PRESSES}\nseed = {seed}\n[layer]\nthickness_m = {}\nkernel = \"{layer}\"\n\
+             contact = \"hertz\"\n[sensor]\nkind = \"ideal\"\nnoise_sigma = {noise}\n[[touch]]\non = \"grid\"\n{indenter}\n\
+             path = [{path}]\ntimes_s = [{times}]\nforce_newton = [{forces}]\n",
+            SIGMA_M / spread
+        )
+    }
+}
+
+/// What was found in one cell of the table.
+#[derive(Default)]
+struct Found {
+    /// Touches with more than [`FEW`] pressed taxels, and those with fewer.
+    touches: usize,
+    few: usize,
+    given: usize,
+    doubtful: usize,
+    /// Squares of errors of the moments and of the fit, for touches that have one.
+    moments: f64,
+    fitted: f64,
+    /// Squares of errors of `place`, and of the moments, for all touches.
+    place: f64,
+    centroid: f64,
+    /// Errors within 1.96 σ, of so many: of the fit's place or angle, and of the force.
+    covered: [usize; 2],
+    forces: [usize; 2],
+}
+
+impl Found {
+    fn add(&mut self, other: &Self) {
+        self.touches += other.touches;
+        self.few += other.few;
+        self.given += other.given;
+        self.doubtful += other.doubtful;
+        self.moments += other.moments;
+        self.fitted += other.fitted;
+        self.place += other.place;
+        self.centroid += other.centroid;
+        for k in 0..2 {
+            self.covered[k] += other.covered[k];
+            self.forces[k] += other.forces[k];
+        }
+    }
+
+    fn given_share(&self) -> f64 {
+        self.given as f64 / self.touches as f64
+    }
+
+    fn of(pressed: Pressed, body: &Body, seed: u64, layer: &str, noise: f64) -> Self {
+        let text = pressed.simulation(seed, layer, noise);
+        let mut source = SimulatedSource::on_body("layers", &text, body.clone()).unwrap();
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let mut calibration = source.calibration();
+        calibration.truncate(calibration.find("\n[layer]").unwrap_or(calibration.len()));
+        calibration += &format!("\n[layer]\nsigma_m = {SIGMA_M}\ngain_spread = 0.0\n");
+        let calibration = Calibration::parse(&calibration, &ids).unwrap();
+        let asked = touch::Options { outputs: TouchOutputs::all(), ..touch::Options::default() };
+        let scene = Scene::default().outputs(Outputs::TOTAL).touches(asked).fields(["grid"]);
+        let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(256);
+        let mut engine = Engine::new(body, options).unwrap();
+        engine.set_channels(source.taxels()).unwrap();
+        let (mut frames, mut truths) = (Vec::new(), Vec::<Truth>::new());
+        let mut frame = Frame::missing(0.0, source.taxels().len());
+        while source.next_frame(&mut frame).unwrap() {
+            truths.push(source.truth()[0].clone());
+            frames.push(frame.clone());
+        }
+        let percepts = engine.process(&frames).unwrap();
+        let mut found = Self::default();
+        for (frame, truth) in truths.iter().enumerate() {
+            let touches = percepts.touches(frame).unwrap();
+            // The largest is the press; a tail may be a touch of its own.
+            let Some(touch) = touches.touches.iter().max_by(|a, b| a.total.total_cmp(&b.total)) else { continue };
+            if touches.taxels(touch).len() <= FEW {
+                found.few += 1;
+                continue;
+            }
+            found.touches += 1;
+            found.doubtful += usize::from(touch.flags.contains(TouchFlags::POOR_FIT));
+            let place = glam::DVec2::from_array(truth.uv.unwrap());
+            let off = |p: glam::DVec3| flat(p).distance(place);
+            let Some(fit) = touch.fit else { continue };
+            match truth.angle {
+                None => {
+                    found.given += 1;
+                    found.moments += off(touch.position).powi(2);
+                    found.fitted += off(fit.place).powi(2);
+                    let sigma = fit.sigma.unwrap();
+                    let apart = flat(fit.place) - place;
+                    for (apart, sigma) in [(apart.x, sigma.place[0]), (apart.y, sigma.place[1])] {
+                        found.covered[0] += usize::from(apart.abs() <= COVERS * sigma);
+                        found.covered[1] += 1;
+                    }
+                    if let Some(force) = fit.force {
+                        found.forces[0] += usize::from((force - truth.force_newton).abs() <= COVERS * sigma.force);
+                        found.forces[1] += 1;
+                    }
+                }
+                Some(angle) => {
+                    let (Some(axis), Some(direction)) = (touch.principal_axis, fit.direction) else { continue };
+                    let turned = |line: glam::DVec3| between(flat(line).to_angle(), angle);
+                    found.given += 1;
+                    found.moments += turned(axis).powi(2);
+                    found.fitted += turned(direction).powi(2);
+                    found.covered[0] += usize::from(turned(direction) <= COVERS * fit.sigma.unwrap().angle);
+                    found.covered[1] += 1;
+                }
+            }
+        }
+        found
+    }
+
+    fn row(&self, pressed: Pressed) -> String {
+        let rms = |sum: f64| {
+            let rms = (sum / self.given as f64).sqrt();
+            if pressed == Pressed::Rods { format!("{:.2}°", rms.to_degrees()) } else { format!("{:.3} mm", 1e3 * rms) }
+        };
+        let share = |[within, of]: [usize; 2]| {
+            if of == 0 { "–".to_owned() } else { format!("{:.0} %", 100.0 * within as f64 / of as f64) }
+        };
+        format!(
+            "{} | {:.0} % | {:.0} % | {} | {} | {:.2} | {} | {} |",
+            self.few,
+            100.0 * self.given_share(),
+            100.0 * self.doubtful as f64 / self.touches as f64,
+            rms(self.moments),
+            rms(self.fitted),
+            (self.fitted / self.moments).sqrt(),
+            share(self.covered),
+            share(self.forces)
+        )
+    }
+}
+
+#[test]
+fn fits_are_given_and_sure_of_themselves_under_every_layer() {
+    let seeds: u64 = std::env::var("SOMATIC_SEEDS").map_or(1, |seeds| seeds.parse().unwrap());
+    let first: u64 = std::env::var("SOMATIC_FIRST_SEED").map_or(1000, |seed| seed.parse().unwrap());
+    let body = grid(PITCH_M);
+    let mut wrong = Vec::new();
+    println!(
+        "| touches | layer | noise | few | given | doubtful | moments | fit | ratio | within 1.96 σ | force within |"
+    );
+    for pressed in [Pressed::Inside, Pressed::AtRim, Pressed::Rods] {
+        for layer in LAYERS {
+            for noise in NOISES {
+                let mut all = Found::default();
+                (first..first + seeds).for_each(|seed| all.add(&Found::of(pressed, &body, seed, layer, noise)));
+                println!("| {} | {layer} | {:.0} mN | {}", pressed.word(), 1e3 * noise, all.row(pressed));
+                let least = if pressed == Pressed::AtRim { 0.9 } else { 0.95 };
+                if all.touches > 0 && all.given_share() < least {
+                    wrong.push(format!("{} {layer} {noise}: {:.2} given", pressed.word(), all.given_share()));
+                }
+            }
+        }
+    }
+    println!("{wrong:#?}");
+}
