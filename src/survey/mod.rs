@@ -1,6 +1,6 @@
 //! Surveys: what a robot's sensors deliver untouched and pressed, and the calibration that follows from it.
 //!
-//! At rest a sensor has a **baseline**, the median of its values, and **noise**, the distance from it that one value in a
+//! At rest a sensor has a **baseline**, the mean of its values without those that stray, and **noise**, the distance from it that one value in a
 //! thousand exceeds. While it is pressed it has a **travel**, the farthest that it goes to its pressed side; a value counts
 //! as far as it is the middle one of three in succession, so that a single wrong value is no press. Which side is the
 //! pressed one is told by most of the sensors.
@@ -9,6 +9,7 @@
 //! chance explains: the steps from value to value tell how far chance goes, as what moves a sensor takes many values over
 //! its way.
 
+mod at_rest;
 mod figure;
 mod file;
 pub mod known;
@@ -18,10 +19,10 @@ mod which_way;
 use somatic::error::{Error, Result};
 use somatic::signal::{RawValue, UnitOfP};
 
+use self::at_rest::{chance_of, median, middle, movement_of, rest_of, sigma_of};
+
 /// Maximum number of values kept per sensor; a longer rest is decimated by powers of two.
 const MAX_REST_VALUES: usize = 4096;
-/// Share of rest values that may exceed the noise.
-const EXCEEDING_SHARE: f64 = 1e-3;
 /// Minimum number of values at rest that tell a standard deviation to a quarter of itself.
 const MIN_SIGMA_VALUES: usize = 32;
 /// Dead band over noise.
@@ -189,7 +190,7 @@ impl Survey {
         if wishes.bits.is_some_and(|bits| !(1..=24).contains(&bits)) {
             return Err(Error::usage("a converter has 1 to 24 bits"));
         }
-        let at_rest: Vec<AtRest> = self.rest.iter().map(|kept| rest_of(kept)).collect();
+        let at_rest: Vec<AtRest> = self.rest.iter().map(|kept| rest_of(kept, self.step())).collect();
         if at_rest.iter().all(Option::is_none) {
             return Err(Error::failed(
                 "no sensor delivered anything at rest; is the source connected and the rest long enough?",
@@ -308,54 +309,6 @@ impl Survey {
     }
 }
 
-/// A sensor's baseline and noise from its values at rest.
-fn rest_of(kept: &[f32]) -> Option<(f64, f64)> {
-    let mut values: Vec<f64> = kept.iter().map(|&value| value.into()).collect();
-    let baseline = median(&mut values)?;
-    Some((baseline, noise_of(values.into_iter(), baseline)))
-}
-
-/// How far from `baseline` all `values` stay but for the share that noise may exceed; 0 where there are none.
-fn noise_of(values: impl Iterator<Item = f64>, baseline: f64) -> f64 {
-    let mut strays: Vec<f64> = values.map(|value| (value - baseline).abs()).collect();
-    strays.sort_by(f64::total_cmp);
-    let rank = ((1.0 - EXCEEDING_SHARE) * strays.len() as f64).ceil() as usize;
-    strays.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
-}
-
-/// How far a sensor moved at rest: its noise without single wrong values.
-fn movement_of(kept: &[f32], baseline: f64) -> f64 {
-    noise_of(kept.windows(3).map(|three| middle(three[0], three[1], three[2]).into()), baseline)
-}
-
-fn middle(a: f32, b: f32, c: f32) -> f32 {
-    a.max(b).min(a.min(b).max(c))
-}
-
-/// The standard deviation of a sensor's values at rest as the steps between them tell it, and at least that of rounding to
-/// whole multiples of `unit`.
-fn chance_of(kept: &[f32], unit: f64) -> f64 {
-    /// The median of the size of the difference of two normal values, in their standard deviation: √2 · 0.6745.
-    const MEDIAN_STEP: f64 = 0.953_87;
-    let mut steps: Vec<f64> = kept.windows(2).map(|pair| (f64::from(pair[1]) - f64::from(pair[0])).abs()).collect();
-    (median(&mut steps).unwrap_or(0.0) / MEDIAN_STEP).max(unit / 12.0_f64.sqrt())
-}
-
-/// The standard deviation of a raw value, from the differences of values in succession, so that a slow drift adds nothing,
-/// and without the farthest hundredth of them, so that single wrong values add nothing. At least that of rounding to whole
-/// multiples of `unit`: a value that never changes may lie anywhere within its step.
-fn sigma_of(kept: &[f32], unit: f64) -> f64 {
-    /// The mean square of normal values without the farthest hundredth, over that of all.
-    const KEPT_SHARE: f64 = 0.924_76;
-    let mut squares: Vec<f64> = kept.windows(2).map(|pair| (f64::from(pair[1]) - f64::from(pair[0])).powi(2)).collect();
-    squares.sort_by(f64::total_cmp);
-    let left_out = squares.len() / 100;
-    squares.truncate(squares.len() - left_out);
-    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
-    let share = if left_out > 0 { KEPT_SHARE } else { 1.0 };
-    (mean / (2.0 * share)).sqrt().max(unit / 12.0_f64.sqrt())
-}
-
 /// How far a sensor went down and up from its baseline.
 fn travels(rest: &Option<(f64, f64)>, pressed: &Pressed) -> [f64; 2] {
     match rest {
@@ -364,12 +317,6 @@ fn travels(rest: &Option<(f64, f64)>, pressed: &Pressed) -> [f64; 2] {
         }
         _ => [0.0; 2],
     }
-}
-
-/// The middle value, the lower of two; sorts them.
-fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len().checked_sub(1)? / 2).copied()
 }
 
 /// The first few of `ids`, and how many more there are.
@@ -630,6 +577,19 @@ mod tests {
     }
 
     #[test]
+    fn a_baseline_of_whole_counts_is_known_to_a_tenth_of_one() {
+        // Triangular noise about 512.37, in whole counts, with a wrong value now and then.
+        let noise = |n: usize| ((n * 7_919 % 1009) as f64 + (n * 104_729 % 1013) as f64) / 1011.0 - 1.0;
+        let kept: Vec<f32> =
+            (0..1000).map(|n| if n % 97 == 5 { 900.0 } else { (512.37 + 1.7 * noise(n)).round() as f32 }).collect();
+        let (baseline, noise) = rest_of(&kept, 1.0).unwrap();
+        assert!((baseline - 512.37).abs() < 0.1, "{baseline}");
+        assert!(noise > 1.0 && noise < 3.0, "{noise}");
+        assert_eq!(rest_of(&[700.0; 40], 1.0), Some((700.0, 0.0)));
+        assert_eq!(rest_of(&[], 1.0), None);
+    }
+
+    #[test]
     fn sensors_that_moved_are_masked_if_that_is_wished() {
         let survey = rested(|n| if n.is_multiple_of(50) { 20.0 } else { 900.0 });
         let found = survey.finish(Wishes { bits: Some(10), mask_moved: true, ..Wishes::default() }).unwrap();
@@ -650,6 +610,7 @@ mod tests {
             "{}",
             survey.rest[0].len()
         );
-        assert_eq!(rest_of(&survey.rest[0]), Some((5.0, 5.0)));
+        let (baseline, noise) = rest_of(&survey.rest[0], 1.0).unwrap();
+        assert!((baseline - 5.0).abs() < 0.02 && (noise - 5.0).abs() < 0.02, "{baseline} {noise}");
     }
 }

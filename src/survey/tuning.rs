@@ -8,7 +8,8 @@
 //! A sensor's own circuit is not quite the model's, and a press that stands at the end of the range says only that it is
 //! at least so firm. So what is chosen is looked at anew, in rounds, until every press is where it should be.
 
-use super::{MIN_TRAVEL_BANDS, Pressed, Survey, Wishes, rest_of};
+use super::at_rest::rest_of;
+use super::{MIN_TRAVEL_BANDS, Pressed, Survey, Wishes};
 use somatic::error::Result;
 use somatic::signal::{FsrCircuit, RawValue};
 
@@ -220,8 +221,8 @@ impl Tuning {
 
     fn learn_noise(&mut self) {
         for (sensor, kept) in self.sensors.iter_mut().zip(&self.survey.rest) {
-            let noise =
-                rest_of(kept).map(|(_, noise)| MIN_TRAVEL_BANDS * (super::DEAD_BAND_MARGIN * noise).ceil().max(1.0));
+            let noise = rest_of(kept, 1.0)
+                .map(|(_, noise)| MIN_TRAVEL_BANDS * (super::DEAD_BAND_MARGIN * noise).ceil().max(1.0));
             sensor.noise = noise.unwrap_or(f64::INFINITY);
             sensor.clear = sensor.noise;
         }

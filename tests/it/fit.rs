@@ -198,8 +198,8 @@ fn a_rod_that_ends_on_the_field_is_not_taken_for_a_line() {
     let errors = rods(0.03, "", None);
     let (axis, fit) = (rms(&column(&errors, 0)), rms(&column(&errors, 1)));
     println!("{} rods of 30 mm: axis {axis:.2}°, fit {fit:.2}°", errors.len());
-    // Nine sensors cannot tell most of them; those that they can are told no worse.
-    assert!(errors.len() > 50 && errors.len() < 450 && fit < axis, "{} {fit} {axis}", errors.len());
+    // Nine sensors tell them badly, and no worse than the axis.
+    assert!(errors.len() > 600 && fit < 0.8 * axis, "{} {fit} {axis}", errors.len());
 }
 
 /// A square grid of sensors without gaps, `half` of them to either side of the middle.
@@ -255,7 +255,9 @@ impl Points {
         for indenter in INDENTERS {
             let text = presses(sigma_m, [0.0; 2], indenter, layer);
             for pressed in fitted_by(by, &grid(pitch, 6), &text, "grid", None) {
-                let Some(fit) = pressed.fit() else { continue };
+                // With few taxels the spread is a guess.
+                let is_told = !pressed.flags().contains(TouchFlags::FEW_TAXELS);
+                let Some(fit) = pressed.fit().filter(|_| is_told) else { continue };
                 let off = fit.place - pressed.truth.position_in_link;
                 points.places.push(off.length() * 1e3);
                 points.centroids.push(pressed.centroid.distance(pressed.truth.position_in_link) * 1e3);
@@ -389,10 +391,16 @@ fn what_cannot_be_told_is_absent_with_its_reason() {
     assert_eq!(reasons(&without, TouchFlags::NO_LAYER), 100);
     assert!(without.iter().all(|one| one.fit().is_none()));
 
-    // Four sensors or fewer have less to say than a point has parameters.
+    // One or two sensors cannot tell a point; three or four can, as far as its spread is the prior's.
     let few = pressed(&grid(20e-3, 3), &middle, None);
     assert!(reasons(&few, TouchFlags::FEW_TAXELS) > 90, "{}", reasons(&few, TouchFlags::FEW_TAXELS));
-    assert!(few.iter().all(|one| !one.flags().contains(TouchFlags::FEW_TAXELS) || one.fit().is_none()));
+    let taxels = |one: &Pressed| one.touch.as_ref().map_or(0, |touch| touch.active);
+    assert!(few.iter().all(|one| taxels(one) > 2 || one.fit().is_none()));
+    let some = pressed(&grid(8e-3, 4), &presses(1.5e-3, [0.0; 2], INDENTERS[1], ""), None);
+    let with_few = some.iter().filter(|one| one.flags().contains(TouchFlags::FEW_TAXELS) && one.fit().is_some());
+    let with_few: Vec<&Pressed> = with_few.collect();
+    let is_point = |one: &&Pressed| one.fit().is_some_and(|fit| fit.kind == ContactKind::Point);
+    assert!(with_few.len() > 10 && with_few.iter().all(|one| is_point(one) && (3..5).contains(&taxels(one))), "{}", with_few.len());
 
     // Most of a press 8 mm beyond the edge falls on no sensor.
     let beyond = pressed(&body, &presses(4e-3, [0.0, 0.039], INDENTERS[1], ""), None);
@@ -414,7 +422,7 @@ fn what_cannot_be_told_is_absent_with_its_reason() {
     }
     let percepts = engine.process_one(&frame).unwrap();
     let [touch] = &percepts.touches(0).unwrap().touches[..] else { panic!("one touch") };
-    assert!(touch.flags.contains(TouchFlags::POOR_FIT) && touch.fit.is_none(), "{touch:?}");
+    assert!(touch.flags.contains(TouchFlags::POOR_FIT), "{touch:?}");
     // Negative control: the middle has none of these.
     let all = pressed(&body, &middle, None);
     let none = TouchFlags::NO_LAYER | TouchFlags::FEW_TAXELS | TouchFlags::OFF_SKIN | TouchFlags::POOR_FIT;
@@ -433,7 +441,8 @@ fn neighbours_that_are_turned_away_say_nothing() {
     let poor = pressed.iter().filter(|one| one.flags().contains(TouchFlags::POOR_FIT)).count();
     let given = pressed.iter().filter(|one| one.fit().is_some()).count();
     println!("{given} fits and {poor} poor fits of {}", pressed.len());
-    assert!(given > 140 && poor < 20, "{given} {poor}");
+    // A doubt stands beside an answer.
+    assert!(given > 170 && poor < 30, "{given} {poor}");
 }
 
 #[test]

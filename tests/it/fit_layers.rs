@@ -9,8 +9,9 @@ use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, T
 
 use crate::fit_cells::{HALF, Random, between, flat, grid};
 
-/// Presses of a seed and cell.
+/// Presses of a seed and cell, and of a test without seeds.
 const PRESSES: usize = 40;
+const FEW_PRESSES: usize = 6;
 const PITCH_M: f64 = 5e-3;
 const SIGMA_M: f64 = 2e-3;
 /// Touches with no more pressed taxels are counted apart.
@@ -42,11 +43,11 @@ impl Pressed {
         }
     }
 
-    fn simulation(self, seed: u64, layer: &str, noise: f64) -> String {
+    fn simulation(self, (seed, presses): (u64, usize), layer: &str, noise: f64) -> String {
         let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let (mut path, mut times, mut forces, mut angles) =
             (String::new(), String::new(), String::new(), String::new());
-        for t in 0..PRESSES {
+        for t in 0..presses {
             let edge = HALF * PITCH_M;
             let [u, v] = match self {
                 Self::AtRim => [edge + PITCH_M * (1.5 * random.next() - 1.0), 0.03 * (random.next() - 0.5)],
@@ -66,7 +67,7 @@ impl Pressed {
         };
         let spread = if layer == "bonded" { 0.460_634_846_4 } else { 3.0_f64.sqrt().recip() };
         format!(
-            "rate_hz = 1\nduration_s = {PRESSES}\nseed = {seed}\n[layer]\nthickness_m = {}\nkernel = \"{layer}\"\n\
+            "rate_hz = 1\nduration_s = {presses}\nseed = {seed}\n[layer]\nthickness_m = {}\nkernel = \"{layer}\"\n\
              contact = \"hertz\"\n[sensor]\nkind = \"ideal\"\nnoise_sigma = {noise}\n[[touch]]\non = \"grid\"\n{indenter}\n\
              path = [{path}]\ntimes_s = [{times}]\nforce_newton = [{forces}]\n",
             SIGMA_M / spread
@@ -85,9 +86,6 @@ struct Found {
     /// Squares of errors of the moments and of the fit, for touches that have one.
     moments: f64,
     fitted: f64,
-    /// Squares of errors of `place`, and of the moments, for all touches.
-    place: f64,
-    centroid: f64,
     /// Errors within 1.96 σ, of so many: of the fit's place or angle, and of the force.
     covered: [usize; 2],
     forces: [usize; 2],
@@ -101,8 +99,6 @@ impl Found {
         self.doubtful += other.doubtful;
         self.moments += other.moments;
         self.fitted += other.fitted;
-        self.place += other.place;
-        self.centroid += other.centroid;
         for k in 0..2 {
             self.covered[k] += other.covered[k];
             self.forces[k] += other.forces[k];
@@ -113,8 +109,8 @@ impl Found {
         self.given as f64 / self.touches as f64
     }
 
-    fn of(pressed: Pressed, body: &Body, seed: u64, layer: &str, noise: f64) -> Self {
-        let text = pressed.simulation(seed, layer, noise);
+    fn of(pressed: Pressed, body: &Body, pressings: (u64, usize), layer: &str, noise: f64) -> Self {
+        let text = pressed.simulation(pressings, layer, noise);
         let mut source = SimulatedSource::on_body("layers", &text, body.clone()).unwrap();
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let mut calibration = source.calibration();
@@ -201,25 +197,39 @@ impl Found {
 
 #[test]
 fn fits_are_given_and_sure_of_themselves_under_every_layer() {
-    let seeds: u64 = std::env::var("SOMATIC_SEEDS").map_or(1, |seeds| seeds.parse().unwrap());
+    let seeds: Option<u64> = std::env::var("SOMATIC_SEEDS").ok().map(|seeds| seeds.parse().unwrap());
     let first: u64 = std::env::var("SOMATIC_FIRST_SEED").map_or(1000, |seed| seed.parse().unwrap());
+    let (presses, noises) = if seeds.is_some() { (PRESSES, &NOISES[..]) } else { (FEW_PRESSES, &[1e-3, 30e-3][..]) };
     let body = grid(PITCH_M);
-    let mut wrong = Vec::new();
+    let (mut wrong, mut layers) = (Vec::new(), LAYERS.map(|_| Found::default()));
     println!(
         "| touches | layer | noise | few | given | doubtful | moments | fit | ratio | within 1.96 σ | force within |"
     );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for pressed in [Pressed::Inside, Pressed::AtRim, Pressed::Rods] {
-        for layer in LAYERS {
-            for noise in NOISES {
+        for (layer, of_layer) in LAYERS.iter().zip(&mut layers) {
+            for &noise in noises {
                 let mut all = Found::default();
-                (first..first + seeds).for_each(|seed| all.add(&Found::of(pressed, &body, seed, layer, noise)));
+                for seed in first..first + seeds.unwrap_or(1) {
+                    all.add(&Found::of(pressed, &body, (seed, presses), layer, noise));
+                }
                 println!("| {} | {layer} | {:.0} mN | {}", pressed.word(), 1e3 * noise, all.row(pressed));
-                let least = if pressed == Pressed::AtRim { 0.9 } else { 0.95 };
+                // Beside a rim a place may be beyond the sensors; with few presses one is a sixth.
+                let least = if pressed == Pressed::AtRim { 0.65 } else { 0.95 };
                 if all.touches > 0 && all.given_share() < least {
                     wrong.push(format!("{} {layer} {noise}: {:.2} given", pressed.word(), all.given_share()));
                 }
+                of_layer.add(&all);
             }
         }
     }
-    println!("{wrong:#?}");
+    for (layer, found) in LAYERS.iter().zip(&layers) {
+        let share = |[within, of]: [usize; 2]| within as f64 / of as f64;
+        let [places, forces] = [found.covered, found.forces].map(share);
+        println!("{layer}: {places:.2} of places and angles within 1.96 σ, {forces:.2} of forces");
+        if places < 0.88 || forces < 0.6 {
+            wrong.push(format!("{layer}: {places:.2}, {forces:.2} within 1.96 σ"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }

@@ -157,7 +157,7 @@ fn drawn() -> (Body, Calibration, Vec<Frame>) {
             let mut pressed: Vec<f64> = frame.values.iter().map(value).collect();
             pressed.sort_by(|a, b| b.total_cmp(a));
             let lower = |own: &mut somatic::RawValue| {
-                if value(own) < pressed[2] {
+                if value(own) < pressed[1] {
                     *own = somatic::RawValue::new(0.0);
                 }
             };

@@ -10,6 +10,7 @@ mod noise;
 mod patch;
 mod path;
 mod profile;
+mod quadrature;
 mod radial;
 mod record;
 mod sensor;

@@ -5,7 +5,7 @@
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-use super::patch::gauss_legendre;
+use super::quadrature::gauss_legendre;
 
 /// How the pressure of a point force falls off with the distance from it, at the bottom of the layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
