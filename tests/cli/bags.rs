@@ -361,7 +361,7 @@ fn an_estimate_that_cannot_be_had_is_refused_with_what_is_missing() {
         assert!(told.contains(why), "{told}");
     }
     let told = fails(2, &with(&run_of(&body, &bag("bag.mcap"), &bag("bag.mcap")), &["--joints-delay", "soon"]));
-    assert!(told.contains("`soon` is not a time span; give seconds, or auto"), "{told}");
+    assert!(told.contains("`soon` is not a time; give seconds, a time such as 25ms, or auto"), "{told}");
 }
 
 #[test]

@@ -207,6 +207,8 @@ fn what_makes_no_sense_is_wrong_usage() {
     assert!(fails(2, &["run", "--source", "-", "--speed", "2"]).contains("--speed"));
     assert!(fails(2, &["run", "--speed", "0"]).contains("--speed 0"));
     assert!(fails(2, &["run", "--max-age", "nan"]).contains("--max-age"));
+    assert!(fails(2, &["run", "--max-age", "5mm"]).contains("`5mm` is not a time; write a number in seconds"));
+    assert!(fails(2, &["run", "--live-rate", "5s"]).contains("`5s` is not a rate; write a number in Hz"));
     assert!(fails(2, &["run", "--rate", "9"]).contains("--rate"));
     assert!(fails(2, &["run", "--batch", "0"]).contains("--batch"));
     assert!(fails(2, &["run", "--sink", "json:x"]).contains("did you mean `ndjson:`?"));
@@ -326,6 +328,7 @@ fn calibration_and_age_reach_the_percepts() {
     };
     assert_eq!(totals(&["--calibration", text_of(&calibration)]), [20.0, 0.0, 0.0]);
     assert_eq!(totals(&["--max-age", "0.5"]), [3.0, 3.0, 0.0]);
+    assert_eq!(totals(&["--max-age", "500ms"]), totals(&["--max-age", "0.5"]));
 }
 
 #[test]

@@ -107,11 +107,11 @@ fn what_nothing_reaches_is_said_with_by_how_much() {
     let output = with_cache(folder.path(), &[&rest[..], &BRIEF].concat());
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("no knobs meet 0.0001 mm; nearest is ") && said.contains(" times 0.0001 mm"), "{said}");
+    assert!(said.contains("no options meet 0.0001 mm; nearest is ") && said.contains(" times 0.0001 mm"), "{said}");
     let path = scene(folder.path(), "backend = \"cpu\"\n[accuracy]\nbudget = \"1 ns\"\n");
     let output = with_cache(folder.path(), &["run", &path, "--quiet"]);
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.code() == Some(1) && said.contains("no knobs meet 0.001 us"), "{said}");
+    assert!(output.status.code() == Some(1) && said.contains("no options meet 0.001 us"), "{said}");
 }
 
 #[test]
@@ -160,7 +160,7 @@ fn what_was_measured_counts_for_its_recording_and_for_what_is_live() {
     let outputs = ["--outputs", "centroid"];
     done(folder.path(), &[&["tradeoff"][..], &BRIEF, &named, &outputs].concat());
     let said = |source: &[&str]| done(folder.path(), &[&["run"][..], source, &outputs].concat()).1;
-    let by_measurement = "the fastest of these knobs, as measured on 20";
+    let by_measurement = "the fastest of these options, as measured on 20";
     for source in [&named[..], &["--source", "-"]] {
         let said = said(source);
         assert!(said.contains(by_measurement) && said.contains("touch.csv"), "{source:?}: {said}");

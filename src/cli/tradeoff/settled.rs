@@ -133,7 +133,7 @@ fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) ->
     if options.backend != BackendKind::Auto {
         return Settled { options, why: None, measured };
     }
-    let why = Some(format!("the fastest of these knobs, as measured {when}"));
+    let why = Some(format!("the fastest of these options, as measured {when}"));
     Settled { options: options.backend(combination.backend), why, measured }
 }
 

@@ -55,8 +55,10 @@ token, may look and play; nobody can change a file.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES, mut_args(shown))]
 pub(super) struct Arguments {
-    /// What to show: a body (.glb, .gltf, hand, mat or humanoid), a recording (.mcap, .csv, or a pressure system's
-    /// .asf, .lst, .asc or .txt), or a scene or simulation (.toml) [default: the bundled touch].
+    /// What to show: a body, a recording, a scene or a simulation [default: the bundled touch].
+    ///
+    /// A body is a .glb or .gltf, or hand, mat or humanoid. A recording is a .mcap, a .csv, or a pressure system's
+    /// .asf, .lst, .asc or .txt. A scene or a simulation is a .toml.
     #[arg(value_name = "WHAT")]
     what: Option<String>,
 
