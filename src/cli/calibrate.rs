@@ -157,7 +157,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let mut outputs = read.outputs(arguments.force);
     let to = outputs.add(output)?;
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
-        return Err(Error::usage("--rest and --press are times over 0, in seconds"));
+        return Err(Error::usage("--rest and --press must be over 0; give times such as 5s"));
     }
     // What was found is printed there.
     outputs.add_standard_output()?;

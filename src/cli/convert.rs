@@ -84,12 +84,12 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     if skin::is_body(&arguments.from) {
         let is_plain = arguments.body.is_none() && arguments.calibration.is_none();
         if !is_plain || arguments.export.options()? != VendorOptions::default() {
-            return Err(Error::usage("of a body nothing else can be said; leave out the flags for recordings"));
+            return Err(Error::usage("a body is converted without the flags for recordings; leave them out"));
         }
         return skin::convert(&arguments.from, to_name, arguments.force);
     }
     if arguments.from == "-" || arguments.from.starts_with("serial:") {
-        return Err(Error::usage("only a recording can be converted; record what is live with `somatic run`")
+        return Err(Error::usage("a live source is not a recording; record it with `somatic run`, and convert that")
             .at(&arguments.from));
     }
     let options = arguments.export.options()?;

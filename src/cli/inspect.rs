@@ -72,7 +72,7 @@ pub(super) struct Arguments {
 
 pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     if let Some(tolerance) = arguments.contact_tolerance.filter(|it| !(it.is_finite() && *it > 0.0)) {
-        return Err(Error::usage(format!("--contact-tolerance {tolerance} is no distance; give metres over 0")));
+        return Err(Error::usage(format!("--contact-tolerance {tolerance} is not a distance; give metres over 0")));
     }
     let body = load_body(&arguments.body)?;
     let mut findings = body.findings.clone();

@@ -94,7 +94,7 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     let spans = [Some(arguments.rest), arguments.press];
     let [rest, press] = spans.map(|s| s.map(|s| Duration::try_from_secs_f64(s).ok().filter(|span| !span.is_zero())));
     let (Some(Some(rest)), None | Some(Some(_))) = (rest, press) else {
-        return Err(Error::usage("--rest and --press are times over 0, in seconds"));
+        return Err(Error::usage("--rest and --press must be over 0; give times such as 5s"));
     };
     let ports = arguments.lines.lines(&arguments.sources)?;
     if ports.is_empty() {

@@ -163,19 +163,18 @@ impl Accuracy {
             return Err(("centroid", Error::usage("a tolerance needs outputs to hold for")));
         }
         if target.orientation_rad.is_some() && !outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) {
-            let what =
-                "a tolerance of orientation is for output `orientation` or `principal_axis`, and neither is asked for";
+            let what = "a tolerance of orientation needs output `orientation` or `principal_axis`; add one of them";
             return Err(("orientation", Error::usage(what)));
         }
         match (backend, self.arithmetic) {
             (BackendKind::Gpu, Some(Arithmetic::Double)) => {
                 let what =
-                    "`arithmetic` is double, and shaders have no double precision; take backend `cpu`, or compensated";
+                    "`arithmetic` is double, and shaders have no double precision; use backend `cpu`, or compensated";
                 return Err(("arithmetic", Error::usage(what)));
             }
             (BackendKind::Reference, Some(arithmetic @ (Arithmetic::OnePass | Arithmetic::Compensated))) => {
                 let what = format!(
-                    "`arithmetic` is {arithmetic}, and backend `reference` is always double; take `cpu` or `gpu`"
+                    "`arithmetic` is {arithmetic}, and backend `reference` is always double; use `cpu` or `gpu`"
                 );
                 return Err(("arithmetic", Error::usage(what)));
             }

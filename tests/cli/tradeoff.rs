@@ -122,7 +122,7 @@ fn contradictions_are_found_where_they_stand() {
         ("backend = \"gpu\"\n[accuracy]\narithmetic = \"double\"\n", "line 3, column 1", "no double precision"),
         ("backend = \"reference\"\n[accuracy]\narithmetic = \"one-pass\"", "line 3, column 1", "always double"),
         ("backend = \"gpu\"\n[accuracy]\n  coverage = \"touched\"", "line 3, column 3", "only backend `cpu`"),
-        ("outputs = [\"total\"]\n[accuracy]\norientation = \"2 deg\"", "line 3, column 1", "neither is asked for"),
+        ("outputs = [\"total\"]\n[accuracy]\norientation = \"2 deg\"", "line 3, column 1", "add one of them"),
         ("[accuracy]\ncentroid = \"0.5\"", "line 2, column 12", "is not a length"),
         ("[accuracy]\ncharts = \"geodesik\"", "line 2, column 10", "did you mean `geodesic`?"),
         ("[accuracy]\ncentriod = \"1 mm\"", "line 2, column 1", "did you mean `centroid`?"),

@@ -86,7 +86,10 @@ pub(in crate::cli) fn settled(asked: &Setup, input: Option<&Input>, body: &Body,
         }
     };
     let Some(pick) = target.pick(&report, way) else {
-        return Err(Error::failed(format!("no measurement meets {}", target.words())));
+        return Err(Error::failed(format!(
+            "no measurement meets {}; widen the tolerance or the budget",
+            target.words()
+        )));
     };
     if !pick.missed.is_empty() {
         return Err(Error::failed(missed(&target, &pick)?));
