@@ -149,7 +149,8 @@ pub mod scene {
     pub mod file {
         #[doc(inline)]
         pub use crate::scene_file::{
-            Accuracy, JointsDelay, LineKeys, SceneFile, StatesSpec, Target, TextKeys, TouchKeys, angle, length, time,
+            Accuracy, JointsDelay, LineKeys, SceneFile, StatesSpec, Target, TextKeys, TouchKeys, angle, hertz, length,
+            metres, seconds, time,
         };
     }
 }

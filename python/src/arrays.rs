@@ -74,7 +74,7 @@ pub(crate) fn values<'py>(
     }
     if !["f", "i", "u"].contains(&kind.as_str()) {
         let dtype = array.getattr("dtype")?.str()?;
-        return Err(usage(py, format!("{}; this is of type {dtype}, which is no number", expected())));
+        return Err(usage(py, format!("{}; this is of type {dtype}, which is not a number", expected())));
     }
     let size: usize = array.getattr("dtype")?.getattr("itemsize")?.extract()?;
     let mut values: Vec<RawValue> = if kind == "f" && size <= 4 {

@@ -144,7 +144,7 @@ fn why_not(key: &str, value: &toml::Value) -> Option<String> {
     Some(match asked.accuracy.target().is_empty() {
         true => format!("`{key}` is for the command; leave it out of this scene"),
         false => {
-            format!("`{key}` has a wish, which the command measures: `somatic tradeoff --write`; give knobs here")
+            format!("`{key}` has a wish, which the command measures: `somatic tradeoff --write`; give options here")
         }
     })
 }

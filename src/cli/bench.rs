@@ -16,7 +16,7 @@ use somatic_engine::shape::Shape;
 
 use super::bar::Bar;
 use super::interrupt::stop_soon_on_signal;
-use super::scene::{one_of, output, outputs_help, outputs_or_usual};
+use super::scene::{one_of, output, outputs_or_usual};
 use super::stdio::{DONE, print, say};
 use super::words::count;
 
@@ -38,9 +38,9 @@ const FEWEST: usize = 3;
 
 /// Measure how long a call takes, from frames in memory to percepts in memory.
 ///
-/// Sensors lie at random on a flat sheet, every field has its own random ones (or neighbours, with --local), and in every
-/// frame every sensor is pressed.
-/// The same arguments make the same skin and the same values. Rates count memberships: a sensor in a field in a frame.
+/// Sensors lie at random on a flat sheet, and every one is pressed in every frame. Every field has random sensors of its
+/// own, or neighbours with --local. The same arguments make the same skin and the same values. Rates count memberships: a
+/// sensor in a field in a frame.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
@@ -48,7 +48,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1000)]
     sensors: usize,
 
-    /// Fields beside each other.
+    /// Number of fields.
     #[arg(long, value_name = "F", default_value_t = 100)]
     fields: usize,
 
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "M", default_value_t = 16)]
     members: usize,
 
-    /// One field more, over K sensors.
+    /// One more field, over K sensors.
     #[arg(long, value_name = "K", default_value_t = 0, hide_default_value = true)]
     wide: usize,
 
@@ -72,15 +72,15 @@ pub(super) struct Arguments {
     #[arg(long, default_value = "auto", value_parser = one_of::<BackendKind>(BackendKind::WORDS))]
     backend: BackendKind,
 
-    /// Only these quantities [default: those of `somatic run`].
-    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output, help = outputs_help())]
+    /// Only these quantities of fields, as `somatic outputs` lists them [default: as for `somatic run`].
+    #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output)]
     outputs: Vec<Outputs>,
 
-    /// Measure so many calls [default: as many as fit into 2 s, at most 20000].
+    /// Number of calls to measure [default: as many as fit into 2 s, at most 20000].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     calls: Option<u32>,
 
-    /// Of places, members and values.
+    /// Random seed of places, members and values.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
 

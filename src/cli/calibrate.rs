@@ -10,11 +10,11 @@ use crate::survey::known::{KnownForce, PressedOn};
 use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use serde_json::json;
+use somatic::scene::file::{hertz, length, seconds};
 use somatic::setup::FilesRead;
 use somatic::setup::bodies::{in_body, load_body};
 use somatic::signal::{RawValue, UnitOfP};
 use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, VendorSource};
-use somatic::tradeoff::length;
 use somatic::{Body, Calibration, Error, Result};
 
 use super::interrupt::stop_on_signal;
@@ -29,14 +29,14 @@ use somatic::run::{Arrival, Feed, ReadMode, left_out};
 
 const EXAMPLES: &str = "\
 Examples:
-  somatic calibrate --body robot.glb --source session.csv --rest 5 -o robot.toml --plot robot.svg
+  somatic calibrate --body robot.glb --source session.csv --rest 5s -o robot.toml --plot robot.svg
   robot-driver | somatic calibrate --body robot.glb --source - --bits 10 -o robot.toml
   somatic calibrate --body robot.glb --source serial:/dev/ttyUSB0 --wiring hand.toml -o robot.toml
   somatic run --body robot.glb --source session.csv --calibration robot.toml
   somatic calibrate --body robot.glb --gains-from touches.csv --calibration robot.toml -o skin.toml
 
-First nothing touches the robot, for --rest seconds; then every sensor is pressed firmly, one
-after the other or many at once, until the recording ends, --press seconds are over, or Ctrl-C.
+First nothing touches the robot for the time --rest. Then press every sensor firmly, one after the
+other or many at once, until the recording ends, the time --press is over, or Ctrl-C.
 --gains-from needs no rest and no order: a finger that wanders over the skin for two minutes.
 
 The file is TOML; its keys may be edited:
@@ -62,8 +62,9 @@ pub(super) struct Arguments {
     #[arg(long = "source", value_name = "SOURCE", required_unless_present = "gains_from")]
     sources: Vec<String>,
 
-    /// Find each sensor's gain and how wide the layer makes a contact, from ordinary touches that move about; writes them into
-    /// the calibration that --calibration names.
+    /// Find each sensor's gain, and the layer's width of a contact, from ordinary touches that move about.
+    ///
+    /// They are written into the calibration that --calibration names.
     #[arg(long, value_name = "RECORDING", requires = "calibration",
         conflicts_with_all = ["sources", "plot", "press", "bits", "missing", "equalise", "mask_moved"])]
     gains_from: Option<String>,
@@ -72,8 +73,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE.toml", requires = "gains_from")]
     calibration: Option<PathBuf>,
 
-    /// For --gains-from: the touches are all by the flat end of a stamp of this radius, such as 6mm, so that the layer's own σ is told
-    /// apart from the contact's size.
+    /// For --gains-from: all touches are by the flat end of a stamp of this radius, such as 6mm.
+    ///
+    /// The layer's own σ can then be distinguished from the contact's size.
     #[arg(long, value_name = "RADIUS", requires = "gains_from", value_parser = length)]
     stamp: Option<f64>,
 
@@ -91,27 +93,35 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
-    /// How long nothing touches the robot, from the first frame on, in seconds.
-    #[arg(long, value_name = "S", default_value_t = 3.0)]
+    /// How long nothing touches the robot, from the first frame on.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", default_value = "3s", value_parser = seconds)]
     rest: f64,
 
-    /// How long sensors are pressed after that, in seconds [default: to the end of a recording; else until Ctrl-C].
-    #[arg(long, value_name = "S")]
+    /// How long sensors are pressed after that, such as 60s [default: to the end of a recording; else until Ctrl-C].
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
     press: Option<f64>,
 
-    /// Bits of the sensors' converter: tells where their range ends [default: where many of them stop].
+    /// Bits of the sensors' converter, which give the end of their range [default: where many of them stop].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=24))]
     bits: Option<u8>,
 
-    /// Raw values that are no reading, such as 0,65535: they are left out, and written down as the key `missing`.
+    /// Raw values that are not readings, such as 0,65535.
+    ///
+    /// They are left out, and written down as the key `missing`.
     #[arg(long, value_name = "RAW,...", value_delimiter = ',', allow_negative_numbers = true)]
     missing: Vec<f64>,
 
-    /// Give each sensor the gain that makes all the presses equal: for sensors that were all pressed alike.
+    /// Give each sensor the gain that makes all presses equal, for sensors that were all pressed alike.
     #[arg(long)]
     equalise: bool,
 
-    /// The force of every press, such as 4.9N, or as a weight 500g: P is in newtons then.
+    /// The force of every press, such as 4.9N, or as a weight 500g.
+    ///
+    /// P is in newtons then.
     #[arg(long, value_name = "FORCE", requires = "on", value_parser = str::parse::<KnownForce>,
         conflicts_with_all = ["equalise", "gains_from"])]
     known: Option<KnownForce>,
@@ -124,8 +134,10 @@ pub(super) struct Arguments {
     #[arg(long)]
     mask_moved: bool,
 
-    /// Frames per second of a CSV recording that has no column t, in Hz.
-    #[arg(long, value_name = "HZ")]
+    /// Frames per second of a CSV recording that has no column t, such as 50Hz.
+    ///
+    /// A bare number is in Hz.
+    #[arg(long, value_name = "RATE", value_parser = hertz)]
     rate: Option<f64>,
 
     /// Replace the calibration and the plot if they are there.
@@ -145,7 +157,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let mut outputs = read.outputs(arguments.force);
     let to = outputs.add(output)?;
     if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
-        return Err(Error::usage("--rest and --press are times over 0, in seconds"));
+        return Err(Error::usage("--rest and --press must be over 0; give times such as 5s"));
     }
     // What was found is printed there.
     outputs.add_standard_output()?;

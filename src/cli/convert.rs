@@ -43,12 +43,14 @@ and `--urdf-skin`: id, link, place, normal and area; fields are made anew, meshe
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: csv:FILE, mcap:FILE or sim:FILE.toml, or just a .csv, a .mcap or a pressure system's export. Or a body:
-    /// a .glb or .gltf file, or one of the bundled hand, mat and humanoid.
+    /// The recording, or the body.
+    ///
+    /// A recording is csv:FILE, mcap:FILE, sim:FILE.toml, or just a .csv, a .mcap or a pressure system's export. A
+    /// body is a .glb or .gltf file, or the bundled hand, mat or humanoid.
     #[arg(value_name = "IN")]
     from: String,
 
-    /// What it is to become: of a recording csv:FILE or mcap:FILE, or just a .csv or .mcap; of a body a .csv or a .urdf.
+    /// The output: of a recording csv:FILE or mcap:FILE, or just a .csv or .mcap; of a body a .csv or a .urdf.
     #[arg(value_name = "OUT", required_unless_present = "output")]
     to: Option<String>,
 
@@ -56,7 +58,7 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "OUT", conflicts_with = "to")]
     output: Option<String>,
 
-    /// The robot to put into an MCAP, a .glb or .gltf file, or one of the bundled bodies [default: the recording's own].
+    /// The robot to put into an MCAP: a .glb or .gltf file, or a bundled body [default: the recording's own].
     #[arg(long, value_name = "BODY")]
     body: Option<String>,
 
@@ -82,12 +84,12 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     if skin::is_body(&arguments.from) {
         let is_plain = arguments.body.is_none() && arguments.calibration.is_none();
         if !is_plain || arguments.export.options()? != VendorOptions::default() {
-            return Err(Error::usage("of a body nothing else can be said; leave out the flags for recordings"));
+            return Err(Error::usage("a body is converted without the flags for recordings; leave them out"));
         }
         return skin::convert(&arguments.from, to_name, arguments.force);
     }
     if arguments.from == "-" || arguments.from.starts_with("serial:") {
-        return Err(Error::usage("only a recording can be converted; record what is live with `somatic run`")
+        return Err(Error::usage("a live source is not a recording; record it with `somatic run`, and convert that")
             .at(&arguments.from));
     }
     let options = arguments.export.options()?;

@@ -4,20 +4,23 @@ use std::path::PathBuf;
 
 use clap::Args;
 use somatic::Result;
-use somatic::scene::file::SceneFile;
+use somatic::scene::file::{SceneFile, hertz};
 use somatic::source::{VendorFormat, VendorOptions};
 
 use super::scene::{in_flags, one_of};
 
-/// What is said of a recording beside what its file says.
+/// What a recording needs that its file does not have.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct ExportFlags {
-    /// Frames per second of a recording that has no times, in Hz.
-    #[arg(long, value_name = "HZ")]
+    /// Frames per second of a recording without times, such as 50Hz.
+    ///
+    /// A bare number is in Hz.
+    #[arg(long, value_name = "RATE", value_parser = hertz)]
     pub(super) rate: Option<f64>,
 
-    /// Read the file as a pressure system's export: xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers
-    /// [default: as its content says].
+    /// Read the file as the export of a pressure system [default: as its content says].
+    ///
+    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
     #[arg(long, value_name = "FORMAT", value_parser = one_of::<VendorFormat>(VendorFormat::WORDS))]
     pub(super) format: Option<VendorFormat>,
 
@@ -25,16 +28,17 @@ pub(super) struct ExportFlags {
     #[arg(long, value_name = "ROWSxCOLUMNS")]
     pub(super) grid: Option<String>,
 
-    /// From one row and column of them to the next, such as 8.6mm, or 8.6mm,5mm for rows and columns.
+    /// Distance between rows and columns of plain numbers, such as 8.6mm, or 8.6mm,5mm for rows and columns.
     #[arg(long, value_name = "LENGTH")]
     pub(super) pitch: Option<String>,
 
-    /// The unit of the values where the file does not say it: kPa, mmHg, N/cm2, psi, N, and others.
+    /// The unit of the values, if the file has none: kPa, mmHg, N/cm2, psi, N, and others.
     #[arg(long, value_name = "UNIT")]
     pub(super) unit: Option<String>,
 
-    /// Where the sensors of pedar's insoles are, which its files do not say: a CSV with the columns id, x, y and area, in
-    /// metres and square metres.
+    /// Where the sensors of pedar's insoles are: a CSV with the columns id, x, y and area.
+    ///
+    /// It is in metres and square metres. The exports of pedar do not have it.
     #[arg(long, value_name = "FILE.csv")]
     pub(super) layout: Option<PathBuf>,
 }

@@ -24,7 +24,7 @@ Examples:
   somatic info touch.mcap
   somatic info touch.csv --json | jq .rate_hz
   somatic info insoles.csv                    a pressure system's export, by its content
-  somatic info ros2-mcap:bag                  the topics of a bag of ROS 2
+  somatic info ros2-mcap:bag                  the topics of a ROS 2 bag
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording could not be read.";
 
@@ -32,7 +32,8 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording co
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: mcap:FILE, csv:FILE, ros2-mcap:PATH for a bag of ROS 2, a pressure system's export, or just the file.
+    /// The recording: mcap:FILE, csv:FILE, ros2-mcap:PATH for a ROS 2 bag, a pressure system's export, or just the
+    /// file.
     #[arg(value_name = "FILE")]
     recording: String,
 

@@ -13,6 +13,7 @@ use somatic::author::{DrawnPoses, coverage, lint_with_progress};
 use somatic::error::{Error, Result};
 use somatic::field::{ContactTolerance, FieldSet, TaxelGraph, rest_overlaps};
 use somatic::robot::{Kinematics, drawn_poses};
+use somatic::scene::file::metres;
 use somatic::setup::bodies::load_body;
 
 use self::graph::SkinGraph;
@@ -40,7 +41,9 @@ pub(super) struct Arguments {
     #[arg(long)]
     json: bool,
 
-    /// Simulate touches on the layout: how far place, axis and force will be off, with the same on an ideal skin.
+    /// Simulate touches on the layout: how far off place, axis and force will be.
+    ///
+    /// With the same on an ideal skin.
     #[arg(long)]
     errors: bool,
 
@@ -48,13 +51,17 @@ pub(super) struct Arguments {
     #[arg(long)]
     strict: bool,
 
-    /// Report links whose taxels are closer than this at rest, in metres [default: by the taxels' spacing, as for
+    /// Report links whose taxels are closer than this at rest, such as 5mm [default: by the taxels' spacing, as for
     /// self_contacts].
-    #[arg(long, value_name = "M")]
+    ///
+    /// A bare number is in metres.
+    #[arg(long, value_name = "LENGTH", value_parser = metres)]
     contact_tolerance: Option<f64>,
 
-    /// Joints of the robot: a URDF. Taxels that are covered at rest are then looked at in other poses, too. A body that was
-    /// made from a URDF keeps its joints and needs none.
+    /// Joints of the robot: a URDF.
+    ///
+    /// Taxels that are covered at rest are then checked in other poses, too. A body that was made from a URDF keeps
+    /// its joints and needs none.
     #[arg(long, value_name = "URDF")]
     joints: Option<PathBuf>,
 
@@ -65,7 +72,7 @@ pub(super) struct Arguments {
 
 pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     if let Some(tolerance) = arguments.contact_tolerance.filter(|it| !(it.is_finite() && *it > 0.0)) {
-        return Err(Error::usage(format!("--contact-tolerance {tolerance} is no distance; give metres over 0")));
+        return Err(Error::usage(format!("--contact-tolerance {tolerance} is not a distance; give metres over 0")));
     }
     let body = load_body(&arguments.body)?;
     let mut findings = body.findings.clone();

@@ -62,7 +62,7 @@ use self::stdio::{DONE, print};
 const GREETING: &str = concat!(
     "somatic ",
     env!("CARGO_PKG_VERSION"),
-    ", a sense of touch for whole robots: touch frames in, percepts out
+    ", a sense of touch for whole robots: touch frames in, touches out
 
   somatic run         turn touch frames into percepts; alone, on a bundled touch
   somatic view        show it in a browser: a body, a recording or a scene
@@ -87,8 +87,8 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some input was never pro
 
 /// A sense of touch for whole robots: raw values of sensors in, touches out.
 ///
-/// A glTF body says where the sensors are. For every touch on it, and for every receptive field, somatic tells where it
-/// is, how hard it presses, how it lies and how it moves.
+/// A glTF body has the places of the sensors. For every touch on it, somatic gives its place, how hard it presses, how it
+/// lies and how it moves. For every receptive field it gives the same.
 #[derive(Parser)]
 #[command(name = "somatic", version, after_help = EXAMPLES, max_term_width = 100)]
 pub(crate) struct Arguments {

@@ -35,7 +35,7 @@ struct Row {
     what: &'static str,
 }
 
-/// What touches have that is no number.
+/// What touches have that is not a number.
 const LISTS: [(TouchOutputs, &str, &str); 5] = [
     (TouchOutputs::LINKS, "1", "The links that it lies on, with their shares of its total."),
     (TouchOutputs::FIELDS, "1", "The fields that hold parts of it, with their shares of its total."),

@@ -33,7 +33,9 @@ taxel pressed. A stage's time is what a plan with it takes more than a plan with
 #[derive(Args)]
 #[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {
-    /// A scene, a TOML file: its keys are the flags below, with _ for -; a flag overrides its key. `somatic plan --schema` has all keys.
+    /// A scene, a TOML file; a flag overrides its key.
+    ///
+    /// Its keys are the flags below, with _ for -. `somatic plan --schema` has all keys.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 

@@ -8,6 +8,7 @@ use somatic::percept::Unit;
 use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
 use somatic::run::left_out;
 use somatic::scene::AskedOutputs;
+use somatic::scene::file::seconds;
 use somatic::setup::FilesRead;
 use somatic::setup::RECORDED_BATCH;
 use somatic::setup::Setup;
@@ -25,7 +26,7 @@ const EXAMPLES: &str = "\
 Examples:
   somatic plot -o touch.svg                          the bundled touch on the bundled hand
   somatic plot --body insole.glb walk.csv -o walk.png
-  somatic plot touch.mcap --from 60 --to 90 --outputs total,speed,orientation -o minute.svg
+  somatic plot touch.mcap --from 60s --to 90s --outputs total,speed,orientation -o minute.svg
   somatic plot --body mat before.csv after.csv -o compared.png     side by side, with one scale
   somatic plot touch.mcap --fields 'hand/palm*' -o palm.svg
 
@@ -43,8 +44,8 @@ const MAX_RECORDINGS: usize = 8;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recordings: csv:FILE, mcap:FILE or sim:FILE.toml, a pressure system's export, or just the file [default: a bundled
-    /// touch].
+    /// The recordings: csv:FILE, mcap:FILE or sim:FILE.toml, a pressure system's export, or just the file [default: a
+    /// bundled touch].
     #[arg(value_name = "SOURCE")]
     sources: Vec<String>,
 
@@ -67,12 +68,16 @@ pub(super) struct Arguments {
     #[command(flatten)]
     export: ExportFlags,
 
-    /// Begin at this time of the recording, s.
-    #[arg(long, value_name = "S")]
+    /// Begin at this time of the recording, such as 60s.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
     from: Option<f64>,
 
-    /// End at this time of the recording, s.
-    #[arg(long, value_name = "S")]
+    /// End at this time of the recording, such as 90s.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
     to: Option<f64>,
 
     /// The plot to write, .svg or .png.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use somatic::Result;
-use somatic::scene::file::LineKeys;
+use somatic::scene::file::{LineKeys, hertz};
 use somatic::source::SourceSpec;
 
 use super::scene::in_flags;
@@ -12,19 +12,22 @@ use super::scene::in_flags;
 /// How boards on serial lines are read.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct LineFlags {
-    /// Which taxel is on which channel of which board, a TOML file as `somatic board --help` shows [default: the boards, one per port,
-    /// share the taxels in ascending order of their ids].
+    /// The board and the channel of each taxel, a TOML file [default: taxels in ascending order of their ids].
+    ///
+    /// By default the boards, one per port, share the taxels. `somatic board --help` shows such a file.
     #[arg(long, value_name = "FILE")]
     pub(super) wiring: Option<PathBuf>,
 
-    /// Merge the boards' frames at this rate, in Hz; 0 gives one for each frame of any board [default: one for each
-    /// frame of the fastest board].
-    #[arg(long, value_name = "HZ")]
+    /// Merge the boards' frames at this rate, such as 100Hz [default: one for each frame of the fastest board].
+    ///
+    /// With 0 there is one for each frame of any board. A bare number is in Hz.
+    #[arg(long, value_name = "RATE", value_parser = hertz)]
     pub(super) live_rate: Option<f64>,
 
-    /// Tell the boards to send frames at this rate, in Hz; 0 is as fast as the line allows [default: leave them as they
-    /// are].
-    #[arg(long, value_name = "HZ")]
+    /// Make the boards send frames at this rate, such as 100Hz [default: leave them as they are].
+    ///
+    /// With 0 they send as fast as the line allows. A bare number is in Hz.
+    #[arg(long, value_name = "RATE", value_parser = hertz)]
     pub(super) board_rate: Option<f64>,
 }
 

@@ -23,12 +23,12 @@ Examples:
   somatic render humanoid -o chart.png --uv head/skull/front_2
   somatic render hand -o hand.png --ids --look-at hand/palm --view bottom
   somatic render hand -o edges.png --edges
-  somatic render hand -o touch.png --source touch.csv --at 2.9
-  somatic render hand -o touch.png --source touch.csv --from 1 --to 4      an animation
+  somatic render hand -o touch.png --source touch.csv --at 2.9s
+  somatic render hand -o touch.png --source touch.csv --from 1s --to 4s    an animation
   somatic render insoles.csv -o peak.png       a pressure system's export, with its own sensors
 
 With a recording, taxels have the colours of their pressures. Each touch has one mark: its
-taxels have a rim of its colour, its id stands at its place, an ellipse shows its principal axis
+taxels have a rim of its colour, its id is at its place, an ellipse shows its principal axis
 and spread, an arrow its motion of a quarter of a second, and a fading line where it was in the
 last second. Without a recording a taxel in several fields shows a slice of each. Up to twelve
 fields are named; of more, those side by side differ in colour.";
@@ -39,8 +39,9 @@ fields are named; of more, those side by side differ in colour.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid; or a recording that has its body:
-    /// .mcap, sim:FILE.toml, or a pressure system's export [default: that of the source].
+    /// The robot: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own].
+    ///
+    /// A recording that has its body may be here, too: .mcap, sim:FILE.toml, or a pressure system's export.
     #[arg(value_name = "BODY", required_unless_present = "source")]
     body: Option<String>,
 
@@ -52,7 +53,7 @@ pub(super) struct Arguments {
     #[arg(long = "view", value_name = "VIEW", value_delimiter = ',')]
     views: Vec<String>,
 
-    /// Colour only the fields whose names match; globs, may be repeated [default: all that have no children].
+    /// Colour only the fields whose names match, as globs; may be repeated [default: all that have no children].
     #[arg(long = "field", value_name = "GLOB")]
     fields: Vec<String>,
 
@@ -75,7 +76,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     touched: touched::Flags,
 
-    /// Width in pixels, or WIDTHxHEIGHT where the height is the most it may take.
+    /// Width in pixels, or WIDTHxHEIGHT with the largest height.
     #[arg(long, default_value = "1600", value_name = "PIXELS")]
     size: Size,
 

@@ -41,12 +41,12 @@ Examples:
   somatic run --source touch.csv --speed 0.25            a recording, watched in slow motion
   somatic run --source touch.csv --fields 'hand/palm*' --outputs total,centroid
   somatic run --source touch.csv --letters sustained,change --outputs total
-  somatic run --outputs filtered_direction --filter-window 0.5mm.. --filter-time 0.2
+  somatic run --outputs filtered_direction --filter-window 0.5mm.. --filter-time 200ms
   somatic run robot.scene.toml                           all of it from a file
   robot-driver | somatic run --body robot.glb --source - | controller
   robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
   zcat touch.csv.gz | somatic run --body robot.glb --source csv:-
-  somatic run --source mcap:touch.mcap --from 60 --to 90   its second minute's first half
+  somatic run --source mcap:touch.mcap --from 60s --to 90s   its second minute's first half
   somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify
 
@@ -62,19 +62,23 @@ of JSON a frame.";
 #[derive(Args)]
 #[command(after_help = FIRST_EXAMPLES, after_long_help = EXAMPLES, hide_possible_values = true, mut_args(grouped))]
 pub(super) struct Arguments {
-    /// A scene, a TOML file: its keys are the flags below, with _ for -; a flag overrides its key. `somatic plan --schema` has all keys.
+    /// A scene, a TOML file; a flag overrides its key.
+    ///
+    /// Its keys are the flags below, with _ for -. `somatic plan --schema` has all keys.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 
     #[command(flatten)]
     asked: RunFlags,
 
-    /// In csv: one row per frame, with columns of their own for each field, instead of a row per field in contact.
+    /// In csv: one row per frame, with columns of their own for each field.
+    ///
+    /// Without it, there is a row per field in contact.
     #[arg(long, help_heading = "Output")]
     wide: bool,
 
-    /// The table that csv:- puts on standard output: fields, touches or self_contacts [default: fields; touches where nothing is asked of fields;
-    /// fields].
+    /// The table that csv:- puts on standard output: fields, touches or self_contacts [default: fields; touches if no
+    /// quantity of fields is asked for].
     #[arg(long, value_name = "TABLE", help_heading = "Output")]
     table: Option<TableName>,
 
@@ -86,7 +90,9 @@ pub(super) struct Arguments {
     #[arg(long = "for", value_name = "TIME", help_heading = LIVE)]
     lasts: Option<String>,
 
-    /// At the end, write how many frames each board sent and lost, and how long percepts took, to this file, as JSON.
+    /// Write a summary at the end to this file, as JSON.
+    ///
+    /// It has how many frames each board sent and lost, and how long percepts took.
     #[arg(long, value_name = "FILE", help_heading = LIVE)]
     summary: Option<PathBuf>,
 }

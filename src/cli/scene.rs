@@ -14,7 +14,7 @@ use somatic::source::SourceSpec;
 
 pub(super) use self::flags::{LIVE, first, grouped, one_of};
 pub(super) use self::in_flags::{in_flags, words_of_flags};
-pub(super) use self::outputs::{output, outputs_help, outputs_or_usual};
+pub(super) use self::outputs::{output, outputs_or_usual};
 pub(super) use self::run_flags::RunFlags;
 use super::stdio::{check_input, say};
 

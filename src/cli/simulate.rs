@@ -49,7 +49,7 @@ The truth has a row per frame and touch: its place, normal, angle, velocity, spe
 
 /// Write a simulated touch as a recording, with its truth.
 ///
-/// Beside the recording come a table of the truth and the sensors' calibration.
+/// A table of the truth and the sensors' calibration are written next to the recording.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
@@ -61,7 +61,7 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
 
-    /// Where the truth goes, CSV [default: beside the recording, as NAME.truth.csv].
+    /// Where the truth goes, CSV [default: next to the recording, as NAME.truth.csv].
     #[arg(long, value_name = "FILE.csv")]
     truth: Option<PathBuf>,
 

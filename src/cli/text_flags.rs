@@ -1,29 +1,37 @@
-//! What is said of lines of text instead of being found out.
+//! The form of lines of text, instead of finding it out.
 
 use clap::Args;
 use somatic::Result;
 use somatic::scene::file::TextKeys;
 use somatic::source::TextOptions;
 
-/// How lines of text are written, of sources text:; what is not said is found out from the first second of them.
+/// The form of the lines of sources text:. What is left out is found out from the first second of them.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct TextFlags {
-    /// Of text:, the columns that are sensors, by number from 1 or by name, such as 2-17, 1,3,8-10 or 'A*' [default: all but times,
-    /// counts and words].
+    /// For text:, the columns that are sensors, such as 2-17, 1,3,8-10 or 'A*' [default: all but times, counts and
+    /// words].
+    ///
+    /// They are given by number from 1, or by name.
     #[arg(long, help_heading = "Live", value_name = "COLUMNS")]
     pub(super) columns: Option<String>,
 
-    /// Of text:, the taxels of these columns, such as 4-19, or names, where columns are called by the ids of their taxels [default:
-    /// as names say, else the body's in ascending order].
+    /// For text:, the taxels of these columns, such as 4-19, or names [default: as names say, else the body's in
+    /// ascending order].
+    ///
+    /// With names, columns are called by the ids of their taxels.
     #[arg(long, help_heading = "Live", value_name = "IDS")]
     pub(super) ids: Option<String>,
 
-    /// Of text:, what stands between two frames of several lines: blank, or what such a line begins with [default: as found out].
+    /// For text:, the line between two frames of several lines [default: as found out].
+    ///
+    /// Write blank, or what such a line begins with.
     #[arg(long, help_heading = "Live", value_name = "TEXT")]
     pub(super) frame_end: Option<String>,
 
-    /// Of text:, the column of the time, by number or name, and its unit, s, ms, us or iso, such as 1:ms; arrival stamps frames when
-    /// they come [default: as found out].
+    /// For text:, the column of the time and its unit, such as 1:ms [default: as found out].
+    ///
+    /// The column is given by number or name, the unit is s, ms, us or iso. With arrival, frames have the time when
+    /// they come.
     #[arg(long, help_heading = "Live", value_name = "COLUMN[:UNIT]")]
     pub(super) time: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `somatic tradeoff`: what each knob costs and gives, on one's own body, recording and machine.
+//! `somatic tradeoff`: what each option costs and gives, on one's own body, recording and machine.
 
 mod measured;
 mod settled;
@@ -9,6 +9,7 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use console::style;
+use somatic::scene::file::seconds;
 use somatic::setup::bodies::load_body;
 use somatic::setup::{FilesRead, Setup};
 use somatic::tradeoff::{CallMode, Errors, Measurement, Pick, Report, Store, TrueErrors, plot_png, plot_svg};
@@ -34,12 +35,12 @@ Examples:
   somatic tradeoff robot.scene.toml --budget 100us                     the most accurate within it
   somatic tradeoff --body mat --source night.csv --json | jq '.rows[] | select(.front)'
 
-Methods are held against the truth of touches that are simulated on the body, under the layer that the
-calibration names in [layer], or of the source where it is a simulation. The knobs of rounding are held
-against the reference. Combinations take turns, so that a machine that slows down slows all of them.
-A front is what no other combination beats: none is as true and faster. What is measured is kept, and
-`somatic run` and `somatic plan` choose by it, on the same recording or live, where a scene leaves
-the backend or the knobs to be chosen.";
+Methods are compared with the truth: of touches simulated on the body, under the layer that the
+calibration names in [layer], or of the source if it is a simulation. Options of rounding are compared
+with the reference. Combinations take turns, so that a machine that slows down slows all of them.
+The front has those that no other combination beats: none is as true and faster. Results are kept.
+With them `somatic run` and `somatic plan` choose the backend and the options that a scene leaves
+open, on the same recording or live.";
 
 /// Frames that are measured on, unless told otherwise.
 const FRAMES: usize = 512;
@@ -48,22 +49,26 @@ const VALUES: usize = 1 << 24;
 
 /// Measure speed against accuracy on your body and machine.
 ///
-/// It goes knob by knob, on touches simulated on your body, or on a recording.
+/// Each option is measured, on touches simulated on your body or on a recording.
 #[derive(Args)]
 #[command(after_help = EXAMPLES, hide_possible_values = true, mut_args(grouped), mut_arg("within", first), mut_arg("budget", first))]
 pub(super) struct Arguments {
-    /// A scene, a TOML file: its keys are the flags below, with _ for -; a flag overrides its key. `somatic plan --schema` has all keys.
+    /// A scene, a TOML file; a flag overrides its key.
+    ///
+    /// Its keys are the flags below, with _ for -. `somatic plan --schema` has all keys.
     #[arg(value_name = "SCENE")]
     scene: Option<PathBuf>,
 
     #[command(flatten)]
     asked: RunFlags,
 
-    /// How long to measure, in seconds; more is steadier.
-    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    /// How long to measure; longer is steadier.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", default_value = "10s", value_parser = seconds)]
     seconds: f64,
 
-    /// Measure on the source's first so many frames [default: 512, or as many as memory is well spent on].
+    /// Measure on this many first frames of the source [default: 512, or as many as memory is well spent on].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: Option<u32>,
 
@@ -242,7 +247,7 @@ fn rungs(report: &Report, of: &dyn Fn(&Measurement) -> Option<&TrueErrors>) -> S
     shown(&table)
 }
 
-/// What rounding costs and gives: the combinations of the other knobs against the reference.
+/// What rounding costs and gives: the combinations of the other options against the reference.
 fn rounding(report: &Report, way: CallMode, all: bool) -> String {
     let rows = report.of(way);
     if rows.is_empty() {

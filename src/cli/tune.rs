@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use clap::Args;
+use somatic::scene::file::seconds;
 use somatic::setup::FilesRead;
 use somatic::setup::bodies::load_body;
 use somatic::signal::{FsrCircuit, Wiring};
@@ -23,16 +24,15 @@ use super::stdio::{DONE, FAILED, print, say};
 const EXAMPLES: &str = "\
 Examples:
   somatic tune --body hand --source serial:/dev/ttyUSB0 --wiring hand.toml -o tuned.toml
-  somatic tune --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --rest 5 --press 60 --json
+  somatic tune --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --rest 5s --press 60s --json
   somatic calibrate --body hand --source serial:/dev/ttyUSB0 --wiring tuned.toml -o calibration.toml
   somatic run --source serial:/dev/ttyUSB0 --wiring tuned.toml --calibration calibration.toml
 
-First nothing touches the robot, for --rest seconds; then every sensor is pressed as firmly as it
-ever will be. From that follows which wiper position lets it use most of the range and leaves a
-sixteenth; the wipers are set, and the sensors pressed again to see it, until all fit, in at most
-five rounds.
-What stands in the file written by -o is set again by every command that has it as its --wiring,
-whenever a board starts. Ctrl-C puts all wipers back.";
+First nothing touches the robot for the time --rest. Then press every sensor as firmly as it ever
+will be. The command sets the wiper position with which the sensor uses most of the range and
+leaves a sixteenth. Press the sensors again, until all fit, in at most five rounds.
+Every command with the file of -o as its --wiring sets these wipers again, whenever a board
+starts. Ctrl-C puts all wipers back.";
 
 /// Set boards' potentiometers so that sensors use the converters' range.
 #[derive(Args)]
@@ -57,16 +57,22 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE.toml")]
     fsr_calibration: Option<PathBuf>,
 
-    /// The wiper to begin with, where the wiring has none: a board cannot be asked which it has.
+    /// The wiper to begin with, if the wiring has none.
+    ///
+    /// The host cannot ask a board for it.
     #[arg(long, value_name = "WIPER", default_value_t = FsrCircuit::MIDDLE_WIPER)]
     wiper: u8,
 
-    /// How long nothing touches the robot, in seconds.
-    #[arg(long, value_name = "S", default_value_t = 3.0)]
+    /// How long nothing touches the robot.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", default_value = "3s", value_parser = seconds)]
     rest: f64,
 
-    /// How long sensors are pressed in each round, in seconds [default: until Enter].
-    #[arg(long, value_name = "S")]
+    /// How long sensors are pressed in each round, such as 60s [default: until Enter].
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
     press: Option<f64>,
 
     /// Replace the files that are there.
@@ -88,7 +94,7 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     let spans = [Some(arguments.rest), arguments.press];
     let [rest, press] = spans.map(|s| s.map(|s| Duration::try_from_secs_f64(s).ok().filter(|span| !span.is_zero())));
     let (Some(Some(rest)), None | Some(Some(_))) = (rest, press) else {
-        return Err(Error::usage("--rest and --press are times over 0, in seconds"));
+        return Err(Error::usage("--rest and --press must be over 0; give times such as 5s"));
     };
     let ports = arguments.lines.lines(&arguments.sources)?;
     if ports.is_empty() {

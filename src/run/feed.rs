@@ -114,7 +114,9 @@ impl Feed {
             None => match self.arrivals.recv_timeout(wait) {
                 Ok(arrival) => arrival,
                 Err(RecvTimeoutError::Timeout) => return None,
-                Err(RecvTimeoutError::Disconnected) => Arrival::Failed(Error::failed("the source failed")),
+                Err(RecvTimeoutError::Disconnected) => {
+                    Arrival::Failed(Error::failed("the source ended without a reason; read it again"))
+                }
             },
         };
         let Arrival::Frames(mut frames, mut info) = first else { return Some(first) };

@@ -14,8 +14,8 @@ use crate::error::{Error, Result, place_in};
 use crate::percept::Outputs;
 use crate::scene::{Arithmetic, Cadence, Charts, Coverage, Knobs, OrientationBy};
 
-/// Speed against accuracy: either how far percepts may be off and how long a frame may take, so that the knobs are chosen
-/// by measurement, or the knobs themselves.
+/// Speed against accuracy: either tolerances and a time budget, for which a measurement chooses the options, or these
+/// options themselves.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 #[cfg_attr(feature = "cli", derive(JsonSchema))]
@@ -31,39 +31,49 @@ pub struct Accuracy {
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>"))]
     pub orientation_rad: Option<f64>,
 
-    /// Measure, and use only knobs with which a frame takes at most this in the median, such as 100us; without a tolerance
-    /// the most accurate of them.
+    /// Measure, and use only options with which a frame takes at most this time, such as 100us.
+    ///
+    /// The median frame counts. Without a tolerance, the most accurate of these options are chosen.
     #[serde(rename = "budget", deserialize_with = "seconds")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>"))]
     pub budget_s: Option<f64>,
 
-    /// How sums are made: in single precision (one-pass), with the rounding errors added back (compensated), or in
-    /// double precision on the CPU (double) [default: one-pass; reference: double].
+    /// How sums are made: one-pass, compensated or double [default: one-pass; reference: double].
+    ///
+    /// In single precision (one-pass), with the rounding errors added back (compensated), or in double precision on
+    /// the CPU (double).
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Arithmetic::WORDS)))]
     pub arithmetic: Option<Arithmetic>,
 
-    /// Which charts fields have: the layout's (as-authored), tangent planes (plane), or shortest paths over the surface
-    /// where that is possible (geodesic) [default: as-authored].
+    /// Which charts fields have: as-authored, plane or geodesic [default: as-authored].
+    ///
+    /// They are the layout's (as-authored), tangent planes (plane), or shortest paths over the surface where that is
+    /// possible (geodesic).
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Charts::WORDS)))]
     pub charts: Option<Charts>,
 
-    /// Which output gives an orientation: the ones in `outputs` (as-asked), orientation alone (two-points), principal_axis alone
-    /// (second-moments), or with it the direction and place of the contact fitted to each touch in one step (fit-1), two
-    /// (fit-2) or all (fit): touches.fit_direction and touches.fit_place [default: as-asked].
+    /// Which output gives an orientation: as-asked, two-points, second-moments, fit-1, fit-2 or fit [default:
+    /// as-asked].
+    ///
+    /// The ones in `outputs` (as-asked), orientation alone (two-points), or principal_axis alone (second-moments). A
+    /// fit adds touches.fit_direction and touches.fit_place to principal_axis. It fits a contact to each touch in one
+    /// step (fit-1), two (fit-2) or all (fit).
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = OrientationBy::WORDS)))]
     pub orientation_by: Option<OrientationBy>,
 
-    /// Which fields are computed in a live frame on the CPU: all, only those that changed (touched), or the faster of
-    /// these (auto); percepts are the same [default: auto].
+    /// Which fields are computed in a live frame on the CPU: all, touched or auto [default: auto].
+    ///
+    /// All of them (all), only those that changed (touched), or the faster of these (auto). Percepts are the same.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Coverage::WORDS)))]
     pub coverage: Option<Coverage>,
 
-    /// When a field is computed: in every frame (every-frame), or when its values change (on-change), and motion then
-    /// from change to change [default: every-frame].
+    /// When a field is computed: every-frame or on-change [default: every-frame].
+    ///
+    /// With on-change, a field is computed when its values change, and motion is from change to change.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Cadence::WORDS)))]
     pub cadence: Option<Cadence>,
@@ -146,26 +156,25 @@ impl Accuracy {
     pub(super) fn check(&self, backend: BackendKind, outputs: Outputs) -> Result<(), (&'static str, Error)> {
         let target = self.target();
         if let Some(knob) = self.knob().filter(|_| !target.is_empty()) {
-            let what = format!("`{knob}` sets a knob that {} chooses; give one or the other", target.words());
+            let what = format!("`{knob}` sets an option that {} chooses; give one or the other", target.words());
             return Err((knob, Error::usage(what)));
         }
         if target.centroid_m.is_some() && outputs.is_empty() {
             return Err(("centroid", Error::usage("a tolerance needs outputs to hold for")));
         }
         if target.orientation_rad.is_some() && !outputs.intersects(Outputs::ORIENTATION | Outputs::PRINCIPAL_AXIS) {
-            let what =
-                "a tolerance of orientation is for output `orientation` or `principal_axis`, and neither is asked for";
+            let what = "a tolerance of orientation needs output `orientation` or `principal_axis`; add one of them";
             return Err(("orientation", Error::usage(what)));
         }
         match (backend, self.arithmetic) {
             (BackendKind::Gpu, Some(Arithmetic::Double)) => {
                 let what =
-                    "`arithmetic` is double, and shaders have no double precision; take backend `cpu`, or compensated";
+                    "`arithmetic` is double, and shaders have no double precision; use backend `cpu`, or compensated";
                 return Err(("arithmetic", Error::usage(what)));
             }
             (BackendKind::Reference, Some(arithmetic @ (Arithmetic::OnePass | Arithmetic::Compensated))) => {
                 let what = format!(
-                    "`arithmetic` is {arithmetic}, and backend `reference` is always double; take `cpu` or `gpu`"
+                    "`arithmetic` is {arithmetic}, and backend `reference` is always double; use `cpu` or `gpu`"
                 );
                 return Err(("arithmetic", Error::usage(what)));
             }

@@ -126,7 +126,7 @@ impl SceneFile {
         }
         let by_window = &given[1..3];
         if let Some((key, _)) = by_window.iter().find(|(_, given)| *given && self.filter_over_s.is_some()) {
-            return Err(Error::usage(format!("`{key}` has no effect beside `filter_over_s`; leave one of them out")));
+            return Err(Error::usage(format!("`{key}` has no effect with `filter_over_s`; leave one of them out")));
         }
         let filter = usual
             .over_s(self.filter_over_s)

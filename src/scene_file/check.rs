@@ -73,7 +73,7 @@ impl SceneFile {
         }
         if let Some(tolerance) = self.contact_tolerance_m.filter(|it| !(it.is_finite() && *it > 0.0)) {
             return Err(Error::usage(format!(
-                "`contact_tolerance_m = {tolerance}` is no distance; give metres over 0"
+                "`contact_tolerance_m = {tolerance}` is not a distance; give metres over 0"
             )));
         }
         Ok(())

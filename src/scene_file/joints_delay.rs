@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer};
 
+use super::target::seconds;
 use crate::error::{Error, Result};
 
 /// How much later the clock of joint states stamps an instant than that of frames.
@@ -24,10 +25,10 @@ impl FromStr for JointsDelay {
         if text == "auto" {
             return Ok(Self::Auto);
         }
-        let seconds = text.parse().ok().filter(|seconds: &f64| seconds.is_finite());
-        seconds
+        let delay = seconds(text).ok().filter(|seconds| seconds.is_finite());
+        delay
             .map(Self::Seconds)
-            .ok_or_else(|| Error::usage(format!("`{text}` is not a time span; give seconds, or auto")))
+            .ok_or_else(|| Error::usage(format!("`{text}` is not a time; give seconds, a time such as 25ms, or auto")))
     }
 }
 
@@ -70,8 +71,10 @@ mod tests {
     fn a_delay_is_seconds_or_auto() {
         assert_eq!("auto".parse(), Ok(JointsDelay::Auto));
         assert_eq!("-0.5".parse(), Ok(JointsDelay::Seconds(-0.5)));
-        for text in ["", "inf", "nan", "1s", "Auto"] {
-            assert!(text.parse::<JointsDelay>().unwrap_err().to_string().contains("give seconds, or auto"), "{text}");
+        assert_eq!("-250ms".parse(), Ok(JointsDelay::Seconds(-0.25)));
+        for text in ["", "inf", "nan", "1mm", "Auto"] {
+            let error = text.parse::<JointsDelay>().unwrap_err().to_string();
+            assert!(error.contains("give seconds, a time such as 25ms, or auto"), "{error}");
         }
     }
 }

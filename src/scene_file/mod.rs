@@ -26,7 +26,7 @@ use self::deserialize::{batch, outputs, window, word, words};
 pub use self::joints_delay::JointsDelay;
 pub use self::lines::LineKeys;
 pub use self::states::StatesSpec;
-pub use self::target::{Target, angle, length, time};
+pub use self::target::{Target, angle, hertz, length, metres, seconds, time};
 pub use self::text::TextKeys;
 pub use self::touches::TouchKeys;
 use crate::backend::BackendKind;
@@ -56,14 +56,23 @@ pub struct SceneFile {
     /// hand].
     pub body: Option<String>,
 
-    /// Where touch frames come from: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a bag of ROS 2, sim:FILE.toml, a pressure system's export (.csv, .asf, .lst,
-    /// .asc, .txt), one or more serial:PORT[@BAUD], text:PORT[@BAUD] (also text:tcp://HOST:PORT, text:udp://:PORT, text:-) for a board that prints numbers, ros2:/TOPIC, one or more zenoh:KEY for limbs on other computers, or from standard input - for NDJSON and csv:- for CSV [default: a bundled touch].
+    /// Where touch frames come from, such as csv:FILE, serial:PORT, or - for NDJSON on standard input [default: a
+    /// bundled touch].
+    ///
+    /// Recordings: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a ROS 2 bag, sim:FILE.toml, or a pressure
+    /// system's export (.csv, .asf, .lst, .asc, .txt). Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or
+    /// more zenoh:KEY for limbs on other computers. A board that prints numbers: text:PORT[@BAUD],
+    /// text:tcp://HOST:PORT, text:udp://:PORT or text:-. Standard input: - for NDJSON, csv:- for CSV.
     #[serde(rename = "source", deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub sources: Vec<SourceSpec>,
 
-    /// Where percepts go: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, ros2-mcap:FOLDER for a bag of ROS 2, ros2[:/NAMESPACE] for its topics, page[:HOST:PORT] for browsers, zenoh:KEY or zenoh-percepts:KEY to send frames or percepts of a limb to another computer, or -
-    /// for NDJSON on standard output; one or a list [default: a table at a terminal, else -].
+    /// Where percepts go, such as csv:FILE, mcap:FILE, or - for NDJSON on standard output; one or a list [default: a
+    /// table at a terminal, else -].
+    ///
+    /// Files: ndjson:FILE, csv:FILE or parquet:FILE for a table, mcap:FILE, and ros2-mcap:FOLDER for a ROS 2 bag.
+    /// Live: ros2[:/NAMESPACE] for its topics, and page[:HOST:PORT] for browsers. To another computer: zenoh:KEY for
+    /// the frames of a limb, and zenoh-percepts:KEY for its percepts.
     #[serde(rename = "sink", deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub sinks: Vec<SinkSpec>,
@@ -73,8 +82,8 @@ pub struct SceneFile {
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub fields: Vec<String>,
 
-    /// Compute only these quantities [default: all but touches, self_contacts, speed_in_world, filtered_* and *_sigma;
-    /// force only where P has a unit].
+    /// Compute only these quantities of `somatic outputs` [default: touches, and of fields all but self_contacts,
+    /// speed_in_world, filtered_* and *_sigma; force only if P has a unit].
     #[serde(deserialize_with = "outputs")]
     #[cfg_attr(feature = "cli", schemars(with = "Vec<String>", transform = output_names))]
     pub outputs: Vec<AskedOutputs>,
@@ -82,12 +91,15 @@ pub struct SceneFile {
     /// When touches of the whole body begin and end: `on` and `off`, in the unit of P.
     pub touch: Option<TouchKeys>,
 
-    /// The calibration of the sensors, a TOML file; without one, pressures are raw values [default: the source's own,
-    /// if it has one].
+    /// The calibration of the sensors, a TOML file [default: the source's own, if it has one].
+    ///
+    /// Without one, pressures are raw values.
     pub calibration: Option<PathBuf>,
 
-    /// What computes: reference in double precision, cpu or gpu in single precision, or auto, the faster of cpu and gpu
-    /// [default: auto].
+    /// What computes: auto, reference, cpu or gpu [default: auto].
+    ///
+    /// The reference has double precision, cpu and gpu have single precision. With auto, the faster of cpu and gpu
+    /// computes.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = BackendKind::WORDS)))]
     pub backend: Option<BackendKind>,
@@ -95,50 +107,57 @@ pub struct SceneFile {
     /// Play a recording at this many times its own speed [default: as fast as possible; 1 with a page].
     pub playback_speed: Option<f64>,
 
-    /// Compare every percept with the double-precision reference; exit with 1 where they disagree.
+    /// Compare every percept with the double-precision reference; exit with 1 if they disagree.
     pub verify: bool,
 
     /// Replace output files that exist; a file that is read is never replaced.
     pub overwrite: bool,
 
-    /// Compute the fields from pressures (sustained), from their change per second (change), or once from each [default:
-    /// sustained].
+    /// Compute the fields from pressures (sustained), from their change per second (change), or once from each
+    /// [default: sustained].
     #[serde(deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub letters: Vec<Receptor>,
 
-    /// Compute from the raw or linear signal of force-sensing resistors, not the one in the calibration; with both,
-    /// every field is computed once from each.
+    /// Compute from the raw or the linear signal of force-sensing resistors, not the one in the calibration.
+    ///
+    /// With both, every field is computed once from each.
     #[serde(deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub signal: Vec<FsrSignal>,
 
-    /// Take the first frame's values as the sensors' baselines; nothing may touch the robot then.
+    /// Use the first frame's values as the sensors' baselines.
+    ///
+    /// Nothing may touch the robot then.
     pub tare: bool,
 
-    /// Frame of positions and normals: the world where frames carry poses, or always the field's anchor [default:
+    /// Frame of positions and normals: the world if frames carry poses, or always the field's anchor [default:
     /// world].
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Coordinates::WORDS)))]
     pub coordinates: Option<Coordinates>,
 
-    /// Put positions, normals and self-contacts into the frame of this link instead of the world, where frames carry poses.
+    /// Put positions, normals and self-contacts into the frame of this link instead of the world, if frames carry
+    /// poses.
     pub relative_to: Option<String>,
 
-    /// How far the places of two touches may be apart that are one contact, in metres [default: by the taxels' spacing].
+    /// How far apart the places of two touches in self-contact may be, in metres [default: by the taxels' spacing].
     pub contact_tolerance_m: Option<f64>,
 
     /// The longest time between two frames over which motion is measured, in seconds [default: 10].
     pub max_gap_s: Option<f64>,
 
-    /// How far a centroid must move until the filtered_* outputs count it, and how far it moves at most within one
-    /// touch, such as 0.5mm..20mm; either end may be left out [default: 1/16 and 3 times the spacing of the field's
-    /// taxels].
+    /// How far a centroid must move to count in filtered_* outputs, such as 0.5mm..20mm [default: 1/16 and 3 times
+    /// the spacing of the field's taxels].
+    ///
+    /// The upper end is how far it moves at most within one touch. Either end may be left out.
     #[serde(deserialize_with = "window")]
     pub filter_window: Option<String>,
 
-    /// What `filter_window` measures: how far the centroid moves (distance), or how much its distance from the chart's
-    /// origin changes, as in the paper (radial) [default: distance].
+    /// What `filter_window` measures: distance or radial [default: distance].
+    ///
+    /// With distance, how far the centroid moves. With radial, how much its distance from the chart's origin changes,
+    /// as in the paper.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = ["distance", "radial"])))]
     pub filter_by: Option<FilterBy>,
@@ -146,8 +165,10 @@ pub struct SceneFile {
     /// Time constant of filtered_direction, in seconds; 0 follows at once [default: 0.1].
     pub filter_time_s: Option<f64>,
 
-    /// Measure the filtered_* outputs over this time, in seconds, from where the centroid was that long ago, instead of by
-    /// `filter_window`, of which the high end still counts. 0.2 is steady where few sensors feel a touch.
+    /// Measure the filtered_* outputs over this time, in seconds, instead of by `filter_window`.
+    ///
+    /// Motion is measured from where the centroid was that long ago; the upper end of `filter_window` still counts.
+    /// With 0.2 it is steady even if few sensors feel a touch.
     pub filter_over_s: Option<f64>,
 
     /// Play a recording from this time after its start, in seconds [default: 0].
@@ -160,11 +181,12 @@ pub struct SceneFile {
     #[serde(rename = "loop")]
     pub repeat: Option<u64>,
 
-    /// Frames per second of a recording that has no times, in Hz.
+    /// Frames per second of a recording without times, in Hz.
     pub rate_hz: Option<f64>,
 
-    /// Read the source as a pressure system's export: xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers
-    /// [default: as its content says].
+    /// Read the source as the export of a pressure system [default: as its content says].
+    ///
+    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = VendorFormat::WORDS)))]
     pub format: Option<VendorFormat>,
@@ -172,14 +194,15 @@ pub struct SceneFile {
     /// Rows and columns of a frame of plain numbers, such as 31x11.
     pub grid: Option<String>,
 
-    /// From one row and column of them to the next, such as 8.6mm, or 8.6mm,5mm for rows and columns.
+    /// Distance between rows and columns of plain numbers, such as 8.6mm, or 8.6mm,5mm for rows and columns.
     pub pitch: Option<String>,
 
-    /// The unit of an export's values where it does not say it: kPa, mmHg, N/cm2, psi, N, and others.
+    /// The unit of an export's values, if it has none: kPa, mmHg, N/cm2, psi, N, and others.
     pub unit: Option<String>,
 
-    /// Where the sensors of pedar's insoles are, which its files do not say: a CSV with the columns id, x, y and area, in
-    /// metres and square metres.
+    /// Where the sensors of pedar's insoles are: a CSV with the columns id, x, y and area.
+    ///
+    /// It is in metres and square metres. The exports of pedar do not have it.
     pub layout: Option<PathBuf>,
 
     /// What mcap:FILE holds: raw frames (frames), percepts, and what viewers show (view) [default: all].
@@ -187,88 +210,107 @@ pub struct SceneFile {
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub record: Vec<RecordPart>,
 
-    /// How long a taxel that frames leave out keeps its value, in seconds; after that it counts as missing [default: 0;
-    /// for boards three of their frames, and at least 0.05].
+    /// How long a taxel that frames leave out keeps its value, in seconds [default: 0; for boards three of their
+    /// frames, at least 0.05].
+    ///
+    /// After that it counts as missing.
     pub max_age_s: Option<f64>,
 
     /// Fail at the first taxel on standard input that the body does not have [default: leave its values out and exit
     /// with 3].
     pub strict: bool,
 
-    /// Which taxel is on which channel of which board, a TOML file as `somatic board --help` shows [default: the boards, one per port,
-    /// share the taxels in ascending order of their ids].
+    /// The board and the channel of each taxel, a TOML file [default: taxels in ascending order of their ids].
+    ///
+    /// By default the boards, one per port, share the taxels. `somatic board --help` shows such a file.
     pub wiring: Option<PathBuf>,
 
-    /// Merge the boards' frames at this rate, in Hz; 0 gives one for each frame of any board [default: one for each
-    /// frame of the fastest board].
+    /// Merge the boards' frames at this rate, in Hz [default: one for each frame of the fastest board].
+    ///
+    /// With 0 there is one for each frame of any board.
     pub live_rate_hz: Option<f64>,
 
-    /// Tell the boards to send frames at this rate, in Hz; 0 is as fast as the line allows [default: leave them as they
-    /// are].
+    /// Make the boards send frames at this rate, in Hz [default: leave them as they are].
+    ///
+    /// With 0 they send as fast as the line allows.
     pub board_rate_hz: Option<f64>,
 
-    /// How lines of `text:` are written, where that is not to be found out.
+    /// The form of the lines of `text:`, if it is not to be found out.
     #[cfg_attr(
         feature = "cli",
-        schemars(description = "How lines of `text:` are written, where that is not to be found out.")
+        schemars(description = "The form of the lines of `text:`, if it is not to be found out.")
     )]
     pub text: TextKeys,
 
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
     pub zenoh_config: Option<PathBuf>,
 
-    /// The robot's URDF: joint states, which frames carry or `joint_states` has, say where links are.
+    /// The robot's URDF, with which joint states give the poses of links.
+    ///
+    /// Joint states come in the frames, or from `joint_states`.
     pub joints: Option<PathBuf>,
 
-    /// Joint states in a recording of their own: a CSV under t,<joint>,..., NDJSON, a bag of ROS 2 in MCAP (a .mcap, a folder, or
-    /// ros2-mcap:PATH:/TOPIC), or ros2:/TOPIC, live [default: those in the frames, or in their bag].
+    /// A recording of joint states, or ros2:/TOPIC, live [default: those in the frames, or in their bag].
+    ///
+    /// A recording is a CSV under t,<joint>,..., NDJSON, or a ROS 2 bag in MCAP: a .mcap, a folder, or
+    /// ros2-mcap:PATH:/TOPIC.
     pub joint_states: Option<PathBuf>,
 
-    /// The axis that points up in the URDF: z, or y where its axes are glTF's [default: what the body was made with, else z].
+    /// The URDF's axis that points up: z, or y if its axes are glTF's [default: the axis used for the body, else z].
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = Up::WORDS)))]
     pub up: Option<Up>,
 
-    /// How much later the clock of `joint_states` stamps an instant than that of the frames, in seconds; auto estimates it
-    /// for frames and states from one bag of ROS 2 [default: 0].
+    /// How much later the clock of `joint_states` stamps an instant than the frames' clock, in seconds [default: 0].
+    ///
+    /// With "auto" it is estimated, for frames and states from one ROS 2 bag.
     #[cfg_attr(
         feature = "cli",
         schemars(with = "Option<f64>", extend("type" = ["number", "string", "null"], "pattern" = "^auto$"))
     )]
     pub joints_delay_s: Option<JointsDelay>,
 
-    /// The age of a joint's last state from which on positions stay in links, flagged stale_pose, in seconds [default:
-    /// 0.1].
+    /// The age of a joint's last state from which positions stay in links, in seconds [default: 0.1].
+    ///
+    /// They have the flag stale_pose then.
     pub joints_max_age_s: Option<f64>,
 
-    /// The times of ROS messages: those of the frames (recording), or this computer's when the first frame comes and as the
-    /// frames go on (wall) [default: recording].
+    /// The times of ROS messages: recording or wall [default: recording].
+    ///
+    /// With recording, they are the frames' times. With wall, they begin at this computer's time when the first frame
+    /// comes, and go on as the frames do.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = RosTime::WORDS)))]
     pub ros_time: Option<RosTime>,
 
-    /// How far percepts may be off and how long a frame may take, or the knobs themselves.
+    /// Tolerances and a time budget, for which a measurement chooses the options, or these options themselves.
     #[cfg_attr(
         feature = "cli",
-        schemars(description = "How far percepts may be off and how long a frame may take, or the knobs themselves.")
+        schemars(
+            description = "Tolerances and a time budget, for which a measurement chooses the options, or these options \
+                           themselves."
+        )
     )]
     pub accuracy: Accuracy,
 
-    /// Compute at most this many frames in one call: more is faster, fewer is sooner [default: 256 for recordings, 1
-    /// live].
+    /// Compute at most this many frames in one call [default: 256 for recordings, 1 live].
+    ///
+    /// More is faster, fewer is sooner.
     #[serde(deserialize_with = "batch")]
     #[cfg_attr(feature = "cli", schemars(range(min = 1, max = 65536)))]
     pub batch: Option<u32>,
 
-    /// Let browsers reach the page by this host name too; without one it is for this machine alone. One or a list.
+    /// Let browsers reach the page by this host name too; one or a list.
+    ///
+    /// Without one, the page is for this machine alone.
     #[serde(rename = "allow_host", deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub allow_hosts: Vec<String>,
 
-    /// Begin NDJSON with a line that says units and body.
+    /// Begin NDJSON with a line that has units and body.
     pub header: bool,
 
-    /// Write fields without contact too.
+    /// Write fields without contact, too.
     pub all_fields: bool,
 
     /// Show no table, progress or remarks.

@@ -26,8 +26,10 @@ impl StatesSpec {
         let text = states.to_str().unwrap_or_default();
         if let Some(topic) = text.strip_prefix("ros2:") {
             if !topic.starts_with('/') {
-                return Err(Error::usage(format!("`{topic}` is no topic; it begins with /: ros2:/{topic}"))
-                    .at("`joint_states`"));
+                return Err(Error::usage(format!(
+                    "`{topic}` is not a topic; write one that begins with /: ros2:/{topic}"
+                ))
+                .at("`joint_states`"));
             }
             return Ok(Self::Topic(topic.to_owned()));
         }

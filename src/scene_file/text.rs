@@ -1,4 +1,4 @@
-//! What a scene says of lines of text instead of its being found out.
+//! The form of lines of text in a scene, instead of finding it out.
 
 #[cfg(feature = "cli")]
 use schemars::JsonSchema;
@@ -7,22 +7,29 @@ use serde::Deserialize;
 use crate::error::Result;
 use crate::source::TextOptions;
 
-/// How lines of text are written, of sources text:; what is not said is found out from the first second of them.
+/// The form of the lines of sources text:. What is left out is found out from the first second of them.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 #[cfg_attr(feature = "cli", derive(JsonSchema))]
 #[non_exhaustive]
 pub struct TextKeys {
-    /// The columns that are sensors, by number from 1 or by name, such as 2-17, 1,3,8-10 or 'A*' [default: all but times, counts and
-    /// words].
+    /// The columns that are sensors, such as 2-17, 1,3,8-10 or 'A*' [default: all but times, counts and words].
+    ///
+    /// They are given by number from 1, or by name.
     pub columns: Option<String>,
-    /// The taxels of these columns, such as 4-19, or names, where columns are called by the ids of their taxels [default: as names say,
-    /// else the body's in ascending order].
+    /// The taxels of these columns, such as 4-19, or names [default: as names say, else the body's in ascending
+    /// order].
+    ///
+    /// With names, columns are called by the ids of their taxels.
     pub ids: Option<String>,
-    /// What stands between two frames of several lines: blank, or what such a line begins with [default: as found out].
+    /// The line between two frames of several lines [default: as found out].
+    ///
+    /// Write blank, or what such a line begins with.
     pub frame_end: Option<String>,
-    /// The column of the time, by number or name, and its unit, s, ms, us or iso, such as 1:ms; arrival stamps frames when they come
-    /// [default: as found out].
+    /// The column of the time and its unit, such as 1:ms [default: as found out].
+    ///
+    /// The column is given by number or name, the unit is s, ms, us or iso. With arrival, frames have the time when
+    /// they come.
     pub time: Option<String>,
 }
 

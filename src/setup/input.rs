@@ -76,11 +76,11 @@ impl Input {
             };
         }
         if setup.playback_speed.is_some() && !input.is_recording() {
-            return Err(Error::usage("`playback_speed` is for recordings; live frames come when they come"));
+            return Err(Error::usage("`playback_speed` is for recordings; leave it out for live sources"));
         }
         if (setup.from_s.is_some() || setup.to_s.is_some() || setup.repeat.is_some()) && !input.is_recording() {
             return Err(Error::usage(
-                "`from_s`, `to_s` and `loop` are for recordings; live frames come when they come",
+                "`from_s`, `to_s` and `loop` are for recordings; leave them out for live sources",
             ));
         }
         Ok(input)

@@ -8,7 +8,7 @@ use crate::scene_file::{JointsDelay, StatesSpec};
 use crate::source::{JointStates, Source, SourceSpec};
 
 /// What is added where nothing says which axis points up in the URDF.
-const Z_IS_ASSUMED: &str = "; its z is taken as up, as REP 103 has it: where its y is up, give `up = \"y\"`";
+const Z_IS_ASSUMED: &str = "; its z counts as up, as in REP 103; if its y is up, give `up = \"y\"`";
 
 impl Setup {
     /// The delay to go by, s, where the joints come from `states`; an estimate is said.

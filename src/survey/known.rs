@@ -14,7 +14,7 @@ impl FromStr for KnownForce {
 
     /// `4.9N`, or a weight such as `500g`.
     fn from_str(text: &str) -> Result<Self> {
-        let bad = || Error::usage(format!("{text} is no force; write it as 4.9N, or as a weight, 500g"));
+        let bad = || Error::usage(format!("{text} is not a force; write it as 4.9N, or as a weight, 500g"));
         let text = text.trim();
         let end = text.find(|c: char| c.is_alphabetic()).unwrap_or(text.len());
         let unit = match text[end..].trim() {

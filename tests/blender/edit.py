@@ -3,7 +3,7 @@
     edit.py IN.glb OUT.glb [EDIT]
 
 EDIT is one of the functions below; without one the body is only imported and exported. The options of the export are
-those that docs/reference/layout.md asks for, less the one that a `without_…` leaves off. What an edit did is printed as JSON, so
+those that docs/how-to/blender.md asks for, less the one that a `without_…` leaves off. What an edit did is printed as JSON, so
 that a test knows what to look for.
 """
 

@@ -361,7 +361,7 @@ fn an_estimate_that_cannot_be_had_is_refused_with_what_is_missing() {
         assert!(told.contains(why), "{told}");
     }
     let told = fails(2, &with(&run_of(&body, &bag("bag.mcap"), &bag("bag.mcap")), &["--joints-delay", "soon"]));
-    assert!(told.contains("`soon` is not a time span; give seconds, or auto"), "{told}");
+    assert!(told.contains("`soon` is not a time; give seconds, a time such as 25ms, or auto"), "{told}");
 }
 
 #[test]
@@ -436,7 +436,7 @@ fn bags_that_are_not_read_say_what_to_do_and_cut_ones_give_what_is_whole() {
     assert!(same + 10 > count, "{same} of {count}");
     let told = stderr(&cut);
     assert_eq!(told.matches("cut.mcap: it is cut off: what came after t = ").count(), 2, "{told}");
-    // A position that is no number tells nothing, and is told.
+    // A position that is not a number tells nothing, and is told.
     let mut odd = messages.clone();
     let What::Joints(_, position) = &mut odd.iter_mut().rfind(|one| one.topic != "/skin").unwrap().what else {
         panic!()

@@ -398,7 +398,7 @@ fn a_bag_of_another_robot_whose_ids_fit_is_told() {
         stderr(&output(&arguments.iter().map(String::as_str).collect::<Vec<_>>()))
     };
     let told = run(&gripper);
-    assert_eq!(told.matches("clouds are in frame `fore_arm`, which is no link of ").count(), 1, "{told}");
+    assert_eq!(told.matches("clouds are in frame `fore_arm`, which is not a link of ").count(), 1, "{told}");
     assert!(told.contains("gripper.glb; is it the right body?"), "{told}");
     assert!(!run(&arm).contains("clouds are in frame"));
 }

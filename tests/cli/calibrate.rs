@@ -107,7 +107,7 @@ fn a_survey_that_says_nothing_leaves_nothing_behind() {
         assert!(!std::path::Path::new(&toml).exists());
     };
     refused(&[], "no sensor left its rest", 1);
-    refused(&["--rest=-1"], "times over 0", 2);
+    refused(&["--rest=-1"], "must be over 0", 2);
     refused(&["--plot", "a.gif"], "ends in .svg or .png", 2);
 }
 

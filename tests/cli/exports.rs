@@ -174,7 +174,7 @@ fn a_wrong_row_in_the_middle_is_an_error_with_its_place() {
     let (_folder, path) = changed(&format!("{}0,0,O,0{}", &whole[..at + 1], &whole[at + 8..]));
     let error = fails(1, &["run", "--backend", "cpu", "--quiet", "--source", text_of(&path), "--sink", "-"]);
     assert!(error.contains(&format!("insoles.csv: line {line}: sensor `")), "{error}");
-    assert!(error.contains("column 3: `O` is no number") && error.lines().count() == 1, "{error}");
+    assert!(error.contains("column 3: `O` is not a number") && error.lines().count() == 1, "{error}");
 }
 
 #[test]

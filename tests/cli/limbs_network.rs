@@ -305,7 +305,7 @@ pub fn play(limbs: &mut [Limb], mut row: u64, mut until: impl FnMut(u64) -> bool
 }
 
 pub fn number(of: &Value) -> u64 {
-    of.as_u64().unwrap_or_else(|| panic!("{of} is no number"))
+    of.as_u64().unwrap_or_else(|| panic!("{of} is not a number"))
 }
 
 /// What a head saw of a limb's field.

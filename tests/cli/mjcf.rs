@@ -147,7 +147,7 @@ fn what_is_wrong_with_a_model_is_one_line_with_its_place() {
     assert!(why("file=\"box.stl\"", "file=\"bix.stl\"").contains("no such file"));
     assert!(why("<frame pos", "<replicate count=\"3\"/><frame pos").contains("to_xml()"));
     assert!(why("<worldbody>", "<worldbdy>").contains("not valid XML"));
-    assert!(why("pos=\"0 0 0.5\"", "pos=\"0 0 half\"").contains("`half`, which is no number"));
+    assert!(why("pos=\"0 0 0.5\"", "pos=\"0 0 half\"").contains("`half`, which is not a number"));
     assert!(
         why("type=\"box\" size=\"0.02 0.03 0.01\"", "type=\"box\" size=\"0.02\"").contains("a box has more numbers")
     );

@@ -157,7 +157,7 @@ fn conversion_comes_back_with_every_bit() {
     assert!(why.contains("--force"), "{why}");
     done(&["convert", text_of(&csv), text_of(&mcap), "--force"]);
     assert!(fails(2, &["convert", text_of(&csv), text_of(&csv), "--force"]).contains("name another file"));
-    assert!(fails(2, &["convert", "-", text_of(&csv)]).contains("only a recording"));
+    assert!(fails(2, &["convert", "-", text_of(&csv)]).contains("is not a recording"));
     for text in ["-", "x.ndjson", "sim:a.toml", "serial:/dev/ttyUSB0"] {
         let why = fails(2, &["info", text]);
         assert!(why.contains("this should be csv:FILE, mcap:FILE, ros2-mcap:PATH") && why.contains(text), "{why}");

@@ -306,7 +306,7 @@ fn a_body_of_a_urdf_remembers_what_points_up_in_it() {
     let (folder, body) = arm();
     let frame = "{\"t\":0,\"values\":{\"11\":5},\"joints\":{\"shoulder\":0,\"elbow\":0,\"grip\":0}}\n";
     let in_root = DVec3::new(0.3 + 0.07, 0.015, 0.12 + 0.02);
-    let assumed = "its z is taken as up, as REP 103 has it";
+    let assumed = "its z counts as up, as in REP 103";
     let (found, said) = run_lines(&body, frame, &["--joints", URDF]);
     assert!(place(&found[0]).0.distance(in_root) < 1e-6 && !said.contains(assumed), "{said}");
     // With y up the URDF has glTF's axes, and faces along its z.

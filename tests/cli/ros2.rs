@@ -191,7 +191,7 @@ fn with<'a>(flags: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 #[test]

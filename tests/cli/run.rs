@@ -207,6 +207,8 @@ fn what_makes_no_sense_is_wrong_usage() {
     assert!(fails(2, &["run", "--source", "-", "--speed", "2"]).contains("--speed"));
     assert!(fails(2, &["run", "--speed", "0"]).contains("--speed 0"));
     assert!(fails(2, &["run", "--max-age", "nan"]).contains("--max-age"));
+    assert!(fails(2, &["run", "--max-age", "5mm"]).contains("`5mm` is not a time; write a number in seconds"));
+    assert!(fails(2, &["run", "--live-rate", "5s"]).contains("`5s` is not a rate; write a number in Hz"));
     assert!(fails(2, &["run", "--rate", "9"]).contains("--rate"));
     assert!(fails(2, &["run", "--batch", "0"]).contains("--batch"));
     assert!(fails(2, &["run", "--sink", "json:x"]).contains("did you mean `ndjson:`?"));
@@ -234,7 +236,7 @@ fn filtered_motion_is_given_where_it_is_asked_for() {
         (&["--filter-time", "nan"][..], "filter time of NaN"),
         (&["--filter-time", "-1"], "filter time of -1"),
         (&["--filter-over", "0"], "motion over 0 s"),
-        (&["--filter-over", "0.2", "--filter-by", "radial"], "--filter-by has no effect beside --filter-over"),
+        (&["--filter-over", "0.2", "--filter-by", "radial"], "--filter-by has no effect with --filter-over"),
         (&["--filter-window", "-1mm..2mm"], "from -1 mm"),
         (&["--filter-window", "3mm..2mm"], "the smaller first"),
         (&["--filter-window", "3..4"], "has no unit"),
@@ -268,7 +270,7 @@ fn what_is_not_there_is_named_in_one_line() {
 fn ids_that_the_body_does_not_have_are_told_with_the_file() {
     let (_folder, path) = file("touch.csv", "t,4,77\n0,1,2\n");
     let error = fails(1, &["run", "--backend", "cpu", "--source", text_of(&path)]);
-    let start = format!("somatic: error: {}: header: there is a taxel id 77, which", path.display());
+    let start = format!("somatic: error: {}: header: taxel id 77 is not in the body", path.display());
     assert!(error.starts_with(&start), "{error}");
     let (_folder, path) = file("touch.csv", "t,4,4\n0,1,2\n");
     assert!(fails(1, &["run", "--source", text_of(&path)]).contains("touch.csv: taxel 4 heads columns 2 and 3"));
@@ -326,6 +328,7 @@ fn calibration_and_age_reach_the_percepts() {
     };
     assert_eq!(totals(&["--calibration", text_of(&calibration)]), [20.0, 0.0, 0.0]);
     assert_eq!(totals(&["--max-age", "0.5"]), [3.0, 3.0, 0.0]);
+    assert_eq!(totals(&["--max-age", "500ms"]), totals(&["--max-age", "0.5"]));
 }
 
 #[test]

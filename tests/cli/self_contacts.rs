@@ -182,7 +182,7 @@ fn poses_that_are_off_and_a_tolerance_that_is_too_small_give_no_contacts() {
     assert!(any(&plates.jointed(&plates.lines(&truth, 0.017), &[])));
     assert!(!any(&plates.jointed(&plates.lines(&truth, 0.021), &[])));
     let lines = plates.lines(&truth, 0.0);
-    assert!(any(&plates.jointed(&lines, &["--contact-tolerance", "0.003"])));
+    assert!(any(&plates.jointed(&lines, &["--contact-tolerance", "3mm"])));
     assert!(!any(&plates.jointed(&lines, &["--contact-tolerance", "0.0005"])));
     // Far enough apart, two touches of others would pass for one.
     let open = &plates.jointed(&lines, &["--contact-tolerance", "0.05"])[13];

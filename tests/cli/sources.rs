@@ -85,7 +85,7 @@ fn csv_on_standard_input_is_the_same_as_from_a_file() {
     let piped = fed(&["--source", "csv:-", "--rate", "10"], "4\n1\n2\n");
     assert_eq!(frames(&stdout(&piped))[1]["t"], 0.1);
     let bad = fed(&["--source", "csv:-"], "t,4\n0,x\n");
-    assert!(stderr(&bad).contains("stdin: line 2: taxel 4: `x` is no number"), "{}", stderr(&bad));
+    assert!(stderr(&bad).contains("stdin: line 2: taxel 4: `x` is not a number"), "{}", stderr(&bad));
     assert!(fails(2, &["run", "--source", "csv:-", "--loop=2"]).contains("--loop is for recordings in files"));
     assert!(fails(2, &["run", "--source", "csv:-", "--source", "-"]).contains("only serial lines"));
     assert!(fails(2, &["info", "csv:-"]).contains("should be csv:FILE, mcap:FILE, ros2-mcap:PATH"));

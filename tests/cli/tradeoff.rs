@@ -107,11 +107,11 @@ fn what_nothing_reaches_is_said_with_by_how_much() {
     let output = with_cache(folder.path(), &[&rest[..], &BRIEF].concat());
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("no knobs meet 0.0001 mm; nearest is ") && said.contains(" times 0.0001 mm"), "{said}");
+    assert!(said.contains("no options meet 0.0001 mm; nearest is ") && said.contains(" times 0.0001 mm"), "{said}");
     let path = scene(folder.path(), "backend = \"cpu\"\n[accuracy]\nbudget = \"1 ns\"\n");
     let output = with_cache(folder.path(), &["run", &path, "--quiet"]);
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.code() == Some(1) && said.contains("no knobs meet 0.001 us"), "{said}");
+    assert!(output.status.code() == Some(1) && said.contains("no options meet 0.001 us"), "{said}");
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn contradictions_are_found_where_they_stand() {
         ("backend = \"gpu\"\n[accuracy]\narithmetic = \"double\"\n", "line 3, column 1", "no double precision"),
         ("backend = \"reference\"\n[accuracy]\narithmetic = \"one-pass\"", "line 3, column 1", "always double"),
         ("backend = \"gpu\"\n[accuracy]\n  coverage = \"touched\"", "line 3, column 3", "only backend `cpu`"),
-        ("outputs = [\"total\"]\n[accuracy]\norientation = \"2 deg\"", "line 3, column 1", "neither is asked for"),
+        ("outputs = [\"total\"]\n[accuracy]\norientation = \"2 deg\"", "line 3, column 1", "add one of them"),
         ("[accuracy]\ncentroid = \"0.5\"", "line 2, column 12", "is not a length"),
         ("[accuracy]\ncharts = \"geodesik\"", "line 2, column 10", "did you mean `geodesic`?"),
         ("[accuracy]\ncentriod = \"1 mm\"", "line 2, column 1", "did you mean `centroid`?"),
@@ -160,7 +160,7 @@ fn what_was_measured_counts_for_its_recording_and_for_what_is_live() {
     let outputs = ["--outputs", "centroid"];
     done(folder.path(), &[&["tradeoff"][..], &BRIEF, &named, &outputs].concat());
     let said = |source: &[&str]| done(folder.path(), &[&["run"][..], source, &outputs].concat()).1;
-    let by_measurement = "the fastest of these knobs, as measured on 20";
+    let by_measurement = "the fastest of these options, as measured on 20";
     for source in [&named[..], &["--source", "-"]] {
         let said = said(source);
         assert!(said.contains(by_measurement) && said.contains("touch.csv"), "{source:?}: {said}");

@@ -239,7 +239,7 @@ fn what_makes_no_sense_is_said_before_anything_is_set() {
     let refused = |arguments: &[&str]| super::fails(2, &[&["tune"], arguments].concat());
     assert!(refused(&["--source", "a.csv", "--press", "3"]).contains("give --source serial:PORT"));
     assert!(refused(&["--source", "serial:a"]).contains("is not a terminal; give --press"));
-    assert!(refused(&["--source", "serial:a", "--press", "0"]).contains("times over 0"));
+    assert!(refused(&["--source", "serial:a", "--press", "0"]).contains("must be over 0"));
     assert!(refused(&["--source", "serial:a", "--press", "3", "--wiper", "256"]).contains("256"));
     assert!(refused(&["--source", "serial:a", "--source", "-", "--press", "3"]).contains("only serial lines"));
     let (_folder, path) = super::file("there.toml", "mine");

@@ -206,8 +206,8 @@ fn what_cannot_be_shown_is_one_line() {
         (2, &["view", "--source", "-"], "--sink page"),
         (2, &["view", "--listen", "0.0.0.0:0"], "--allow-host"),
         (2, &["view", "--for", "soon"], "is not a time"),
-        (2, &["view", "--sink", "a.ndjson"], "writes and compares nothing"),
-        (2, &["view", "--verify"], "writes and compares nothing"),
+        (2, &["view", "--sink", "a.ndjson"], "has no use for --sink and --verify"),
+        (2, &["view", "--verify"], "has no use for --sink and --verify"),
         (2, &["view", "hand", "--calibration", "none.toml"], "--calibration: it is about frames"),
     ] {
         let line = fails(code, arguments);

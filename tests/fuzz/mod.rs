@@ -64,7 +64,7 @@ const TOGETHER_S: f64 = 60.0;
 
 fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
     std::env::var(name)
-        .map_or(default, |text| text.parse().unwrap_or_else(|_| panic!("{name} is no number that fits: {text}")))
+        .map_or(default, |text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number that fits: {text}")))
 }
 
 /// Runs `target`, and fails with the input that shows a fault.

@@ -566,7 +566,7 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         ),
         ("[[place]]\nspacing = 4\n".into(), 2, "write \"4 mm\""),
         ("[[place]]\ngrid = \"hexagonal\"\npitch = 4\n".into(), 2, "a pitch of 4.00 m"),
-        ("[[place]]\ntaxels = 5\npitch = 1\n".into(), 3, "`pitch` has no effect beside `taxels`"),
+        ("[[place]]\ntaxels = 5\npitch = 1\n".into(), 3, "`pitch` has no effect with `taxels`"),
         ("[[place]]\ntaxels = 5\ncsv = \"a.csv\"\n".into(), 3, "remove `csv` or `taxels`"),
         ("[[place]]\ntaxls = 5\n".into(), 2, "did you mean `taxels`?"),
         ("[[place]]\ntaxels = 5\nmodality = \"presure\"\n".into(), 3, "did you mean `pressure`?"),

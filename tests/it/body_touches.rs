@@ -184,7 +184,7 @@ fn what_is_wrong_with_a_touch_of_the_body_is_said_in_one_line() {
             "\"thumb\"\nindenter",
             "`path` has a place of the whole body, which needs `on = \"body\"`",
         ),
-        ("[[touch]]", "[sensor]\narea_m2 = 1e-5\ncovers = \"cell\"\n[[touch]]", "beside `area_m2` it must be area"),
+        ("[[touch]]", "[sensor]\narea_m2 = 1e-5\ncovers = \"cell\"\n[[touch]]", "with `area_m2` it must be area"),
     ] {
         assert!(SOUND.contains(from), "{from}");
         let line =

@@ -543,12 +543,12 @@ fn what_is_wrong_is_said_in_one_line() {
         (
             "0.007",
             "0.007\nkernel = \"boussinesq\"\nspread = 0.5",
-            "a.toml: line 7: `spread` has no effect beside `kernel = \"boussinesq\"`",
+            "a.toml: line 7: `spread` has no effect with `kernel = \"boussinesq\"`",
         ),
         (
             "0.007",
             "0.007\nkernel = \"boussinesq\"\ncontact = \"gaussian\"",
-            "a.toml: line 7: `contact` is gaussian; beside `kernel = \"boussinesq\"` it must be hertz",
+            "a.toml: line 7: `contact` is gaussian; with `kernel = \"boussinesq\"` it must be hertz",
         ),
         ("wiper = 38", "gain_spread = -0.1", "a.toml: line 8: `gain_spread` is -0.1; it must be 0 or more"),
         ("wiper = 38", "threshold_newton = -1", "a.toml: line 8: `threshold_newton` is -1; it must be 0 or more"),
@@ -581,7 +581,7 @@ fn what_is_wrong_is_said_in_one_line() {
         ("times_s = [0, 2]", "times_s = [0]", "a.toml: line 17: `times_s` has 1 times for 2 places"),
         ("times_s = [0, 2]\n", "", "a.toml: line 15: `path` has several places; give `times_s` or `speed_m_s`"),
         ("times_s = [0, 2]", "speed_m_s = 0", "a.toml: line 17: `speed_m_s` is 0"),
-        ("times_s = [0, 2]", "times_s = [0, 2]\nspeed_m_s = 1", "`speed_m_s` has no effect beside `times_s`"),
+        ("times_s = [0, 2]", "times_s = [0, 2]\nspeed_m_s = 1", "`speed_m_s` has no effect with `times_s`"),
         ("angle_deg = 20", "angle_deg = inf", "a.toml: line 18: `angle_deg` is inf"),
         ("angle_deg = 20", "angle_deg = [[1, 2], [0, 3]]", "a.toml: line 18: `angle_deg` has the time 0 after 1"),
         ("angle_deg = 20", "angle_deg = \"up\"", "a.toml: line 18: `angle_deg` is a number of degrees, or a list"),

@@ -266,7 +266,7 @@ fn columns_of_a_plain_table_that_are_no_sensors_are_recognised_or_refused() {
     assert_eq!(times("1768494979568 5 6\n1768494979584 5 6\n", [1, 2]), [1_768_494_979.568, 1_768_494_979.584]);
     assert!(read(millis, [1, 5]).unwrap_err().contains("column 1 is the time; correct --grid, as to 2x2"));
 
-    // A label is no sensor, in words or in numbers.
+    // A label is not a sensor, in words or in numbers.
     let labelled = "0.0 512 300 10 walk\n0.1 500 310 12 walk\n0.2 500 310 12 run\n";
     let all = read(labelled, [1, 3]).unwrap();
     assert_eq!(singles(&all.frames[2].1), [500.0, 310.0, 12.0]);

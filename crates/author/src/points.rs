@@ -79,7 +79,7 @@ pub(super) fn of_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Ve
 
 fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPoint>> {
     let file = limits::open(path, MAX_TABLE_BYTES).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => Error::failed("no such file; it is looked for beside the recipe"),
+        std::io::ErrorKind::NotFound => Error::failed("no such file; it must be next to the recipe"),
         _ => Error::failed(e.to_string()),
     })?;
     let mut given = Vec::new();

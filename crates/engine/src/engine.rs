@@ -228,7 +228,7 @@ impl Engine {
         for id in ids {
             let taxel = self.ids.binary_search(id).map_err(|_| {
                 Error::failed(format!(
-                    "there is a taxel id {id}, which the body does not have (its ids are {}); is it the right body?",
+                    "taxel id {id} is not in the body, whose ids are {}; is it the right body?",
                     ranges(&self.ids)
                 ))
             })?;

@@ -94,7 +94,7 @@ pub(super) fn encode(frame: &Frame, to: &mut Vec<u8>) {
     message.encode(to).expect("a vector has room");
 }
 
-/// The value with these bits; whatever is no number but `MISSING` is faulty.
+/// The value with these bits; whatever is not a number but `MISSING` is faulty.
 fn value_of(bits: [u8; 4]) -> RawValue {
     let single = f32::from_le_bytes(bits);
     if single.is_finite() { RawValue::new(single.into()) } else { RawValue::FAULTY }

@@ -26,8 +26,10 @@ type Percentiles = fn(&LayoutErrors) -> Option<[String; 2]>;
 
 #[derive(Args)]
 pub(super) struct CompareArguments {
-    /// Compare the layouts of two bodies: how far place, axis and force of simulated touches are off on each, how alike their cells
-    /// are, and how long a frame takes. Nothing is placed; with -o FILE.svg or FILE.png the errors are drawn.
+    /// Compare the layouts of two bodies by simulated touches; nothing is placed.
+    ///
+    /// The comparison has how far off place, axis and force are on each, how alike their cells are, and how long a
+    /// frame takes. With -o FILE.svg or FILE.png the errors are drawn.
     #[arg(long, num_args = 2, value_names = ["A.glb", "B.glb"], help_heading = HEADING,
         conflicts_with_all = ["mesh", "recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid",
             "icub", "urdf_skin", "mjcf_skin", "csv_skin", "up", "packages", "geometry"])]

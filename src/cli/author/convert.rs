@@ -17,17 +17,22 @@ const HEADING: &str = "Meshes and robots of other formats";
 
 #[derive(Args)]
 pub(super) struct MeshArguments {
-    /// The axis that points up in the file: y, or z as most CAD programs have it. A robot whose z is up faces along its x
-    /// [default: z in .urdf and MJCF, what a .dae says, else y].
+    /// The file's axis that points up: y, or z as in most CAD programs [default: z in .urdf and MJCF, the .dae's own,
+    /// else y].
+    ///
+    /// A robot whose z is up faces along its x.
     #[arg(long, value_name = "AXIS", help_heading = HEADING)]
     up: Option<UpWord>,
 
-    /// Where a package of a .urdf is, for its package://NAME/…; may be repeated. Others are searched in the folders of
-    /// ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
+    /// The folder of a package of a .urdf, for its package://NAME/…; may be repeated.
+    ///
+    /// Others are searched in the folders of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
     #[arg(long = "package", value_name = "NAME=FOLDER", help_heading = HEADING)]
     packages: Vec<String>,
 
-    /// The geometry of a .urdf: visual is what people see, collision is coarser, none are links alone [default: visual].
+    /// The geometry of a .urdf: visual, collision or none [default: visual].
+    ///
+    /// People see the visual one. The one for collision is coarser. With none there are links alone.
     #[arg(long, value_name = "KIND", help_heading = HEADING)]
     geometry: Option<GeometryWord>,
 }

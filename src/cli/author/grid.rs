@@ -13,16 +13,18 @@ const HEADING: &str = "A flat sheet: a mat, an insole, an array";
 
 #[derive(Args)]
 pub(super) struct GridArguments {
-    /// A flat sheet instead of a mesh: so many rows and columns of sensors, such as 31x11.
+    /// A flat sheet instead of a mesh, with this many rows and columns of sensors, such as 31x11.
     ///
-    /// Row 0 is at the top and column 0 at the left, seen from the side that is touched: as in a table of its readings. The
-    /// sheet is one link and one field, called as the output, and a taxel has the area of its cell. In the link's frame, x
+    /// Seen from the side that is touched, row 0 is at the top and column 0 at the left, as in a table. The sheet is
+    /// one link and one field, called as the output, and a taxel has the area of its cell. In the link's frame, x
     /// runs along the columns, z down the rows, and y is the normal.
     #[arg(long, value_name = "ROWSxCOLUMNS", requires = "pitch", help_heading = HEADING,
         conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror"])]
     grid: Option<Pair>,
 
-    /// From one sensor to the next, such as 8.6mm; as 8.6mm,5mm from one row to the next, and from one column to the next.
+    /// The distance from one sensor to the next, such as 8.6mm.
+    ///
+    /// Two lengths, as 8.6mm,5mm, are from one row to the next, and from one column to the next.
     #[arg(long, value_name = "LENGTH[,LENGTH]", requires = "grid", help_heading = HEADING)]
     pitch: Option<String>,
 
@@ -30,11 +32,13 @@ pub(super) struct GridArguments {
     #[arg(long, value_name = "ORDER", requires = "grid", default_value = "rows", help_heading = HEADING)]
     ids: Order,
 
-    /// Which sensors are there: a CSV with a line for each row, 1 for a sensor and 0 for none. Ids stay those of the full grid.
+    /// Where the sheet has sensors: a CSV with a line for each row, 1 for a sensor and 0 for none.
+    ///
+    /// Ids stay as in the full grid.
     #[arg(long, value_name = "MASK.csv", requires = "grid", help_heading = HEADING)]
     cells: Option<PathBuf>,
 
-    /// Fields of regions below that of the sheet: 3x2 makes three from top to bottom and two from left to right.
+    /// Fields of regions below the sheet's field, such as 3x2: three from top to bottom and two from left to right.
     #[arg(long, value_name = "ROWSxCOLUMNS", requires = "grid", help_heading = HEADING)]
     regions: Option<Pair>,
 }

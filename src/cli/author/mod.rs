@@ -40,7 +40,7 @@ Examples:
   somatic author --compare a.glb b.glb -o errors.svg            two layouts, side by side
   somatic run --body skin.glb --source touch.csv
 
-A recipe says it region by region:
+A recipe places taxels region by region:
   seed = 1
   bare = [\"nails\"]
   [regions.palm]
@@ -63,7 +63,7 @@ is brought up to date, as after editing it in Blender:
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The mesh: a .glb, .gltf, .stl, .obj, .dae or .ply file, a robot as .urdf, or one of the bundled bodies hand, mat and
+    /// The mesh: a .glb, .gltf, .stl, .obj, .dae or .ply file, a robot as .urdf, or the bundled hand, mat or
     /// humanoid.
     #[arg(value_name = "MESH", required_unless_present_any = ["grid", "icub", "urdf_skin", "mjcf_skin", "csv_skin", "compare"],
         conflicts_with_all = ["grid", "icub", "urdf_skin", "mjcf_skin", "csv_skin"])]
@@ -73,29 +73,34 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "RECIPE.toml", conflicts_with_all = ["taxels", "spacing", "region"])]
     recipe: Option<PathBuf>,
 
-    /// How many taxels, spread evenly where something can touch them.
+    /// Number of taxels, spread evenly over the surface that something can touch.
     #[arg(long, value_name = "N")]
     taxels: Option<u64>,
 
-    /// How far taxels are apart at least, such as 8mm; with --taxels exactly so many, else as many as fit.
+    /// The least distance between taxels, such as 8mm.
+    ///
+    /// With --taxels there are exactly that many, else as many as fit.
     #[arg(long, value_name = "LENGTH")]
     spacing: Option<String>,
 
-    /// Nodes, meshes or links that get taxels, as a glob; may be given again [default: all].
+    /// Nodes, meshes or links that get taxels, as a glob; may be repeated [default: all].
     #[arg(long, value_name = "GLOB")]
     region: Vec<String>,
 
-    /// Which of many equally good placements [default: the recipe's, or 0].
+    /// Seed of the placement, which selects one of many equally good ones [default: the recipe's, or 0].
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// Whether taxels given by number move until the surface around each is alike (on), or stay where they were scattered (off)
-    /// [default: the recipe's, or on].
+    /// Whether taxels given by number are evened out, on or off [default: the recipe's, or on].
+    ///
+    /// With on, they move until the surface around each is alike. With off, they stay where they were scattered.
     #[arg(long, value_name = "WORD")]
     even: Option<EvenWord>,
 
-    /// What to do with surface that nothing can touch, inside the body or under another link in all poses: place no taxels on it
-    /// (drop), or as many as elsewhere (keep) [default: the recipe's, or drop].
+    /// What to do with surface that nothing can touch: drop or keep [default: the recipe's, or drop].
+    ///
+    /// It is inside the body, or under another link in all poses. With drop it gets no taxels, with keep as many as
+    /// elsewhere.
     #[arg(long, value_name = "WORD")]
     hidden: Option<HiddenWord>,
 
@@ -103,12 +108,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "LENGTH")]
     clear: Option<String>,
 
-    /// The same layout on both sides: taxels are placed to the left of the plane that this axis of the world is perpendicular to, and
-    /// mirrored in it; y is the axis from right to left.
+    /// The same layout on both sides of the plane that is perpendicular to this axis of the world.
+    ///
+    /// Taxels are placed to the left of the plane, and mirrored in it. The axis from right to left is y.
     #[arg(long, value_name = "AXIS")]
     mirror: Option<MirrorWord>,
 
-    /// What the mesh file's numbers are: um, mm, cm or m [default: the recipe's, or m].
+    /// The unit of the mesh file's numbers: um, mm, cm or m [default: the recipe's, or m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
 
@@ -124,7 +130,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     compared: CompareArguments,
 
-    /// Simulate touches on the result: how far place, axis and force will be off, with the same on an ideal skin.
+    /// Simulate touches on the result: how far off place, axis and force will be, with the same on an ideal skin.
     #[arg(long, conflicts_with = "compare")]
     errors: bool,
 
@@ -132,7 +138,7 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "BODY.glb")]
     output: Option<PathBuf>,
 
-    /// Replace the output if it is there. The mesh itself is never replaced.
+    /// Replace the output if it is there; the mesh itself is never replaced.
     #[arg(long)]
     force: bool,
 

@@ -13,13 +13,16 @@ const HEADING: &str = "Skins of others, which have their places";
 
 #[derive(Args)]
 pub(super) struct SkinArguments {
-    /// The iCub's position files, one for each part, as a body without a mesh: a link for each.
+    /// The iCub's position files, one for each part, as a body without a mesh.
+    ///
+    /// Each part is a link.
     #[arg(long, value_name = "FILE", num_args = 1.., help_heading = HEADING,
         conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid", "urdf_skin", "mjcf_skin", "csv_skin"])]
     icub: Vec<PathBuf>,
 
-    /// A robot whose .urdf has its skin, as <sensor> with <tactile>, in an <array> or as <taxel>s; with --geometry none only
-    /// the taxels are taken.
+    /// A robot whose .urdf has its skin, as <sensor> with <tactile>, in an <array> or as <taxel>s.
+    ///
+    /// With --geometry none, only the taxels are read.
     #[arg(long, value_name = "FILE.urdf", help_heading = HEADING,
         conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror", "grid", "mjcf_skin", "csv_skin"])]
     urdf_skin: Option<PathBuf>,

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use somatic::output::OutputLink;
+use somatic::scene::file::hertz;
 use somatic::setup::FilesRead;
 use somatic::setup::bodies::load_body;
 use somatic::signal::Wiring;
@@ -34,7 +35,7 @@ Faults, with commas between them: noise=P and drop=P, the chance of a byte; flip
 drift=50ppm; silence=2s@10s, for 2 s once after 10 s; unplug=1s/20s, for 1 s every 20 s;
 reset@30s.
 
-A wiring says which taxel is on which channel of which board, in TOML:
+A wiring has the board and the channel of each taxel, in TOML:
 
   [[board]]
   id = 1
@@ -54,7 +55,7 @@ enum Rest {
     High,
 }
 
-/// What boards do when they are told to set a wiper.
+/// What boards do with commands to set a wiper.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Wipers {
     /// They set it.
@@ -73,7 +74,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SOURCE")]
     source: Option<String>,
 
-    /// The body whose taxels the boards have [default: those that the source has; of NDJSON, the bundled hand's].
+    /// The body whose taxels the boards have [default: the source's; of NDJSON, the bundled hand].
     #[arg(long, value_name = "BODY")]
     body: Option<String>,
 
@@ -81,7 +82,7 @@ pub(super) struct Arguments {
     #[arg(long = "loop", conflicts_with = "frames")]
     again: bool,
 
-    /// Which taxel hangs on which channel, TOML [default: in ascending order of their ids].
+    /// The board and the channel of each taxel, TOML [default: taxels in ascending order of their ids].
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["board", "boards"])]
     wiring: Option<PathBuf>,
 
@@ -89,11 +90,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "ID", default_value_t = 1)]
     board: u16,
 
-    /// So many boards share the taxels.
+    /// How many boards share the taxels.
     #[arg(long, value_name = "N", default_value_t = 1)]
     boards: usize,
 
-    /// A link to the pseudo-terminal, so that it has a steady name; of several boards, each has PATH-ID.
+    /// A link to the pseudo-terminal, so that it has a steady name.
+    ///
+    /// Of several boards, each has PATH-ID.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
 
@@ -105,15 +108,17 @@ pub(super) struct Arguments {
     #[arg(long)]
     bits: Option<u8>,
 
-    /// Frames a second [default: each that the source has, as far as the line takes them].
-    #[arg(long, value_name = "HZ")]
+    /// Frames per second, such as 50Hz [default: each that the source has, as far as the line has room].
+    ///
+    /// A bare number is in Hz.
+    #[arg(long, value_name = "RATE", value_parser = hertz)]
     rate: Option<f64>,
 
     /// Send only the channels that changed, and all once a second.
     #[arg(long)]
     partial: bool,
 
-    /// Send nothing before the host says start.
+    /// Send nothing before the host's command to start.
     #[arg(long)]
     wait: bool,
 
@@ -121,27 +126,33 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value = "low")]
     rest: Rest,
 
-    /// What boards do when they are told to set a wiper of a potentiometer.
+    /// What boards do with commands that set a wiper of a potentiometer.
     #[arg(long, value_enum, default_value = "obeyed")]
     wipers: Wipers,
 
-    /// What is to go wrong.
+    /// What goes wrong, such as noise=1e-4,drop=1e-4.
+    ///
+    /// Faults are listed below.
     #[arg(long, value_name = "FAULTS", default_value = "")]
     faults: String,
 
-    /// Whose luck it is: the same seed, the same faults.
+    /// Random seed of the faults.
+    ///
+    /// The same seed gives the same faults.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 
-    /// End when each board has sent so many frames; what is played begins again meanwhile.
+    /// End when each board has sent this many frames.
+    ///
+    /// The source begins again as often as that needs.
     #[arg(long, value_name = "N")]
     frames: Option<u64>,
 
-    /// End after so many seconds, such as 2s.
+    /// End after this time, such as 2s.
     #[arg(long = "for", value_name = "TIME")]
     lasts: Option<String>,
 
-    /// Say where the boards are, and in the end what they sent, as JSON.
+    /// Print where the boards are, and at the end what they sent, as JSON.
     #[arg(long)]
     json: bool,
 }

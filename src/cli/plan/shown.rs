@@ -23,7 +23,7 @@ impl Bill {
         let (name, what, why) = &self.backend;
         line("backend", format!("{name} ({what}): {why}; {} a call", count(self.batch as u64, "frame")));
         let Words { arithmetic, charts, orientation_by, coverage, cadence, .. } = self.knobs.words();
-        line("knobs", [arithmetic, charts, orientation_by, coverage, cadence].join(", "));
+        line("options", [arithmetic, charts, orientation_by, coverage, cadence].join(", "));
         if let Some(kept) = &self.kept {
             line("measured", kept.clone());
         }

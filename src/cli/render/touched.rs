@@ -6,7 +6,7 @@ use clap::Args;
 use somatic::field::Field;
 use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture};
 use somatic::scene::Coordinates;
-use somatic::scene::file::SceneFile;
+use somatic::scene::file::{SceneFile, hertz, seconds};
 use somatic::setup::Setup;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
 
@@ -27,20 +27,28 @@ pub(super) struct Flags {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
 
-    /// The time to show, in seconds [default: where most is pressed].
-    #[arg(long, value_name = "S", conflicts_with_all = ["from", "to"])]
+    /// The time to show, such as 2.9s [default: when most is pressed].
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", value_parser = seconds, conflicts_with_all = ["from", "to"])]
     at: Option<f64>,
 
-    /// Show an animation from this time on, in seconds.
-    #[arg(long, value_name = "S")]
+    /// Show an animation from this time on, such as 1s.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
     from: Option<f64>,
 
-    /// Show an animation up to this time, in seconds.
-    #[arg(long, value_name = "S")]
+    /// Show an animation up to this time, such as 4s.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
     to: Option<f64>,
 
-    /// Pictures a second of an animation.
-    #[arg(long, value_name = "HZ", default_value_t = 12.0)]
+    /// Pictures per second of an animation.
+    ///
+    /// A bare number is in Hz.
+    #[arg(long, value_name = "RATE", default_value = "12Hz", value_parser = hertz)]
     rate: f64,
 }
 

@@ -15,7 +15,7 @@ use crate::cli::words::number;
 /// What `pick` misses of `target`, which nothing grants.
 pub(super) fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {
     let combination = pick.row.combination()?;
-    Ok(format!("no knobs meet {}; nearest is {combination}: {}", target.words(), pick.missed.join("; ")))
+    Ok(format!("no options meet {}; nearest is {combination}: {}", target.words(), pick.missed.join("; ")))
 }
 
 /// Why a GPU is not chosen unless it is asked for, where all there are compute on the CPU.
@@ -37,7 +37,7 @@ pub(super) fn measure_options(asked: &Setup, options: &Options, seconds: f64) ->
         BackendKind::Auto if software().is_some() => vec![BackendKind::Cpu],
         BackendKind::Auto => vec![BackendKind::Cpu, BackendKind::Gpu],
         BackendKind::Reference => {
-            return Err(Error::usage("the reference has no knobs to compare; take another backend, or auto"));
+            return Err(Error::usage("the reference has no options to compare; use another backend, or auto"));
         }
         kind => vec![kind],
     };

@@ -86,7 +86,10 @@ pub(in crate::cli) fn settled(asked: &Setup, input: Option<&Input>, body: &Body,
         }
     };
     let Some(pick) = target.pick(&report, way) else {
-        return Err(Error::failed(format!("no measurement meets {}", target.words())));
+        return Err(Error::failed(format!(
+            "no measurement meets {}; widen the tolerance or the budget",
+            target.words()
+        )));
     };
     if !pick.missed.is_empty() {
         return Err(Error::failed(missed(&target, &pick)?));
@@ -133,7 +136,7 @@ fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) ->
     if options.backend != BackendKind::Auto {
         return Settled { options, why: None, measured };
     }
-    let why = Some(format!("the fastest of these knobs, as measured {when}"));
+    let why = Some(format!("the fastest of these options, as measured {when}"));
     Settled { options: options.backend(combination.backend), why, measured }
 }
 

@@ -55,8 +55,10 @@ token, may look and play; nobody can change a file.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES, mut_args(shown))]
 pub(super) struct Arguments {
-    /// What to show: a body (.glb, .gltf, hand, mat or humanoid), a recording (.mcap, .csv, or a pressure system's
-    /// .asf, .lst, .asc or .txt), or a scene or simulation (.toml) [default: the bundled touch].
+    /// What to show: a body, a recording, a scene or a simulation [default: the bundled touch].
+    ///
+    /// A body is a .glb or .gltf, or hand, mat or humanoid. A recording is a .mcap, a .csv, or a pressure system's
+    /// .asf, .lst, .asc or .txt. A scene or a simulation is a .toml.
     #[arg(value_name = "WHAT")]
     what: Option<String>,
 
@@ -119,7 +121,7 @@ pub(super) fn view(arguments: &Arguments) -> Result<u8> {
     let asked = &arguments.asked;
     if !asked.sinks.is_empty() || asked.verify {
         return Err(Error::usage(
-            "a view writes and compares nothing; use `somatic run` with --sink page beside others",
+            "a view has no use for --sink and --verify; give them to `somatic run`, with --sink page",
         ));
     }
     let listen = Listen::new(arguments.listen.as_deref(), &arguments.asked.allow_hosts)?;
@@ -204,7 +206,8 @@ impl Opening<'_> {
     fn recording(&self, asked: &Setup) -> Result<u8> {
         let input = input(asked)?;
         if !input.is_recording() {
-            return Err(Error::usage("live frames are for `somatic run --sink page`").at(&input.name));
+            return Err(Error::usage("a view shows recordings; show live frames with `somatic run --sink page`")
+                .at(&input.name));
         }
         let body = Arc::new(input.body(asked)?);
         let stop = stop_soon_on_signal()?;

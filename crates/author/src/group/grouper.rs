@@ -221,7 +221,7 @@ impl<'a> Grouper<'a> {
             if above != Some(parent) {
                 let above = above.map_or("nothing".to_owned(), |above| format!("`{above}`"));
                 return Err(failed!(
-                    "`parent`: `{top}` stands below {above} since an earlier rule, and cannot be below `{parent}` as well"
+                    "`parent`: `{top}` is below {above} since an earlier rule, and cannot be below `{parent}` as well"
                 ));
             }
         }

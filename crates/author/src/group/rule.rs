@@ -90,7 +90,7 @@ impl FieldRule {
                 matches!(self.patches, Some(Patches::Number(0) | Patches::Of { of: 0, .. })),
                 "`patches` must be 1 or more",
             ),
-            (self.parent.is_some() && self.within.is_some(), "`parent` has no effect beside `within`; remove one"),
+            (self.parent.is_some() && self.within.is_some(), "`parent` has no effect with `within`; remove one"),
             (
                 self.rows.or(self.columns).is_some_and(|rows| rows.of == 0 || rows.stride == Some(0)),
                 "`of` and `stride` of rows must be 1 or more",

@@ -56,7 +56,7 @@ pub(super) fn load(path: &Path, unit_m: Option<f64>) -> Result<(Triangles, Optio
         mesh.positions.iter_mut().for_each(|p| *p *= metres);
     }
     if !mesh.is_sound() {
-        return Err(Error::failed("it has a corner that is no number or is not there; export it again"));
+        return Err(Error::failed("a corner is missing or not a number; export the file again"));
     }
     Ok((mesh, up))
 }

@@ -180,7 +180,7 @@ impl Numbers<'_> {
             let end = word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len());
             self.rest = &word[end..];
             let word = String::from_utf8_lossy(&word[..end]);
-            return word.parse().map_err(|_| self.at(failed!("`{word}` is no number; export it again")));
+            return word.parse().map_err(|_| self.at(failed!("`{word}` is not a number; export it again")));
         }
         self.binary(number).ok_or_else(damaged)
     }
@@ -274,7 +274,7 @@ mod tests {
             assert!(why.starts_with(&format!("line 15: a corner is vertex {wrong}; ")), "{why}");
         }
         assert!(with("-3 0 1 2").unwrap_err().starts_with("line 15: a list of -3 `vertex_indices`"));
-        assert!(with("3 0 1 two").unwrap_err().starts_with("line 15: `two` is no number"));
+        assert!(with("3 0 1 two").unwrap_err().starts_with("line 15: `two` is not a number"));
         let mut bytes = binary(false);
         let end = bytes.len();
         bytes[end - 4..].fill(0xFF);

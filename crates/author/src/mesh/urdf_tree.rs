@@ -110,7 +110,7 @@ fn drivers(robot: &Robot, all_move: bool) -> Result<Vec<Driver>> {
                     index = other;
                 }
                 None if all_move => {
-                    let what = format!("`{}` mimics `{}`, which is no joint that moves", joint.name, mimic.joint);
+                    let what = format!("`{}` mimics `{}`, which is not a joint that moves", joint.name, mimic.joint);
                     return Err(at(joint, what));
                 }
                 None => {
@@ -200,6 +200,6 @@ mod tests {
         let stray = robot("no");
         assert_eq!(names(&stray).unwrap().len(), count + 1);
         let why = followed(&Robot::joints_of(&stray).unwrap()).unwrap_err().to_string();
-        assert!(why.ends_with("mimics `no`, which is no joint that moves"), "{why}");
+        assert!(why.ends_with("mimics `no`, which is not a joint that moves"), "{why}");
     }
 }

@@ -291,7 +291,7 @@ fn how(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Path)
     ];
     for (name, at, of) in extras {
         if let Some(at) = at.filter(|_| !of.contains(&way)) {
-            return Err(text.wrong(at, format!("`{name}` has no effect beside `{way}`; remove it")));
+            return Err(text.wrong(at, format!("`{name}` has no effect with `{way}`; remove it")));
         }
     }
     let spacing_m = keys.spacing.as_ref().map(|spacing| spacing.get_ref().metres);

@@ -112,7 +112,7 @@ impl fmt::Display for Agreement {
         write!(f, ", {} agreeing, {different} different", whole.agreeing)?;
         write!(f, ", {} too close to call, {} not compared", whole.too_close, whole.not_compared)?;
         if whole.not_compared > 0 {
-            write!(f, ", as motion hangs on a centroid before that was too close to call")?;
+            write!(f, ", as motion depends on an earlier centroid that was too close to call")?;
         }
         for (name, c) in &self.quantities {
             let different = c.compared - c.agreeing;
@@ -521,7 +521,7 @@ mod tests {
         assert_eq!(
             first(loose, |_, c| c[Component::Speed][0] = 9.0),
             "agrees with the reference: of 26 values in 1 percept, 24 agreeing, 0 different, 1 too close to call, \
-             1 not compared, as motion hangs on a centroid before that was too close to call"
+             1 not compared, as motion depends on an earlier centroid that was too close to call"
         );
         assert!(first(loose, |_, c| c[Component::Total][0] = 9.0).starts_with(
             "DISAGREES with the reference: of 26 values in 1 percept, 23 agreeing, 1 different, 1 too close to call, 1 not"

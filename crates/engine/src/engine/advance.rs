@@ -70,12 +70,12 @@ impl Engine {
             let at = |e: Error| e.at(format!("frame {}", self.frames_done + index as u64));
             let (got, want) = (values.row(index).len(), self.intake.width());
             if got != want {
-                return Err(at(Error::failed(format!("it has {got} values, and {want} are expected"))));
+                return Err(at(Error::failed(format!("it has {got} values for {want} channels; give one for each"))));
             }
             if let Some((name, _)) = frame.pose.iter().find(|(name, _)| !self.links.index_of.contains_key(name)) {
                 let near = nearest(name, self.links.index_of.keys().map(String::as_str));
                 let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-                return Err(at(Error::failed(format!("it poses link `{name}`, which the body does not have{hint}"))));
+                return Err(at(Error::failed(format!("link `{name}` has a pose and is not in the body{hint}"))));
             }
             if let Some(why) = frame.pose.iter().find_map(|(name, pose)| pose.check(name).err()) {
                 return Err(at(Error::failed(why)));

@@ -243,7 +243,7 @@ fn knots_up_to<K>(knots: &[K], raw: impl Fn(&K) -> f64, x: f64) -> usize {
     if x >= to {
         return knots.len();
     }
-    // Below the first knot, and of what is no number, 0.
+    // Below the first knot, and of what is not a number, 0.
     let guess = ((x - from) * (last as f64 / (to - from))) as usize;
     let is_there = guess < last && raw(&knots[guess]) <= x && x < raw(&knots[guess + 1]);
     if is_there { guess + 1 } else { knots.partition_point(|knot| raw(knot) <= x) }

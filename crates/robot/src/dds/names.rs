@@ -20,7 +20,7 @@ pub(super) fn ros_type(name: &str) -> Option<String> {
 /// The domain that `ROS_DOMAIN_ID` says, 0 where it is not set.
 ///
 /// # Errors
-/// It is no number of a domain.
+/// It is not a number of a domain.
 pub(super) fn domain() -> Result<u16> {
     domain_of(std::env::var(DOMAIN).ok().as_deref())
 }

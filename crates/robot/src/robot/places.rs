@@ -125,7 +125,7 @@ impl Places {
             self.frames.insert(link.to_owned());
             let body = &self.body;
             self.notices
-                .push(format!("clouds are in frame `{link}`, which is no link of {body}; is it the right body?"));
+                .push(format!("clouds are in frame `{link}`, which is not a link of {body}; is it the right body?"));
         }
     }
 

@@ -90,7 +90,7 @@ impl<T: Default + Send + 'static> Handover<T> {
                 let outcome = carry_all(&theirs.0, carrier);
                 theirs.0.lock().outcome = Some(outcome);
             })
-            .map_err(|e| failed!("no thread: {e}").at(name))?;
+            .map_err(|e| failed!("the thread of the sink did not start: {e}; end other programs").at(name))?;
         let handed = Handed::default();
         Ok(Self { shared, name: name.to_owned(), what, room: room.max(1), handed, last_left_out: None })
     }
@@ -103,7 +103,9 @@ impl<T: Default + Send + 'static> Handover<T> {
         let mut state = self.shared.lock();
         if let Some(outcome) = &state.outcome {
             let failure = outcome.clone().err();
-            return Err(failure.unwrap_or_else(|| Error::failed("it has ended").at(&self.name)));
+            return Err(
+                failure.unwrap_or_else(|| Error::failed("the sink has ended; start the run again").at(&self.name))
+            );
         }
         let mut item = state.spare.pop().unwrap_or_default();
         drop(state);

@@ -80,7 +80,7 @@ impl Ray {
         for axis in 0..3 {
             let low = (f64::from(node.low[axis]) - self.origin[axis]) * self.inverse[axis];
             let high = (f64::from(node.high[axis]) - self.origin[axis]) * self.inverse[axis];
-            // A ray that runs within a side of the box, where 0 · ∞ is no number, is not kept out by that side's slab.
+            // A ray that runs within a side of the box, where 0 · ∞ is not a number, is not kept out by that side's slab.
             if low.is_nan() || high.is_nan() {
                 continue;
             }

@@ -196,7 +196,7 @@ fn heaviest_joints(document: &Document, primitive: &Primitive, points: usize, jo
         }
     }
     if let Some((_, joint)) = best.iter().find(|(_, joint)| *joint >= joints) {
-        return Err(failed!("a vertex hangs on joint {joint} of {joints}; export the file again"));
+        return Err(failed!("a vertex names joint {joint} of {joints}; export the file again"));
     }
     Ok(best.into_iter().map(|(_, joint)| joint).collect())
 }
@@ -426,7 +426,7 @@ fn parents_first(fields: Vec<FieldSpec>) -> Result<Vec<FieldSpec>> {
             depth += 1;
             at = names.get(parent.as_str()).map(|&i| &fields[i]).ok_or_else(|| {
                 failed!(
-                    "field `{}` has the parent `{parent}`, which is no field of this body; name one that is",
+                    "field `{}` has the parent `{parent}`, which is not a field of this body; name another",
                     at.name
                 )
             })?;

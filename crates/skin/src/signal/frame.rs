@@ -19,7 +19,7 @@ impl RawValue {
     /// No value arrived, as the sensor's board is silent. Only for engines that track it (`Engine::track_stale`);
     /// others get [`RawValue::MISSING`].
     pub const STALE: Self = Self(0xFFFF_FFFE);
-    /// Something arrived that is no number.
+    /// Something arrived that is not a number.
     pub const FAULTY: Self = Self(0x7FC0_0000);
 
     /// `value` rounded to single precision. NaN and infinities become faulty. An underflow becomes the smallest denormal

@@ -193,7 +193,7 @@ impl BoardKeys {
             let first = int("first", run.first.as_ref(), 0..i64::from(u32::MAX))?;
             let ids: Vec<u32> = match (&run.ids, first) {
                 (Some(ids), None) => {
-                    text.refuse("count", run.count.as_ref(), "beside `ids`")?;
+                    text.refuse("count", run.count.as_ref(), "with `ids`")?;
                     ids.clone()
                 }
                 (None, Some(first)) => {
@@ -282,7 +282,7 @@ mod tests {
         );
         assert!(why(&run("{ channel = 0 }")).contains("either `ids`"));
         assert!(why(&run("{ channel = 0, first = 1, ids = [2] }")).contains("either `ids`"));
-        assert!(why(&run("{ channel = 0, count = 2, ids = [2] }")).contains("beside `ids`"));
+        assert!(why(&run("{ channel = 0, count = 2, ids = [2] }")).contains("with `ids`"));
         assert!(why(&run("{ channel = 250, first = 0, count = 9 }")).contains("channel 258"));
         assert!(why(&run("{ channel = 0, ids = [5] }, { channel = 1, ids = [5] }")).contains("taxel 5 is on channel"));
         assert!(why(&board("bits = 9\ntaxels = [{ channel = 0, first = 0 }]")).contains("8, 10, 12 or 16"));

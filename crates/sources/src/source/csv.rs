@@ -278,7 +278,7 @@ fn parse_value(cell: &[u8]) -> Result<RawValue> {
     }
     number(word).map(RawValue::new).ok_or_else(|| {
         failed!(
-            "`{}` is no number; leave a missing value blank, and write `nan` for a faulty one",
+            "`{}` is not a number; leave a missing value blank, and write `nan` for a faulty one",
             shortened(&String::from_utf8_lossy(word))
         )
     })
@@ -432,13 +432,15 @@ mod tests {
         let mut source = open("t,4,label,7,total\n0,1,walk,2,3\n1,3,,4,7,\n", None).unwrap();
         assert_eq!(source.taxels(), [4, 7]);
         let said = source.notices();
-        assert!(said[0].contains("column 3 (`label`) is no taxel and is left out") && said.len() == 2, "{said:?}");
+        assert!(said[0].contains("column 3 (`label`) is not a taxel and is left out") && said.len() == 2, "{said:?}");
         let mut frame = Frame::missing(0.0, 2);
         for values in ["[1, 2]", "[3, 4]"] {
             assert!(source.next_frame(&mut frame).unwrap());
             assert_eq!(format!("{:?}", frame.values), values);
         }
-        assert!(why("t,4,label,7\n0,1,a,x\n1,2,b,3\n", None).starts_with("a.csv: line 2: taxel 7: `x` is no number"));
+        assert!(
+            why("t,4,label,7\n0,1,a,x\n1,2,b,3\n", None).starts_with("a.csv: line 2: taxel 7: `x` is not a number")
+        );
         assert!(why("t,4,label,7\n0,1,a,2\"\n", None).starts_with("a.csv: line 2: column 4 (taxel 7)"));
     }
 
@@ -482,7 +484,11 @@ mod tests {
     fn errors_name_line_taxel_and_word() {
         for end in ["\n", "\r\n"] {
             let text = ["t,4,7", "0,1,2", "1,3,abc", "2,5,6", ""].join(end);
-            assert!(why(&text, None).starts_with("a.csv: line 3: taxel 7: `abc` is no number"), "{}", why(&text, None));
+            assert!(
+                why(&text, None).starts_with("a.csv: line 3: taxel 7: `abc` is not a number"),
+                "{}",
+                why(&text, None)
+            );
             let text = ["t,4,7", "0,1,2", "", "1,3,NA", "2,5,6", ""].join(end);
             assert!(why(&text, None).starts_with("a.csv: line 4: taxel 7: `NA` is"), "{}", why(&text, None));
         }

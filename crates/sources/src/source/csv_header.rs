@@ -53,7 +53,7 @@ pub(super) fn read(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> 
         if has_ids && is_beside_sensors(&word(cell)) {
             header.left_out.push(index);
             let name = shortened(&word(cell));
-            header.notes.push(format!("column {} (`{name}`) is no taxel and is left out", index + 1));
+            header.notes.push(format!("column {} (`{name}`) is not a taxel and is left out", index + 1));
             continue;
         }
         let id = header_id(index + 1, cell, || way_out(first, below, skipped))?;

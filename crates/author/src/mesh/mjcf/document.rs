@@ -169,7 +169,7 @@ pub(super) fn attribute<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str> {
 pub(super) fn numbers(node: Node<'_, '_>, name: &str, text: &str) -> Result<Vec<f64>> {
     let number = |word: &str| {
         let number = word.parse().ok().filter(|x: &f64| x.is_finite());
-        number.ok_or_else(|| at(node, failed!("`{name}` has `{word}`, which is no number")))
+        number.ok_or_else(|| at(node, failed!("`{name}` has `{word}`, which is not a number")))
     };
     text.split_whitespace().map(number).collect()
 }

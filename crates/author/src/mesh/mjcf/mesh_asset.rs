@@ -58,7 +58,7 @@ pub(super) fn read(
         mesh.transform(&glam::DAffine3::from_scale(scale));
     }
     if !mesh.is_sound() {
-        return Err(failed!("mesh `{name}` has a corner that is no number or is not there"));
+        return Err(failed!("mesh `{name}` has a corner that is missing or not a number"));
     }
     Ok((name, mesh))
 }

@@ -248,7 +248,7 @@ fn in_bins(places: &mut Places<'_>, sensor: &MjSensor, site: &str, grid: &TouchG
         placed.push((index, on, taxel));
     }
     if placed.is_empty() {
-        return Err(failed!("sensor `{}`: from its site no shape of its body is seen along −z", sensor.name));
+        return Err(failed!("sensor `{}`: no shape of its body is visible from its site along −z", sensor.name));
     }
     Ok((grid.taxels(), placed))
 }

@@ -28,7 +28,7 @@ impl Angles {
 
     /// The orientation that the attribute `name` with `numbers` gives.
     pub(super) fn orientation(&self, name: &str, numbers: &[f64]) -> Result<DQuat> {
-        let wrong = || failed!("`{name}` has {} numbers, of which none may be too many", numbers.len());
+        let wrong = || failed!("`{name}` has {} numbers; give as many as MuJoCo expects", numbers.len());
         let axis = |x: f64, y: f64, z: f64| {
             let unit = DVec3::new(x, y, z).try_normalize();
             unit.ok_or_else(|| failed!("the axis in `{name}` has no length"))

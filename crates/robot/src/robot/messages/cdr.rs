@@ -122,7 +122,7 @@ impl Cdr for u8 {
     }
 }
 
-/// `byte`, which is no number to ROS.
+/// `byte`, which is not a number to ROS.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "ros2", derive(serde::Deserialize))]
 pub struct Byte(pub u8);

@@ -254,7 +254,7 @@ mod tests {
         frame.values[0] = RawValue::MISSING;
         assert_eq!(told(&mut wrenches, &body, &engine, &frame), all, "it is masked anyway");
         let beside = (1..ids.len()).find(|&index| body.taxels[index].link == body.taxels[0].link).unwrap();
-        // What came and is no number adds nothing; what did not come is not known.
+        // What came and is not a number adds nothing; what did not come is not known.
         frame.values[beside] = RawValue::FAULTY;
         let faulty = told(&mut wrenches, &body, &engine, &frame);
         assert!(faulty.len() == all.len() && faulty[own] != all[own]);

@@ -79,7 +79,7 @@ pub(super) enum ValueOf {
     SideTotal(usize),
 }
 
-/// What of a touch is no number of [`TOUCH_COLUMNS`].
+/// What of a touch is not a number of [`TOUCH_COLUMNS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OfTouch {
     Id,

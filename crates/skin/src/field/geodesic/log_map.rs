@@ -91,7 +91,7 @@ impl<'a> LogMap<'a> {
             }
         }
         if place.triangle as usize >= topology.triangles.len() {
-            return Err(Error::failed("the chart's origin is on no triangle of the surface"));
+            return Err(Error::failed("the chart's origin is not on the surface; move it there"));
         }
         let start = Start::new(topology, place, u);
         let part = topology.part[place.triangle as usize];

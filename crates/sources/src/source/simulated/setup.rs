@@ -72,11 +72,11 @@ impl Setup<'_> {
             KernelName::Bonded => Kernel::Radial(Radial::Bonded),
         };
         if kernel != Kernel::Gaussian {
-            self.text.refuse("spread", keys.spread.as_ref(), &format!("beside `kernel = \"{}\"`", name.word()))?;
+            self.text.refuse("spread", keys.spread.as_ref(), &format!("with `kernel = \"{}\"`", name.word()))?;
         }
         let contact = match keys.contact.as_ref().map(|contact| (*contact.get_ref(), contact.span())) {
             Some((ContactName::Gaussian, at)) if kernel != Kernel::Gaussian => {
-                let what = format!("`contact` is gaussian; beside `kernel = \"{}\"` it must be hertz", name.word());
+                let what = format!("`contact` is gaussian; with `kernel = \"{}\"` it must be hertz", name.word());
                 return Err(self.text.wrong(at, what));
             }
             None if kernel == Kernel::Gaussian => Pressure::Gaussian,
@@ -242,8 +242,8 @@ impl Setup<'_> {
     pub(super) fn times(&self, keys: &TouchKeys, waypoints: &[DVec3]) -> Result<Vec<f64>> {
         let text = self.text;
         if let Some(times) = &keys.times_s {
-            text.refuse("start_s", keys.start_s.as_ref(), "beside `times_s`")?;
-            text.refuse("speed_m_s", keys.speed_m_s.as_ref(), "beside `times_s`")?;
+            text.refuse("start_s", keys.start_s.as_ref(), "with `times_s`")?;
+            text.refuse("speed_m_s", keys.speed_m_s.as_ref(), "with `times_s`")?;
             text.check_times("times_s", times.span(), times.get_ref().iter().copied())?;
             let (found, wanted) = (times.get_ref().len(), waypoints.len());
             if found != wanted {

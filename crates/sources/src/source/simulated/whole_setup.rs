@@ -28,7 +28,7 @@ pub(super) fn is_of_body(keys: &TouchKeys) -> bool {
 pub(super) fn covers(text: Text<'_>, keys: &SensorKeys) -> Result<Covers> {
     match keys.covers.as_ref().map(|covers| (*covers.get_ref(), covers.span())) {
         Some((CoversName::Cell, at)) if keys.area_m2.is_some() => {
-            Err(text.wrong(at, "`covers` is cell; beside `area_m2` it must be area"))
+            Err(text.wrong(at, "`covers` is cell; with `area_m2` it must be area"))
         }
         Some((CoversName::Cell, _)) => Ok(Covers::Cell),
         None if keys.area_m2.is_none() => Ok(Covers::Cell),

@@ -166,7 +166,7 @@ impl Form {
             None if has_rate => text += ", time goes on as --rate says",
             None => text += ", time is that of arrival",
         }
-        for why in ["counts frames", "rises like a time of unknown unit", "is no sensor"] {
+        for why in ["counts frames", "rises like a time of unknown unit", "is not a sensor"] {
             let which = self.which(|column| *column == Use::LeftOut(why));
             if !which.is_empty() {
                 let out = if which.len() == 1 { "is" } else { "are" };

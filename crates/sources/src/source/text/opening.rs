@@ -216,7 +216,7 @@ impl Listening<'_> {
                 "bytes come at {baud} baud, but they are no text; does the board send at another speed (text:PORT@9600), or speak \
                  the protocol of --source serial:?"
             ),
-            None => Error::failed("what comes is no text; lines of numbers are read here, such as `512,300,7`"),
+            None => Error::failed("the input is not text; send lines of numbers, such as `512,300,7`"),
         })
     }
 }

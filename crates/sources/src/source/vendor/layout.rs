@@ -130,7 +130,9 @@ pub(super) fn value(word: Word<'_>) -> Result<RawValue> {
     if word.is_empty() {
         return Ok(RawValue::MISSING);
     }
-    word.number().map(RawValue::new).ok_or_else(|| failed!("`{word}` is no number; correct the cell or leave it blank"))
+    word.number()
+        .map(RawValue::new)
+        .ok_or_else(|| failed!("`{word}` is not a number; correct the cell or leave it blank"))
 }
 
 /// The next of `cells` as such a value; `None` if there is none.

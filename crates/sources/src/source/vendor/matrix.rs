@@ -81,7 +81,7 @@ impl Matrix {
             cells.next();
         }
         if let Some(more) = cells.next_filled() {
-            return Err(failed!("`{more}` stands after the last of {count} cells"));
+            return Err(failed!("`{more}` follows the last of {count} cells"));
         }
         to.t_s = self.rate.time_of(t_s, None)?;
         Ok(true)
@@ -98,7 +98,7 @@ impl Matrix {
             *slot = value.map_err(|e| e.at(format!("{place}, column {}", index + 1)))?;
         }
         if let Some(more) = cells.next_filled() {
-            return Err(failed!("`{more}` stands after the last of {columns} columns").at(&place));
+            return Err(failed!("`{more}` follows the last of {columns} columns").at(&place));
         }
         self.row += 1;
         if self.row < rows {

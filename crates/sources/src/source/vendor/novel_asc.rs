@@ -90,7 +90,7 @@ impl NovelAsc {
             *slot = value.map_err(|e| e.at(format!("sensor {}", self.sensors[index])))?;
         }
         if let Some(more) = words.next() {
-            return Err(failed!("`{more}` stands after the last of {count} pressures"));
+            return Err(failed!("`{more}` follows the last of {count} pressures"));
         }
         to.t_s = self.rate.time_of(Some(t_s), None)?;
         Ok(true)

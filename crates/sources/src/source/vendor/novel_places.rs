@@ -69,7 +69,7 @@ impl Places {
             Some(b'x' | b'y' | b'a') => {
                 let Some(row) = HEADS.iter().position(|head| line.starts_with(head)) else { return Ok(()) };
                 let number = |word: Word<'_>| {
-                    word.number().filter(|x| x.is_finite()).ok_or_else(|| failed!("`{word}` is no number"))
+                    word.number().filter(|x| x.is_finite()).ok_or_else(|| failed!("`{word}` is not a number"))
                 };
                 self.rows[row] = words.map(number).collect::<Result<_>>()?;
             }

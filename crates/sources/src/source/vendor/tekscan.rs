@@ -92,7 +92,7 @@ impl Tekscan {
         let row = frame.rows;
         let at = |column: u32| format!("row {}, column {}", row + 1, column + 1);
         if let Some(rows) = self.keys.rows.filter(|&rows| row >= rows) {
-            return Err(failed!("a row stands after the last of {rows}"));
+            return Err(failed!("a row follows the last of {rows}"));
         }
         frame.rows += 1;
         let mut cells = self.separator.cells(line);
@@ -121,15 +121,13 @@ impl Tekscan {
             match index {
                 Some(index) if !is_absent => self.values[index] = value(word).map_err(|e| e.at(at(column)))?,
                 None if !is_absent => {
-                    return Err(failed!("`{word}` stands where the first frame has no sensor").at(at(column)));
+                    return Err(failed!("`{word}` is where the first frame has no sensor").at(at(column)));
                 }
                 _ => {}
             }
         }
         match cells.next_filled() {
-            Some(more) => {
-                Err(failed!("`{more}` stands after the last of {columns} columns").at(format!("row {}", row + 1)))
-            }
+            Some(more) => Err(failed!("`{more}` follows the last of {columns} columns").at(format!("row {}", row + 1))),
             None => Ok(()),
         }
     }
@@ -246,7 +244,7 @@ impl Parser for Tekscan {
             return self.row(line).map(|()| false);
         }
         if !self.map.is_empty() {
-            return Err(failed!("`{word}` stands between frames; each begins with `Frame` and its number"));
+            return Err(failed!("`{word}` is between frames; each begins with `Frame` and its number"));
         }
         self.key(line).map(|()| false)
     }

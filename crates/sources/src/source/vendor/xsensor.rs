@@ -91,7 +91,7 @@ impl Xsensor {
             *slot = value.map_err(|e| e.at(at(column)))?;
         }
         if let Some(more) = cells.next_filled() {
-            return Err(failed!("`{more}` stands after the last of its {} columns", grid.columns)
+            return Err(failed!("`{more}` follows the last of its {} columns", grid.columns)
                 .at(format!("sensor `{name}`, row {}", row + 1)));
         }
         let done = row + 1 == grid.rows;
@@ -118,10 +118,10 @@ impl Xsensor {
 
     /// Begins the sensor called `name`.
     fn sensor(&mut self, name: &str) -> Result<()> {
-        let frame = self.frame.as_mut().ok_or_else(|| failed!("a SENSOR stands before the first FRAME"))?;
+        let frame = self.frame.as_mut().ok_or_else(|| failed!("a SENSOR comes before the first FRAME"))?;
         let known = self.sensors.iter().position(|sensor| sensor.name == name);
         let sensor = match known {
-            Some(known) if frame.seen[known] => return Err(failed!("sensor `{name}` stands in one frame twice")),
+            Some(known) if frame.seen[known] => return Err(failed!("sensor `{name}` is in one frame twice")),
             Some(known) => known,
             None if self.is_known => {
                 return Err(failed!(
@@ -148,7 +148,8 @@ impl Xsensor {
     /// Takes a key of a sensor or a group, with what stands beside it.
     fn key(&mut self, key: Word<'_>, beside: Option<Word<'_>>) -> Result<()> {
         let name = key.text();
-        let wrong = || failed!("`{name}` is `{}`, which is no number", beside.map_or(String::new(), |w| w.to_string()));
+        let wrong =
+            || failed!("`{name}` is `{}`, which is not a number", beside.map_or(String::new(), |w| w.to_string()));
         let number = || beside.and_then(Word::number).filter(|x| x.is_finite()).ok_or_else(wrong);
         let count = || beside.and_then(Word::whole).ok_or_else(wrong);
         let length = || Ok::<_, Error>(number()? * in_parentheses(&name).and_then(metres).unwrap_or(0.01));
@@ -275,7 +276,7 @@ impl Parser for Xsensor {
             self.sensor("sensor")?;
             self.key(word, beside)?;
         } else if self.place == Place::Between && word.number().is_some() {
-            return Err(failed!("a row stands after the last row of its sensor"));
+            return Err(failed!("a row follows the last row of its sensor"));
         } else {
             self.key(word, beside)?;
         }

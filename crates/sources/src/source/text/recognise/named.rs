@@ -72,7 +72,7 @@ pub(super) fn named(lines: &[&Heard], is_json: bool, known: Known<'_>) -> Result
         *count += 1;
     }
     let most = counts.values().copied().max().unwrap_or(0);
-    // What only lines of another kind say, such as one about the start of a board, is no sensor.
+    // What only lines of another kind say, such as one about the start of a board, is not a sensor.
     names.retain(|name| 2 * counts[&**name] >= most);
     let widest = said.iter().map(|said| said.values.iter().filter(|(name, _)| names.contains(name)).count()).max();
     let is_spread = !is_json && widest.unwrap_or(0) < names.len();
@@ -123,7 +123,7 @@ fn times(columns: &mut Columns, said: &[Said]) -> Result<()> {
                 _ => TimeUnit::Seconds,
             }));
         } else if is_beside_sensors(last_part(name)) {
-            columns.uses[index] = Use::LeftOut("is no sensor");
+            columns.uses[index] = Use::LeftOut("is not a sensor");
         }
     }
     Ok(())
@@ -166,7 +166,7 @@ pub(super) fn by_options(columns: &mut Columns, known: Known<'_>) -> Result<()> 
         Some(TextTime::Arrival) => {
             (columns.time, columns.is_time_guessed) = (None, false);
             for column in columns.uses.iter_mut().filter(|column| **column == Use::Time) {
-                *column = Use::LeftOut("is no sensor");
+                *column = Use::LeftOut("is not a sensor");
             }
         }
         Some(TextTime::Column(time)) => {
@@ -199,7 +199,7 @@ pub(super) fn by_options(columns: &mut Columns, known: Known<'_>) -> Result<()> 
                 }
                 (Use::Word, true) => return Err(failed!("column {} holds words, and no sensor", index + 1)),
                 (_, true) => columns.uses[index] = Use::Sensor(0),
-                (Use::Sensor(_), false) => columns.uses[index] = Use::LeftOut("is no sensor"),
+                (Use::Sensor(_), false) => columns.uses[index] = Use::LeftOut("is not a sensor"),
                 (_, false) => {}
             }
         }

@@ -192,7 +192,7 @@ fn by_names(columns: &mut Columns) -> Result<()> {
             columns.time = Some(unit.unwrap_or(TimeUnit::Seconds));
             columns.is_unit_open = unit.is_none();
         } else if is_beside_sensors(name) && columns.uses[index] != Use::Word {
-            columns.uses[index] = Use::LeftOut("is no sensor");
+            columns.uses[index] = Use::LeftOut("is not a sensor");
         }
     }
     Ok(())
