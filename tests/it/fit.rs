@@ -400,7 +400,11 @@ fn what_cannot_be_told_is_absent_with_its_reason() {
     let with_few = some.iter().filter(|one| one.flags().contains(TouchFlags::FEW_TAXELS) && one.fit().is_some());
     let with_few: Vec<&Pressed> = with_few.collect();
     let is_point = |one: &&Pressed| one.fit().is_some_and(|fit| fit.kind == ContactKind::Point);
-    assert!(with_few.len() > 10 && with_few.iter().all(|one| is_point(one) && (3..5).contains(&taxels(one))), "{}", with_few.len());
+    assert!(
+        with_few.len() > 10 && with_few.iter().all(|one| is_point(one) && (3..5).contains(&taxels(one))),
+        "{}",
+        with_few.len()
+    );
 
     // Most of a press 8 mm beyond the edge falls on no sensor.
     let beyond = pressed(&body, &presses(4e-3, [0.0, 0.039], INDENTERS[1], ""), None);
