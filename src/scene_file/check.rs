@@ -53,6 +53,9 @@ impl SceneFile {
                 "`ros_time` is for messages of ROS 2; add `sink = \"ros2-mcap:FOLDER\"` or `sink = \"ros2\"`",
             ));
         }
+        if !self.record.is_empty() && !has_sink(|sink| matches!(sink, SinkSpec::Mcap(_))) {
+            return Err(Error::usage("`record` is for a recording; add `sink = \"mcap:FILE\"`"));
+        }
         if !self.allow_hosts.is_empty() && !has_sink(|sink| matches!(sink, SinkSpec::Page(_))) {
             return Err(Error::usage("`allow_host` is for a page; add `sink = \"page:HOST:PORT\"`"));
         }

@@ -208,6 +208,8 @@ impl Input {
                 }
                 Some(spec) => spec.open(&ids, &options),
                 None => {
+                    // It is a table like any other.
+                    SourceSpec::CsvStdin.check_options(&options)?;
                     let length = Some(bundled::TOUCH.len() as u64);
                     Ok(Box::new(CsvSource::from_reader(&name, bundled::TOUCH, length, rate_hz)?))
                 }

@@ -211,6 +211,10 @@ fn what_makes_no_sense_is_wrong_usage() {
     assert!(fails(2, &["run", "--live-rate", "5s"]).contains("`5s` is not a rate; write a number in Hz"));
     assert!(fails(2, &["run", "--rate", "9"]).contains("--rate"));
     assert!(fails(2, &["run", "--batch", "0"]).contains("--batch"));
+    // What nothing would heed is not passed over in silence.
+    assert!(fails(2, &["run", "--columns", "1"]).contains("--columns is for lines of text"));
+    assert!(fails(2, &["run", "--grid", "3x2"]).contains("--grid"));
+    assert!(fails(2, &["run", "--record", "frames"]).contains("--record is for a recording; add --sink mcap:FILE"));
     assert!(fails(2, &["run", "--sink", "json:x"]).contains("did you mean `ndjson:`?"));
 }
 
