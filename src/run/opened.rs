@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{Feed, ReadMode, Run, RunOptions};
+use super::feed::{Feed, ReadMode};
+use super::running::{Run, RunOptions};
 use crate::body::Body;
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result};

@@ -1,6 +1,6 @@
 //! Hands frames and percepts to sinks.
 
-use super::{Observer, Remark};
+use super::observer::{Observer, Remark};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::sink::{Flow, InputFrames, Sink};

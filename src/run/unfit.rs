@@ -1,6 +1,6 @@
 //! Which taxels drift compensation leaves out.
 
-use super::Repeats;
+use super::repeats::Repeats;
 use crate::engine::Engine;
 use crate::signal::Unfit;
 

@@ -6,7 +6,7 @@ const EXCEEDING_SHARE: f64 = 1e-3;
 /// A sensor's baseline and noise from its values at rest, whose steps are `unit`.
 ///
 /// The baseline is the mean of the values within three standard deviations of the median, as the median deviation tells them: a median of
-/// whole numbers is off by a third of a step, and a mean of all by single wrong values.
+/// whole numbers is off by a third of a step, and a mean of all by single wrong values. At an end of the raw range it is the median.
 pub(super) fn rest_of(kept: &[f32], unit: f64) -> Option<(f64, f64)> {
     /// The standard deviation of normal values over their median deviation.
     const SIGMAS: f64 = 1.482_6;
@@ -17,6 +17,11 @@ pub(super) fn rest_of(kept: &[f32], unit: f64) -> Option<(f64, f64)> {
     let mut deviations: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
     let within = (3.0 * SIGMAS * median(&mut deviations)?).max(1.5 * unit);
     let near = || values.iter().filter(|value| (**value - middle).abs() <= within);
+    let (low, high) = near().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
+    // More than half of the values are at an end and the others farther than rounding takes them: the end of the range cuts noise off.
+    if (middle == low && high - middle > 1.5 * unit) || (middle == high && middle - low > 1.5 * unit) {
+        return Some((middle, noise_of(values.into_iter(), middle)));
+    }
     // From the middle, so that large raw values lose no digits.
     let mean = middle + near().map(|value| value - middle).sum::<f64>() / near().count() as f64;
     let baseline = if unit > 0.0 { (mean * DECIMALS).round() / DECIMALS } else { rounded_beside(mean, within) };

@@ -287,7 +287,7 @@ fn what_cannot_be_merged_is_one_line_with_what_to_do() {
     let source = format!("ros2-mcap:{}:/a,/b", text_of(&at("mixed.mcap")));
     let why = refused(1, &with(&run_of(&body, &source), &jointed));
     assert!(
-        why.contains("there is no topic of sensor_msgs/msg/JointState") && why.ends_with("--joint-states FILE"),
+        why.contains("there is no topic of sensor_msgs/msg/JointState") && why.ends_with("--joint-states FILE)"),
         "{why}"
     );
     let states = [&jointed[..], &["--joint-states", &source]].concat();

@@ -250,7 +250,10 @@ fn the_second_signal_ends_what_the_first_does_not() {
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_millis(700));
+    // From its first line on it has something to bring to an end.
+    let mut out = BufReader::new(run.stdout.take().unwrap());
+    out.read_line(&mut String::new()).unwrap();
+    std::thread::sleep(Duration::from_millis(300));
     signal(&run, "-INT");
     std::thread::sleep(Duration::from_millis(500));
     assert!(run.try_wait().unwrap().is_none());

@@ -5,7 +5,7 @@
 use glam::{DVec2, DVec3};
 use somatic::scene::Scene;
 use somatic::source::{SimulatedSource, Source, Truth};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, TouchOutputs, touch};
+use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, TouchFlags, TouchOutputs, touch};
 
 use crate::common::Flat;
 
@@ -143,7 +143,9 @@ impl Cell {
                 let near = |a: &(DVec2, Option<f64>)| a.0.distance(centroid);
                 let Some(&(place, angle)) = truth.iter().min_by(|a, b| near(a).total_cmp(&near(b))) else { continue };
                 errors.touches += 1;
-                let Some(fit) = touch.fit else { continue };
+                // With few taxels a fit is a guess, and flagged.
+                let is_told = !touch.flags.contains(TouchFlags::FEW_TAXELS);
+                let Some(fit) = touch.fit.filter(|_| is_told) else { continue };
                 let angle_of = |line: DVec3| flat(line).to_angle();
                 let (moments, fitted) = match (angle, touch.principal_axis, fit.direction) {
                     (Some(truth), Some(axis), Some(fit)) => {
