@@ -133,7 +133,7 @@ impl Opened {
 
     /// Starts to read, for `sinks`. Of boards or limbs, somebody else reads the lines.
     #[must_use]
-    pub fn start(self, sinks: Vec<Box<dyn Sink + Send>>, input: &Input, options: RunOptions) -> Run {
+    pub fn start(self, sinks: Vec<Box<dyn Sink + Send>>, input: &Input, options: &RunOptions) -> Run {
         let Self { engine, source, lines, pace, .. } = self;
         let feed = match &lines {
             None => Feed::start(source, ReadMode { most: pace.batch, gather: pace.gather, speed: pace.speed }),
@@ -143,7 +143,7 @@ impl Opened {
             is_live: !pace.gather,
             tracks_stale: lines.is_some(),
             recording: pace.ends.then(|| input.name.clone()),
-            ..options
+            ..options.clone()
         };
         Run::new(engine, feed, sinks, options)
     }
@@ -161,7 +161,7 @@ impl Run {
     /// # let folder = tempfile::tempdir().unwrap();
     /// # let file = folder.path().join("palm.toml");
     /// # std::fs::write(&file, "fields = \"hand/palm\"\nsink = \"ndjson:palm.ndjson\"").unwrap();
-    /// let mut run = Run::of(SceneFile::load(&file)?, Tell::new(|line| eprintln!("{line}")))?;
+    /// let mut run = Run::of(SceneFile::load(&file)?, &Tell::new(|line| eprintln!("{line}")))?;
     /// // `()` watches nothing; an `Observer` of your own sees every call, and may end the run.
     /// let ending = run.run(&mut (), || false)?;
     /// let outcome = run.finish(ending)?;
@@ -173,7 +173,7 @@ impl Run {
     /// # Errors
     /// Something that the scene names is invalid or not there, an output exists and `overwrite` is not set, or it asks for a
     /// tolerance or a budget, for which the command measures.
-    pub fn of(scene: SceneFile, tell: Tell) -> Result<Self> {
+    pub fn of(scene: SceneFile, tell: &Tell) -> Result<Self> {
         if !scene.accuracy.target().is_empty() {
             let what = "tolerances and a budget are met by measuring; `somatic tradeoff --write` measures, and writes into a scene what to \
                         give in their place";
@@ -196,7 +196,7 @@ impl Run {
         sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| tell.say(&remark));
         let verify = setup.verify;
         let lines = opened.lines.clone();
-        let mut run = opened.start(sinks, &input, RunOptions { verify, ..RunOptions::default() });
+        let mut run = opened.start(sinks, &input, &RunOptions { verify, ..RunOptions::default() });
         run.lines = lines;
         Ok(run)
     }

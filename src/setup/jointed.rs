@@ -48,7 +48,9 @@ impl Setup {
             Some(StatesSpec::Bag(bag)) => {
                 let failed = |e: Error| match self.joint_states {
                     Some(_) => e,
-                    None => Error::failed(format!("{e}; or name another file with joint states (joint_states, --joint-states FILE)")),
+                    None => Error::failed(format!(
+                        "{e}; or name another file with joint states (joint_states, --joint-states FILE)"
+                    )),
                 };
                 options.states = Some(crate::robot::joint_states_of_bag(&bag).map_err(failed)?);
                 source

@@ -10,6 +10,8 @@ const EXCEEDING_SHARE: f64 = 1e-3;
 pub(super) fn rest_of(kept: &[f32], unit: f64) -> Option<(f64, f64)> {
     /// The standard deviation of normal values over their median deviation.
     const SIGMAS: f64 = 1.482_6;
+    /// More values than this on one side alone are no strays.
+    const CUT_SHARE: f64 = 0.05;
     /// Of whole numbers, means are given with two decimals: what is left of noise after a minute of frames.
     const DECIMALS: f64 = 100.0;
     let mut values: Vec<f64> = kept.iter().map(|&value| value.into()).collect();
@@ -17,9 +19,12 @@ pub(super) fn rest_of(kept: &[f32], unit: f64) -> Option<(f64, f64)> {
     let mut deviations: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
     let within = (3.0 * SIGMAS * median(&mut deviations)?).max(1.5 * unit);
     let near = || values.iter().filter(|value| (**value - middle).abs() <= within);
-    let (low, high) = near().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
-    // More than half of the values are at an end and the others farther than rounding takes them: the end of the range cuts noise off.
-    if (middle == low && high - middle > 1.5 * unit) || (middle == high && middle - low > 1.5 * unit) {
+    // Nothing on one side and many farther than rounding takes them on the other: the end of the range cuts noise off.
+    let share_beyond = |by: f64, side: f64| {
+        values.iter().filter(|value| side * (**value - middle) > by).count() as f64 / values.len() as f64
+    };
+    let is_cut = |side: f64| share_beyond(0.0, side) <= EXCEEDING_SHARE && share_beyond(1.5 * unit, -side) > CUT_SHARE;
+    if is_cut(1.0) || is_cut(-1.0) {
         return Some((middle, noise_of(values.into_iter(), middle)));
     }
     // From the middle, so that large raw values lose no digits.

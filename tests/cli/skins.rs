@@ -94,7 +94,10 @@ fn what_cannot_be_converted_is_said() {
     let at = |name: &str| folder.path().join(name).display().to_string();
     assert!(fails(2, &["convert", "hand", "-o", &at("hand.mcap")]).contains("becomes a .csv or a .urdf"));
     assert!(fails(2, &["convert", "hand"]).contains("OUT"));
-    assert!(fails(2, &["convert", "hand", &at("a.csv"), "--rate", "5"]).contains("without the flags for recordings; leave them out"));
+    assert!(
+        fails(2, &["convert", "hand", &at("a.csv"), "--rate", "5"])
+            .contains("without the flags for recordings; leave them out")
+    );
     let table = at("hand.csv");
     let said = stderr(&output(&["convert", "hand", "-o", &table]));
     assert!(said.contains("40 taxels in") && said.contains("fields left out"), "{said}");

@@ -34,7 +34,7 @@ fn scene(folder: &Path, text: &str) -> SceneFile {
 fn a_scene_becomes_a_file_of_percepts() {
     let folder = tempfile::tempdir().unwrap();
     let text = "backend = \"cpu\"\nfields = \"hand/palm*\"\noutputs = [\"total\"]\nsink = [\"ndjson:a.ndjson\", \"csv:a.csv\"]\n";
-    let mut run = Run::of(scene(folder.path(), text), Tell::default()).unwrap();
+    let mut run = Run::of(scene(folder.path(), text), &Tell::default()).unwrap();
     let mut listener = Listener::default();
     let ending = run.run(&mut listener, || false).unwrap();
     assert!(!folder.path().join("a.csv").exists(), "a table of a recording appears when it is whole");
@@ -48,7 +48,7 @@ fn a_scene_becomes_a_file_of_percepts() {
 #[test]
 fn a_run_that_is_ended_early_leaves_no_part_of_a_recording() {
     let folder = tempfile::tempdir().unwrap();
-    let mut run = Run::of(scene(folder.path(), "sink = \"csv:a.csv\"\nbatch = 1\n"), Tell::default()).unwrap();
+    let mut run = Run::of(scene(folder.path(), "sink = \"csv:a.csv\"\nbatch = 1\n"), &Tell::default()).unwrap();
     let ending = run.run(&mut (), || true).unwrap();
     let outcome = run.finish(ending).unwrap();
     assert!(outcome.losses[0].contains("interrupted before its first frame"), "{:?}", outcome.losses);
@@ -64,9 +64,9 @@ fn what_a_scene_finds_out_is_told_once_and_in_keys() {
     let to = Arc::clone(&told);
     let tell = Tell::new(move |line| to.lock().unwrap().push(line.to_owned()));
     let text = format!("source = {:?}\ncalibration = \"cal.toml\"\n", export.display().to_string());
-    drop(Run::of(scene(folder.path(), &format!("{text}quiet = true\n")), tell.clone()).unwrap());
+    drop(Run::of(scene(folder.path(), &format!("{text}quiet = true\n")), &tell).unwrap());
     assert!(told.lock().unwrap().is_empty());
-    drop(Run::of(scene(folder.path(), &text), tell).unwrap());
+    drop(Run::of(scene(folder.path(), &text), &tell).unwrap());
     let told = told.lock().unwrap();
     let stays = told.iter().filter(|line| line.contains("this stays under `calibration`: unit = \"mmHg\""));
     assert_eq!(stays.count(), 1, "{told:?}");
@@ -80,7 +80,7 @@ fn errors_of_scenes_speak_of_keys() {
         ("source = \"-\"\nfrom_s = 1.0\n", "`from_s`, `to_s` and `loop` are for recordings"),
         ("[accuracy]\nbudget = \"1 ms\"\n", "tolerances and a budget are met by measuring"),
     ] {
-        let error = Run::of(scene(folder.path(), text), Tell::default()).err().unwrap();
+        let error = Run::of(scene(folder.path(), text), &Tell::default()).err().unwrap();
         assert_eq!(error.kind(), ErrorKind::Usage, "{error}");
         assert!(error.to_string().contains(says), "{error}");
     }

@@ -130,7 +130,7 @@ impl Prepared {
             explainer,
         };
         let until = self.lasts.map(|span| Instant::now() + span);
-        let run = self.opened.start(sinks, input, RunOptions { verify: self.verify, until, ..RunOptions::default() });
+        let run = self.opened.start(sinks, input, &RunOptions { verify: self.verify, until, ..RunOptions::default() });
         Ok((run, console))
     }
 }

@@ -72,7 +72,7 @@ impl Setup<'_> {
             KernelName::Bonded => Kernel::Radial(Radial::Bonded),
         };
         if kernel != Kernel::Gaussian {
-            self.text.refuse("spread", keys.spread.as_ref(), &format!("with `kernel = \"{}\"`", name.word()))?;
+            self.text.refuse("spread", keys.spread.as_ref(), format!("with `kernel = \"{}\"`", name.word()))?;
         }
         let contact = match keys.contact.as_ref().map(|contact| (*contact.get_ref(), contact.span())) {
             Some((ContactName::Gaussian, at)) if kernel != Kernel::Gaussian => {
