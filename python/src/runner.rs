@@ -157,7 +157,7 @@ impl Observer for Caller<'_> {
     }
 
     fn turned(&mut self) {
-        let told = Python::attach(|py| py.check_signals());
+        let told = Python::attach(Python::check_signals);
         self.heed(told);
     }
 }
