@@ -157,7 +157,8 @@ impl Observer for Caller<'_> {
     }
 
     fn turned(&mut self) {
-        let told = Python::attach(Python::check_signals);
+        #[expect(clippy::redundant_closure_for_method_calls, reason = "the method alone is for one lifetime")]
+        let told = Python::attach(|py| py.check_signals());
         self.heed(told);
     }
 }

