@@ -178,7 +178,7 @@ mod tests {
                     if kernel == Radial::Boussinesq { 1e-9 * integral + 1e-15 } else { 2e-3 * integral + 1e-7 };
                 assert!((got - integral).abs() <= within, "{kernel:?} ({x}, {y}): {got:e} {integral:e}");
                 // Another depth is told apart where much is felt.
-                let other = kernel.mass(x, y, side / 2.0, 1.02 * depth);
+                let other = kernel.mass(x, y, side / 2.0, 1.15 * depth);
                 assert!(integral < 1e-4 || (other - integral).abs() > within, "{kernel:?} ({x}, {y})");
             }
         }
@@ -215,7 +215,8 @@ mod tests {
         };
         assert!((k(0.0) / BONDED_INTEGRAL - 1.0).abs() < 1e-9);
         for r in [0.0, 0.01, 0.37, 0.9, 1.5, 3.3, 7.7] {
-            assert!((bonded(r) - k(r) / k(0.0)).abs() < 2e-6, "{r}: {} {}", bonded(r), k(r) / k(0.0));
+            // A cubic between four steps h apart is off by h⁴/43 of the fourth derivative, which is about 150 near 0.
+            assert!((bonded(r) - k(r) / k(0.0)).abs() < 5e-6, "{r}: {} {}", bonded(r), k(r) / k(0.0));
         }
         // A thin layer passes all of a long wave, and nothing of a short one.
         assert!((arrives(0.0) - 1.0).abs() < 1e-15 && arrives(30.0) < 1e-11);
