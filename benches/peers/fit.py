@@ -20,6 +20,8 @@ import numpy as np
 
 STEPS, PENALTY, PRIOR, VARIES = 6, 4.6, math.log(1.2), 0.3
 SIGMA, GAIN = 0.007 / math.sqrt(3), 0.05
+# What a point, a line, a segment and a blob may be off by, as shares of the largest pressure.
+FLOORS = (0.01, 0.03, 0.03, 0.01)
 SIDE = math.sqrt(1.96349537873175e-05)
 jit = numba.njit(cache=False, fastmath=False)
 
@@ -81,7 +83,7 @@ def objective(kind, k, p, s, A, g, by):
         off = m - s[i, 3]
         if s[i, 5] == 0.0 and off <= 0.0:
             continue
-        per = 1.0 / math.sqrt(s[i, 4] + GAIN * GAIN * m * m)
+        per = 1.0 / math.sqrt(s[i, 4] + GAIN * GAIN * m * m + FLOORS[kind] * FLOORS[kind])
         r = off * per
         slope = per * (1.0 - r * GAIN * GAIN * m * per)
         cost += r * r
@@ -218,7 +220,6 @@ def fit(uv, pressures, sigmas, threshold, found):
     half = math.log(max(math.sqrt(6.0 * apart), 0.5))
     by, best, p = np.zeros(6), math.inf, np.zeros(7)
     of_line = np.zeros(7)
-    misfit, rest = math.inf, math.inf
     for kind in range(4 if pressed > 6 else 2):
         p[:] = 0.0
         if kind == 0:
@@ -231,16 +232,18 @@ def fit(uv, pressures, sigmas, threshold, found):
             p[2], p[3], p[5], p[6] = math.cos(turn), math.sin(turn), low, high if kind == 3 else 0.0
         if kind != 2:
             with_force(kind, p, s, by)
-        cost, chi, ahead = descend(kind, p, s)
+        cost, _, _ = descend(kind, p, s)
         if kind == 1:
             of_line[:] = p
         k = 4 if kind < 2 else 6
-        if cost + 2.0 * PENALTY * k < best:
-            best, misfit, rest = cost + 2.0 * PENALTY * k, chi / (pressed - k), ahead
+        room = 0.0
+        for i in range(n):
+            if s[i, 5] > 0.0:
+                room += math.log1p(FLOORS[kind] ** 2 / (s[i, 4] + (GAIN * s[i, 3]) ** 2))
+        if cost + room + 2.0 * PENALTY * k < best:
+            best = cost + room + 2.0 * PENALTY * k
             found[0], found[1], found[2] = kind, cu + SIGMA * p[0], cv + SIGMA * p[1]
             found[3] = math.atan2(p[3], p[2]) % math.pi
-    if not (misfit <= 4.0 and rest <= 0.01):
-        found[0] = -1.0
 
 
 @numba.njit(parallel=True)
