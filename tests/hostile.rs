@@ -353,7 +353,7 @@ fn a_layout_that_contradicts_itself_is_refused() {
         draft
     };
     let why = |fields: &[&str]| with_fields(fields).why();
-    assert!(why(&[r#"{"version":1,"name":"a","parent":"b"}"#]).contains("parent `b`, which is no field"));
+    assert!(why(&[r#"{"version":1,"name":"a","parent":"b"}"#]).contains("parent `b`, which is not a field"));
     let ring = [
         r#"{"version":1,"name":"a","parent":"b"}"#,
         r#"{"version":1,"name":"b","parent":"c"}"#,
