@@ -108,7 +108,7 @@ impl Arguments {
     /// Checks and reserves what `asked` has written, before anything is read.
     fn reserve(&self, asked: &Setup) -> Result<Reserved> {
         let sinks = &asked.sinks;
-        let table = asked.tables(self.wide).on_stdout(self.table)?;
+        let table = asked.table_wish(self.wide)?.on_stdout(self.table)?;
         if self.table.is_some() && !sinks.iter().any(SinkSpec::is_table_on_stdout) {
             return Err(Error::usage("--table is for a table on standard output; add --sink csv:-"));
         }
@@ -147,7 +147,7 @@ fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
     let targets = if asked.sinks.is_empty() && !view.is_table() { vec![SinkTarget::Stdout] } else { targets };
-    let session = prepared.session(asked, &input, &targets, arguments.scene.as_deref())?;
+    let session = prepared.opened.session(asked, &input, &targets, arguments.scene.as_deref())?;
     if arguments.describe {
         print(&describe(&asked.sinks, &session, arguments.wide)?)?;
         return Ok(DONE);

@@ -182,7 +182,7 @@ impl Run {
         let setup = Setup::new(scene, tell.clone());
         let input = Input::named(&setup)?;
         let mut outputs = FilesRead::of(&setup, None).outputs(setup.overwrite);
-        let table = setup.tables(false);
+        let table = setup.table_wish(false)?;
         let target = |sink: &SinkSpec| sink.target(&mut outputs, &setup.allow_hosts, table);
         let targets = setup.sinks.iter().map(target).collect::<Result<Vec<SinkTarget>>>()?;
         let pace = Pace::of(&setup, &input, false);

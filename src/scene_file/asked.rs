@@ -80,7 +80,8 @@ impl SceneFile {
             .filter(self.filter()?)
             .knobs(self.accuracy.knobs())
             .contact_tolerance_m(self.contact_tolerance_m)
-            .touches(self.touches())
+            // Without places of sensors there is no place of a touch.
+            .touches(self.touches().filter(|_| is_placed))
             .relative_to(self.relative_to.clone())
             .coordinates(self.coordinates.unwrap_or(usual.coordinates));
         Ok(Options::default()

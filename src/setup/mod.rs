@@ -25,6 +25,7 @@ use crate::body::Body;
 use crate::engine::Options;
 use crate::error::Result;
 use crate::scene_file::SceneFile;
+use crate::sink::TableWish;
 use crate::source::SourceSpec;
 
 /// What a run is asked to do, and what was found out of its first source.
@@ -66,7 +67,19 @@ impl Setup {
     /// The calibration is invalid, or of another body; keys do not go together.
     pub fn options(&self, body: &Body, ids: &[u32], batch: usize) -> Result<Options> {
         let calibration = self.calibration_for(body, ids)?;
-        let is_placed = self.body.is_some() || !self.outputs.is_empty() || self.export_is_placed()?.unwrap_or(true);
-        self.engine_options(calibration, is_placed, batch)
+        self.engine_options(calibration, self.is_placed()?, batch)
+    }
+
+    /// What tables have, with a row per frame or not.
+    ///
+    /// # Errors
+    /// The source cannot be opened.
+    pub fn table_wish(&self, wide: bool) -> Result<TableWish> {
+        Ok(if self.is_placed()? { self.tables(wide) } else { TableWish::new(self.outputs(), false, wide) })
+    }
+
+    /// Whether the sensors have places, or somebody asks for quantities by name.
+    fn is_placed(&self) -> Result<bool> {
+        Ok(self.body.is_some() || !self.outputs.is_empty() || self.export_is_placed()?.unwrap_or(true))
     }
 }

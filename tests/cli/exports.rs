@@ -247,6 +247,11 @@ fn places_of_insoles_are_used_by_every_command_that_reads_them() {
     let (folder, path, table) = pedar();
     let bare = run(&["--source", &path]);
     assert!(bare[5]["fields"][0]["force"].is_null() && bare[5]["fields"][0]["centroid"].is_null());
+    // Nor has a touch a place, as a line or in a table.
+    assert!(bare.iter().all(|frame| frame["touches"].is_null()));
+    let tables = folder.path().join("bare.csv");
+    done(&["run", "--quiet", "--backend", "cpu", "--source", &path, "--sink", &format!("csv:{}", text_of(&tables))]);
+    assert!(tables.is_file() && !folder.path().join("bare.touches.csv").exists());
     let placed = run(&["--source", &path, "--layout", &table]);
     let (force, centroid) = (&placed[5]["fields"][0]["force"], &placed[5]["fields"][0]["centroid"]);
     assert!((force.as_f64().unwrap() - 5.0 * 60.0 * 1000.0 * 1e-4).abs() < 1e-3 && centroid.is_array(), "{force}");

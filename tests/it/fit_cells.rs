@@ -5,7 +5,9 @@
 use glam::{DVec2, DVec3};
 use somatic::scene::Scene;
 use somatic::source::{SimulatedSource, Source, Truth};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, TouchFlags, TouchOutputs, touch};
+use somatic::{
+    BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Percepts, TouchFlags, TouchOutputs, touch,
+};
 
 use crate::common::Flat;
 
@@ -115,26 +117,10 @@ impl Cell {
 
     /// Squares of errors of a seed: of the moments, of the fit; for those that have one, and how many there were.
     fn errors(&self, body: &Body, seed: u64, layer: &str) -> Errors {
-        let mut source = SimulatedSource::on_body("cell", &self.text(seed, layer), body.clone()).unwrap();
-        let mut calibration = source.calibration();
-        calibration.truncate(calibration.find("\n[layer]").unwrap_or(calibration.len()));
         let spread = self.told.unwrap_or(self.gains.max(0.05));
-        calibration += &format!("\n[layer]\nsigma_m = {}\ngain_spread = {spread}\n", self.sigma_m * self.believed);
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        let calibration = Calibration::parse(&calibration, &ids).unwrap();
-        let asked = touch::Options { outputs: TouchOutputs::all(), ..touch::Options::default() };
-        let scene = Scene::default().outputs(Outputs::TOTAL).touches(asked).fields(["grid"]);
-        let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(256);
-        let mut engine = Engine::new(body, options).unwrap();
-        engine.set_channels(source.taxels()).unwrap();
-        let (mut frames, mut truths) = (Vec::new(), Vec::new());
-        let mut frame = Frame::missing(0.0, source.taxels().len());
-        while source.next_frame(&mut frame).unwrap() {
-            let of = |truth: &Truth| (DVec2::from_array(truth.uv.unwrap()), truth.angle);
-            truths.push(source.truth().iter().map(of).collect::<Vec<_>>());
-            frames.push(frame.clone());
-        }
-        let percepts = engine.process(&frames).unwrap();
+        let (percepts, truths) = found(body, &self.text(seed, layer), (self.sigma_m * self.believed, spread));
+        let of = |truth: &Truth| (DVec2::from_array(truth.uv.unwrap()), truth.angle);
+        let truths: Vec<Vec<_>> = truths.iter().map(|truths| truths.iter().map(of).collect()).collect();
         let mut errors = Errors::default();
         for (frame, truth) in truths.iter().enumerate() {
             let touches = &percepts.touches(frame).unwrap().touches;
@@ -162,6 +148,28 @@ impl Cell {
         }
         errors
     }
+}
+
+/// What is found of the touches of the simulation `text` on the grid `body`, if its calibration has a layer with this σ and spread of gains;
+/// and by frame what is true.
+pub(crate) fn found(body: &Body, text: &str, (sigma_m, gain_spread): (f64, f64)) -> (Percepts, Vec<Vec<Truth>>) {
+    let mut source = SimulatedSource::on_body("grid", text, body.clone()).unwrap();
+    let mut calibration = source.calibration();
+    calibration.truncate(calibration.find("\n[layer]").unwrap_or(calibration.len()));
+    calibration += &format!("\n[layer]\nsigma_m = {sigma_m}\ngain_spread = {gain_spread}\n");
+    let calibration = Calibration::parse(&calibration, source.taxels()).unwrap();
+    let asked = touch::Options { outputs: TouchOutputs::all(), ..touch::Options::default() };
+    let scene = Scene::default().outputs(Outputs::TOTAL).touches(asked).fields(["grid"]);
+    let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(256);
+    let mut engine = Engine::new(body, options).unwrap();
+    engine.set_channels(source.taxels()).unwrap();
+    let (mut frames, mut truths) = (Vec::new(), Vec::new());
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    while source.next_frame(&mut frame).unwrap() {
+        truths.push(source.truth().to_vec());
+        frames.push(frame.clone());
+    }
+    (engine.process(&frames).unwrap().clone(), truths)
 }
 
 /// The grid lies in its link's x and −z.

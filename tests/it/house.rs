@@ -86,6 +86,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
                 "robot",
                 "scene_file",
                 "signal",
+                "sink",
                 "source",
             ],
         ),

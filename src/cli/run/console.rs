@@ -79,7 +79,7 @@ impl Observer for Console {
 
 impl Console {
     /// Says, the first time, what is doubtful in the frames so far.
-    pub(super) fn tell_doubts(&mut self, plan: &Plan) {
+    fn tell_doubts(&mut self, plan: &Plan) {
         let doubts = self.doubts.take();
         doubts.iter().flat_map(|doubts| doubts.of_frames(plan)).for_each(|doubt| say(&doubt));
     }

@@ -1,14 +1,13 @@
 //! A run before its first frame: its source is open, its engine made, and nothing is written yet.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use somatic::output::OutputPath;
 use somatic::run::{Opened, Pace, Run, RunOptions};
 use somatic::setup::{Input, Setup};
+use somatic::sink::Sink;
 #[cfg(feature = "page")]
 use somatic::sink::SinkSpec;
-use somatic::sink::{Session, Sink, SinkTarget};
 use somatic::{BackendKind, Error, Result};
 
 use super::console::Console;
@@ -24,7 +23,7 @@ use crate::cli::words;
 
 /// All that a run at a terminal has before its sinks are opened.
 pub(super) struct Prepared {
-    opened: Opened,
+    pub(super) opened: Opened,
     #[cfg(feature = "page")]
     options: somatic::Options,
     /// What is written of boards at the end.
@@ -58,13 +57,12 @@ impl Prepared {
         let mut chosen = None;
         let opened = Opened::new(asked, input, body, pace, |body| {
             let Settled { options, why, .. } = settled(asked, Some(input), body, pace.batch)?;
-            chosen = Some(options.clone());
+            chosen = Some((options.clone(), why.clone()));
             Ok((options, why))
         })?;
-        let options = chosen.unwrap_or_default();
+        let (options, why) = chosen.unwrap_or_default();
         let is_raw = options.calibration.is_none() && !options.tare;
-        let why = (opened.backend[2] != opened.engine.backend().2).then_some(&*opened.backend[2]);
-        let verify = asked.verify && has_another_to_compare(&opened.engine, why)?;
+        let verify = asked.verify && has_another_to_compare(&opened.engine, why.as_deref())?;
         let mut prepared = Self {
             opened,
             #[cfg(feature = "page")]
@@ -91,17 +89,6 @@ impl Prepared {
         let doubts = Doubts::new(&input.name, body, source.taxels(), input.holds_any(), is_raw);
         doubts.of_taxels(engine.plan()).iter().for_each(|doubt| say(doubt));
         self.doubts = Some(doubts);
-    }
-
-    /// What sinks are told that are opened for `targets`; a recording has the `scene` in it.
-    pub(super) fn session<'a>(
-        &'a self,
-        asked: &'a Setup,
-        input: &'a Input,
-        targets: &[SinkTarget],
-        scene: Option<&Path>,
-    ) -> Result<Session<'a>> {
-        self.opened.session(asked, input, targets, scene)
     }
 
     /// Starts to read, for `sinks` and what a `view` shows.

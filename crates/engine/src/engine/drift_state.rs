@@ -13,9 +13,11 @@ use crate::touch::Skin;
 /// Fields that are looked at to find one that leaves enough taxels untouched.
 const MOST_LOOKED_AT: usize = 16;
 
-/// A touch reaches this many spacings of taxels from a pressed one, or this many σ of the layer, if that is more.
-const RINGS: f64 = 2.2;
-const LAYER_SIGMAS: f64 = 4.0;
+/// A touch reaches this many spacings of taxels from a pressed one, or this many σ of the layer, if that is more,
+const REACH_SPACINGS: f64 = 2.2;
+const REACH_SIGMAS: f64 = 4.0;
+/// but no more spacings than this: a taxel has some 200 others within them.
+const MOST_SPACINGS: f64 = 8.0;
 
 /// Drift compensation, and what it needs of the engine.
 #[derive(Clone, Debug)]
@@ -74,7 +76,8 @@ impl DriftState {
             let distance_m = |other: u32| skin.taxels()[other as usize].position.distance(at);
             let beside = skin.beside(node);
             let spacing_m = beside.iter().map(|&other| distance_m(other)).sum::<f64>() / beside.len().max(1) as f64;
-            let reach_m = (RINGS * spacing_m).max(sigma_m.map_or(0.0, |sigma_m| LAYER_SIGMAS * sigma_m));
+            let by_layer_m = sigma_m.map_or(0.0, |sigma_m| REACH_SIGMAS * sigma_m);
+            let reach_m = by_layer_m.clamp(REACH_SPACINGS * spacing_m, MOST_SPACINGS * spacing_m);
             let mut near = vec![node];
             let mut from = 0;
             while from < near.len() {

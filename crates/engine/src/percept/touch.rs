@@ -39,11 +39,11 @@ bitflags! {
         const STALE = 1 << 12;
         /// P has no unit, or a taxel no area: force and mean pressure are absent.
         const NO_UNIT = 1 << 13;
-        /// Too few of its taxels are pressed to tell what presses: no fit.
+        /// Under five of its taxels are pressed: a fit is a point whose spread is a guess, and under three there is none.
         const FEW_TAXELS = 1 << 14;
-        /// What presses goes on beyond the sensors: its force and length are not known, or there is no fit at all.
+        /// The contact goes on beyond the sensors: its force and length are not known, or there is no fit.
         const OFF_SKIN = 1 << 15;
-        /// No kind of contact explains what its taxels feel: no fit.
+        /// No kind of contact explains what its taxels feel: the fit is in doubt.
         const POOR_FIT = 1 << 16;
         /// What the layer makes of a contact is not known, as the calibration has no `[layer]` or a taxel has no area: no fit.
         const NO_LAYER = 1 << 17;

@@ -5,23 +5,26 @@
 //! with ends, and a `blob` with two spreads ([`kinds`]). Each is fitted to the touch's pressed taxels Pᵢ and to their neighbours by least
 //! squares of
 //!
-//! rᵢ = (mᵢ − Pᵢ) / √(σᵢ² + (g·mᵢ)²)
+//! rᵢ = (mᵢ − Pᵢ) / √(σᵢ² + (g·mᵢ)² + (f·max P)²)
 //!
-//! where m is what the contact would make a taxel feel, σᵢ the noise of P and g the spread of the sensors' gains, which
-//! stands for the model's own faults too ([`objective`]). A taxel at 0 says only that m is not over its threshold: it counts
+//! where m is what the contact would make a taxel feel, σᵢ the noise of P, g the spread of the sensors' gains, and f the kind's
+//! floor ([`kinds`]): layers have tails that a Gaussian lacks, and on quiet sensors these would leave no kind standing ([`objective`]). A taxel at 0 says only that m is not over its threshold: it counts
 //! where it is. A prior holds the contact's spread near what touches have.
 //!
 //! **Descent.** Levenberg and Marquardt's, from the touch's moments, for a fixed number of steps; a step that does not help
 //! is not taken ([`descent`]). A segment starts from the line. Nothing is kept from frame to frame, so that a recording that
 //! is cut anywhere has the same fits.
 //!
-//! **Kind.** Of the kinds the one with the least χ² + prior + 2·[`choice::PENALTY`] a parameter ([`choice`]). The errors' covariance is
-//! (JᵀJ)⁻¹ where the descent ends.
+//! **Kind.** Of the kinds the one with the least χ² + prior + 2·[`choice::PENALTY`] a parameter + Σ ln(D²/(D² − (f·max P)²)), D the
+//! residual's denominator: a likelihood pays for the room that a floor gives ([`choice`]). The errors' covariance is (JᵀJ)⁻¹ where the
+//! descent ends, widened by χ² a spare taxel if that is over 1; a force has 4 % more for the layer.
 //!
-//! **Absent** is a fit whose touch has too few pressed taxels to tell (`few_taxels`: no more than parameters), whose place no
-//! sensor is near (`off_skin`), that does not explain the taxels or has not come to rest (`poor_fit`), or without the layer's σ
-//! (`no_layer`). A contact whose ends lie beyond the sensors, as a line's do, has a place and an angle, but no force and no
+//! **Absent** is a fit whose touch has under three pressed taxels (`few_taxels`), whose place no sensor is near (`off_skin`), or without
+//! the layer's σ (`no_layer`). A contact whose ends lie beyond the sensors, as a line's do, has a place and an angle, but no force and no
 //! length: `off_skin` too.
+//!
+//! **In doubt** is one of three or four pressed taxels (`few_taxels`), whose spread is the prior's, and one that does not explain the
+//! taxels or has not come to rest (`poor_fit`).
 //!
 //! This stage is for touches of the whole body. It starts from raw values, in f64 on the host, whatever the backend. [`Real`] lets it
 //! fit several touches side by side, with the bits of one alone.
