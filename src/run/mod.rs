@@ -14,16 +14,16 @@ mod serve;
 mod unfit;
 
 #[doc(hidden)]
-pub use self::feed::Arrival;
-pub use self::feed::{Ending, Feed, FrameInfo, ReadMode};
+pub use self::feed::{Arrival, Feed, ReadMode};
+pub use self::feed::{Ending, FrameInfo};
 pub use self::observer::{Observer, Remark};
 #[cfg(feature = "scenes")]
 #[doc(hidden)]
 pub use self::opened::{Opened, Pace};
 #[doc(hidden)]
 pub use self::repeats::Repeats;
+pub use self::running::{Outcome, Run};
 #[doc(hidden)]
-pub use self::running::left_out;
-pub use self::running::{Outcome, Run, RunOptions};
+pub use self::running::{RunOptions, left_out};
 #[cfg(feature = "scenes")]
 pub use crate::setup::Tell;

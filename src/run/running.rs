@@ -71,6 +71,7 @@ pub struct Outcome {
 
 impl Run {
     /// A run that has all it needs: what comes from `feed` goes through `engine`, which knows the source's taxels, to `sinks`.
+    #[doc(hidden)]
     #[must_use]
     pub fn new(engine: Engine, feed: Feed, sinks: Vec<Box<dyn Sink + Send>>, options: RunOptions) -> Self {
         Self {

@@ -15,6 +15,7 @@ mod columns;
 mod members;
 mod over_fields;
 mod pack;
+#[doc(hidden)]
 pub mod raster;
 mod report;
 mod ring;
