@@ -55,6 +55,15 @@ impl Radial {
         }
     }
 
+    /// The same where a few thousandths of a force may be lost, in depths: 0.1, 0.04 and 0.2 % lie beyond.
+    pub(super) fn near_reach(self) -> f64 {
+        match self {
+            Self::Boussinesq => 10.0,
+            Self::Exponential => 6.0,
+            Self::Bonded => 8.0,
+        }
+    }
+
     /// k(r)/k(0).
     pub(super) fn fall(self, depths: f64) -> f64 {
         match self {

@@ -6,8 +6,6 @@ use super::super::radial::Radial;
 
 /// A Gaussian is cut off at this many standard deviations: 4 · 10⁻⁶ of a force lie beyond.
 const CUTOFF_SIGMAS: f64 = 5.0;
-/// Other kernels are cut off at this many depths: 0.1 % of a force lie beyond under Boussinesq's.
-const CUTOFF_DEPTHS: f64 = 10.0;
 /// A layer counts as spreading at least this much, m.
 const MIN_SIGMA_M: f64 = 5e-4;
 /// Pieces of the surface are at most this large, m, or this share of the smallest cell, whichever is more: a body of four metres with
@@ -46,7 +44,7 @@ impl Layer {
     pub(super) fn reach_m(&self) -> f64 {
         match self.kernel {
             Kernel::Gaussian => CUTOFF_SIGMAS * self.sigma_m,
-            Kernel::Radial(kernel) => CUTOFF_DEPTHS.min(kernel.reach()) * self.depth_m(kernel),
+            Kernel::Radial(kernel) => kernel.near_reach() * self.depth_m(kernel),
         }
     }
 
