@@ -83,8 +83,12 @@ struct Found {
     /// Squares of errors of the moments and of the fit, for touches that have one.
     moments: f64,
     fitted: f64,
-    /// Errors within 1.96 σ, of so many: of the fit's place or angle, and of the force.
+    /// Squares of errors of the moments and of `place`, for all touches, and for those with few taxels.
+    placed: [f64; 2],
+    placed_of_few: [f64; 2],
+    /// Errors within 1.96 σ, of so many: of the fit's place or angle, of `place`, and of the force.
     covered: [usize; 2],
+    places: [usize; 2],
     forces: [usize; 2],
 }
 
@@ -97,7 +101,10 @@ impl Found {
         self.moments += other.moments;
         self.fitted += other.fitted;
         for k in 0..2 {
+            self.placed[k] += other.placed[k];
+            self.placed_of_few[k] += other.placed_of_few[k];
             self.covered[k] += other.covered[k];
+            self.places[k] += other.places[k];
             self.forces[k] += other.forces[k];
         }
     }
@@ -114,14 +121,20 @@ impl Found {
             let touches = percepts.touches(frame).unwrap();
             // The largest is the press; a tail may be a touch of its own.
             let Some(touch) = touches.touches.iter().max_by(|a, b| a.total.total_cmp(&b.total)) else { continue };
+            let place = glam::DVec2::from_array(truth.uv.unwrap());
+            let off = |p: glam::DVec3| flat(p).distance(place);
+            let errors = [touch.position, touch.place.unwrap()].map(|place| off(place).powi(2));
             if touches.taxels(touch).len() <= FEW {
                 found.few += 1;
+                found.placed_of_few = add(found.placed_of_few, errors);
                 continue;
             }
             found.touches += 1;
+            found.placed = add(found.placed, errors);
+            if let Some(sigma) = touch.place_sigma_m {
+                found.places = add(found.places, within(flat(touch.place.unwrap()) - place, sigma));
+            }
             found.doubtful += usize::from(touch.flags.contains(TouchFlags::POOR_FIT));
-            let place = glam::DVec2::from_array(truth.uv.unwrap());
-            let off = |p: glam::DVec3| flat(p).distance(place);
             let Some(fit) = touch.fit else { continue };
             match truth.angle {
                 None => {
@@ -129,11 +142,7 @@ impl Found {
                     found.moments += off(touch.position).powi(2);
                     found.fitted += off(fit.place).powi(2);
                     let sigma = fit.sigma.unwrap();
-                    let apart = flat(fit.place) - place;
-                    for (apart, sigma) in [(apart.x, sigma.place[0]), (apart.y, sigma.place[1])] {
-                        found.covered[0] += usize::from(apart.abs() <= COVERS * sigma);
-                        found.covered[1] += 1;
-                    }
+                    found.covered = add(found.covered, within(flat(fit.place) - place, sigma.place));
                     if let Some(force) = fit.force {
                         found.forces[0] += usize::from((force - truth.force_newton).abs() <= COVERS * sigma.force);
                         found.forces[1] += 1;
@@ -161,18 +170,36 @@ impl Found {
         let share = |[within, of]: [usize; 2]| {
             if of == 0 { "–".to_owned() } else { format!("{:.0} %", 100.0 * within as f64 / of as f64) }
         };
+        let few =
+            if self.few == 0 { "–".to_owned() } else { format!("{} {:.2}", self.few, ratio(self.placed_of_few)) };
         format!(
-            "{} | {:.0} % | {:.0} % | {} | {} | {:.2} | {} | {} |",
-            self.few,
+            "{few} | {:.0} % | {:.0} % | {} | {} | {:.2} | {:.2} | {} | {} | {} |",
             100.0 * self.given_share(),
             100.0 * self.doubtful as f64 / self.touches as f64,
             rms(self.moments),
             rms(self.fitted),
             (self.fitted / self.moments).sqrt(),
+            ratio(self.placed),
             share(self.covered),
+            share(self.places),
             share(self.forces)
         )
     }
+}
+
+fn add<T: std::ops::Add<Output = T> + Copy>(a: [T; 2], b: [T; 2]) -> [T; 2] {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+/// How many of two errors are within 1.96 of their standard deviations, of two.
+fn within(off: glam::DVec2, sigma: [f64; 2]) -> [usize; 2] {
+    let is_within = |(off, sigma): (f64, f64)| usize::from(off.abs() <= COVERS * sigma);
+    [off.to_array().into_iter().zip(sigma).map(is_within).sum(), 2]
+}
+
+/// RMS of `place` over that of the moments.
+fn ratio([moments, place]: [f64; 2]) -> f64 {
+    (place / moments).sqrt()
 }
 
 #[test]
@@ -183,9 +210,9 @@ fn fits_are_given_and_sure_of_themselves_under_every_layer() {
     let body = grid(PITCH_M);
     let (mut wrong, mut layers) = (Vec::new(), LAYERS.map(|_| Found::default()));
     println!(
-        "| touches | layer | noise | few | given | doubtful | moments | fit | ratio | within 1.96 σ | force within |"
+        "| touches | layer | noise | few: place | given | doubtful | moments | fit | fit / moments | place / moments | fit within 1.96 σ | place | force |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for pressed in [Pressed::Inside, Pressed::AtRim, Pressed::Rods] {
         for (layer, of_layer) in LAYERS.iter().zip(&mut layers) {
             for &noise in noises {
@@ -207,7 +234,12 @@ fn fits_are_given_and_sure_of_themselves_under_every_layer() {
     for (layer, found) in LAYERS.iter().zip(&layers) {
         let share = |[within, of]: [usize; 2]| within as f64 / of as f64;
         let [places, forces] = [found.covered, found.forces].map(share);
-        println!("{layer}: {places:.2} of places and angles within 1.96 σ, {forces:.2} of forces");
+        let [blended, of_few] = [found.placed, found.placed_of_few].map(ratio);
+        println!(
+            "{layer}: {places:.2} of places and angles within 1.96 σ, {:.2} of blended places, {forces:.2} of forces; place \
+             {blended:.3} of the moments' error, {of_few:.3} with few taxels",
+            share(found.places)
+        );
         if places < 0.88 || forces < 0.6 {
             wrong.push(format!("{layer}: {places:.2}, {forces:.2} within 1.96 σ"));
         }

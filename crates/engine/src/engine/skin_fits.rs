@@ -12,7 +12,7 @@ use crate::backend::cpu::fit::fit_each;
 use crate::percept::{ContactKind, Percepts, TouchFit, TouchFlags, TouchFrame};
 use crate::scene::{Around, Plan, REACH};
 use crate::signal::{LayerResponse, RawValue};
-use crate::stage::fit::{self, Fit, Layer, Taxel};
+use crate::stage::fit::{self, Fit, Layer, Pull, Taxel};
 use crate::touch::{Skin, Trail, Unrolled};
 
 /// Where the fits of touches were on the body at rest, by the touches' identities: what the velocities of the next fits depend on.
@@ -114,6 +114,7 @@ impl SkinFits {
         found: &mut TouchFrame,
     ) {
         for index in 0..found.touches.len() {
+            found.touches[index].place = Some(found.touches[index].position);
             let touch = &found.touches[index];
             if touch.flags.contains(TouchFlags::WRAPPED) {
                 continue;
@@ -127,7 +128,7 @@ impl SkinFits {
             self.near.dedup();
             let unrolled = skin.unrolled(touch.base, touch.link, self.near.iter().copied());
             let value = |node: u32| raw.rows.value(offset, node as usize);
-            match self.fittable(plan, skin, &unrolled, value) {
+            match self.fittable((plan, skin), &unrolled, found.taxels(touch), value) {
                 Ok(ready) => self.waiting.push(Waiting {
                     at: (raw.first + offset, index),
                     unrolled,
@@ -142,17 +143,20 @@ impl SkinFits {
         }
     }
 
-    /// The taxels `near` a touch as fits take them, of those whose values can be used.
+    /// The taxels `near` a touch that has the nodes `own` as fits take them, of those whose values can be used.
     fn fittable(
         &self,
-        plan: &Plan,
-        skin: &Skin,
+        (plan, skin): (&Plan, &Skin),
         near: &Unrolled,
+        own: &[u32],
         value: impl Fn(u32) -> RawValue,
     ) -> Result<fit::Touch, TouchFlags> {
         let LayerResponse { sigma_m, gain_spread } = self.layer.ok_or(TouchFlags::NO_LAYER)?;
         let Around { felt, longest_way_m } = plan.felt_around(skin, near, value);
-        let taxels: Vec<Taxel> = felt.into_iter().map(|(_, taxel)| taxel).collect();
+        let of_touch = |(node, taxel): (u32, Taxel)| {
+            if own.binary_search(&node).is_ok() { taxel } else { Taxel { pull: Pull::default(), ..taxel } }
+        };
+        let taxels: Vec<Taxel> = felt.into_iter().map(of_touch).collect();
         if taxels.iter().any(|taxel| taxel.area_m2 <= 0.0) {
             return Err(TouchFlags::NO_LAYER);
         }
@@ -170,10 +174,15 @@ impl SkinFits {
         let mut spots = Vec::with_capacity(fitted.len());
         for (waiting, (fit, flags)) in self.waiting.iter().zip(fitted) {
             let on_skin = fit.map(|fit| waiting.on_skin(skin, &fit));
+            let place = fit.and_then(|fit| fit.blended);
             spots.push(on_skin.map(|(_, spot)| spot));
             let Some(touch) = percepts.touch_mut(waiting.at) else { continue };
             touch.flags |= flags;
             touch.fit = on_skin.map(|(fit, _)| fit);
+            if let Some(place) = place {
+                touch.place = Some(waiting.place_on_skin(skin, place.place));
+                touch.place_sigma_m = place.sigma;
+            }
         }
         if let Some(over_s) = self.velocity_over_s {
             self.follow(&spots, over_s, percepts);
@@ -229,6 +238,12 @@ struct Spot {
 }
 
 impl Waiting {
+    /// Where `place_m` of the touch's chart is.
+    fn place_on_skin(&self, skin: &Skin, place_m: [f64; 2]) -> DVec3 {
+        let (place, _) = self.unrolled.on_skin(skin, DVec2::from_array(place_m), None);
+        self.from_body.transform_point3(place)
+    }
+
     fn on_skin(&self, skin: &Skin, fit: &Fit) -> (TouchFit, Spot) {
         let (place, direction) = self.unrolled.on_skin(skin, DVec2::from_array(fit.place), fit.angle);
         let given = TouchFit {

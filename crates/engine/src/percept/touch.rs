@@ -107,6 +107,10 @@ pub struct Touch {
     pub velocity: Option<DVec3>,
     /// What presses, where that is asked for and known.
     pub fit: Option<TouchFit>,
+    /// Where it is by its fit and by its moments, each weighted by how sure it is; its position where it has no fit. m; only on request.
+    pub place: Option<DVec3>,
+    /// Standard deviation of that along u and v of the touch's chart, where it has a fit and the noise of the sensors is known, m.
+    pub place_sigma_m: Option<[f64; 2]>,
     /// Standard deviation of the total from the noise of the sensors, in the unit of P; only on request, as the next two.
     pub total_sigma: Option<f64>,
     /// Standard deviation of the position along u and v of the touch's chart, m.

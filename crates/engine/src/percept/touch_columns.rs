@@ -69,6 +69,8 @@ bitflags! {
         const POSITION_SIGMA = 1 << 27;
         /// The standard deviation of its principal axis.
         const PRINCIPAL_AXIS_SIGMA = 1 << 28;
+        /// Where it is by its fit and by its moments; only on request.
+        const PLACE = 1 << 29;
     }
 }
 
@@ -95,7 +97,8 @@ impl TouchOutputs {
         .union(Self::FIT_WIDTH)
         .union(Self::FIT_LENGTH)
         .union(Self::FIT_SIGMAS)
-        .union(Self::FIT_VELOCITY);
+        .union(Self::FIT_VELOCITY)
+        .union(Self::PLACE);
 
     /// Standard deviations of what is not made of fits.
     pub const SIGMAS: Self = Self::TOTAL_SIGMA.union(Self::POSITION_SIGMA).union(Self::PRINCIPAL_AXIS_SIGMA);
@@ -194,6 +197,8 @@ touch_columns! {
     ORIENTATION "orientation" One 3 "Unit vector along the line through its two farthest points; only on request." |touch| vector(touch.orientation);
     ORIENTATION "orientation_angle" Radian 1 "The same as an angle in its own chart, rad in [0, π)." |touch| one_of(touch.orientation_rad);
     VELOCITY "velocity" MetrePerSecond 3 "Change of the position on the skin over 0.2 s, m/s." |touch| vector(touch.velocity);
+    PLACE "place" Metre 3 "The best estimate of where it is: its position and that of its fit, each weighted by how sure it is." |touch| vector(touch.place);
+    PLACE "place_sigma" Metre 2 "The standard deviation of that along u and v of the touch's chart." |touch| touch.place_sigma_m.map(|[u, v]| [u, v, 0.0]);
     FIT_KIND "fit_kind" Kind 1 "What kind of contact presses: point, line, segment or blob." |touch| one_of(touch.fit.and_then(|fit| ContactKind::ALL.iter().position(|kind| *kind == fit.kind)).map(|kind| kind as f64));
     FIT_PLACE "fit_place" Metre 3 "Where it presses, on the skin; of a line the point nearest to the touch's mean." |touch| vector(touch.fit.map(|fit| fit.place));
     FIT_SIGMAS "fit_place_sigma" Metre 2 "The standard deviation of that along u and v of the touch's chart." |touch| sigma(touch).map(|sigma| [sigma.place[0], sigma.place[1], 0.0]);

@@ -6,7 +6,7 @@ use super::plan::Plan;
 use crate::percept::TouchOutputs;
 use crate::signal::{Quantity, RawValue};
 use crate::stage::calibrate::{self, Felt};
-use crate::stage::fit::Taxel;
+use crate::stage::fit::{Pull, Taxel};
 use crate::touch::{Skin, Unrolled};
 
 /// A place is beyond the sensors where it is farther from every one than this share of the longest way between neighbours: over half
@@ -31,7 +31,8 @@ impl Plan {
         let first_slot = self.touched_from.unwrap_or(0);
         let felt = near.nodes.iter().zip(&near.places_m).filter_map(|(&node, &place_m)| {
             let quantity = self.calibrations[node as usize].quantity;
-            let taxel = self.felt(first_slot + node as usize, quantity, place_m, value(node))?;
+            let mut taxel = self.felt(first_slot + node as usize, quantity, place_m, value(node))?;
+            taxel.pull.weight *= skin.taxels()[node as usize].weight();
             let tells = taxel.pressure > 0.0 || near.cosine_to_base(skin, node) >= TURNED_AWAY_COSINE;
             tells.then_some((node, taxel))
         });
@@ -63,6 +64,7 @@ impl Plan {
             pressure: if pressure > 0.0 { by * (pressure + taken_off) } else { 0.0 },
             threshold: by * (feels_from + taken_off),
             sigma: sigma.map(|sigma| by * sigma),
+            pull: Pull { weight: if by > 0.0 { 1.0 / by } else { 0.0 }, less: by * taken_off },
         })
     }
 

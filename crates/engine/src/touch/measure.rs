@@ -133,6 +133,8 @@ fn sums(felt: &Felt<'_>, nodes: &[u32]) -> Touch {
         fit: None,
         total_sigma: None,
         position_sigma_m: None,
+        place: None,
+        place_sigma_m: None,
         principal_axis_sigma_rad: None,
         in_world: false,
         flags,

@@ -5,6 +5,7 @@ use glam::DVec2;
 use super::descent::{Fitted, STEPS, descend};
 use super::kinds::{Blob, Contact, Kind, Line, Point, Segment};
 use super::objective::Sensor;
+use super::place::{Fitted as FittedPlace, Place};
 use super::real::Real;
 use super::shape::{Parameter, Shape};
 use super::touch::{LEAST_PRESSED, Start, Touch};
@@ -36,6 +37,8 @@ pub(crate) struct Fit {
     pub(crate) length: Option<f64>,
     /// Standard deviations, where the noise of the sensors is known.
     pub(crate) sigma: Option<FitSigma>,
+    /// Where the touch is, by the fit and by its moments.
+    pub(crate) blended: Option<Place>,
 }
 
 /// The fits of a touch, or of several in lanes. Those with more parameters are made for touches with enough taxels.
@@ -145,6 +148,18 @@ impl Candidate {
         self.variances[parameter as usize]
     }
 
+    /// What it makes the sensors of `touch` feel.
+    fn felt(&self, touch: &Touch) -> Vec<f64> {
+        let contact = Contact::of(&self.shape);
+        let felt = |&Sensor { at, margin, .. }: &Sensor<f64>| match self.kind {
+            ContactKind::Point => Point::felt(&contact, at, margin).0,
+            ContactKind::Line => Line::felt(&contact, at, margin).0,
+            ContactKind::Segment => Segment::felt(&contact, at, margin).0,
+            ContactKind::Blob => Blob::felt(&contact, at, margin).0,
+        };
+        touch.sensors().iter().map(felt).collect()
+    }
+
     fn each(fits: &Fits<f64>) -> impl Iterator<Item = Self> {
         let short =
             [Self::of::<Point, 4>(ContactKind::Point, &fits.point), Self::of::<Line, 4>(ContactKind::Line, &fits.line)];
@@ -170,19 +185,8 @@ impl Touch {
         if best.ahead > AT_REST || !self.reaches(DVec2::from_array(best.shape.place)) {
             return None;
         }
-        let contact = Contact::of(&best.shape);
-        let felt = |sensor: &Sensor<f64>| {
-            let (at, margin) = (sensor.at, sensor.margin);
-            let felt = match best.kind {
-                ContactKind::Point => Point::felt(&contact, at, margin).0,
-                ContactKind::Line => Line::felt(&contact, at, margin).0,
-                ContactKind::Segment => Segment::felt(&contact, at, margin).0,
-                ContactKind::Blob => Blob::felt(&contact, at, margin).0,
-            };
-            felt * self.peak
-        };
         let width_m = libm::exp(best.shape.width) * self.unit_m;
-        Some(Explained { felt: self.sensors().iter().map(felt).collect(), width_m })
+        Some(Explained { felt: best.felt(self).into_iter().map(|felt| felt * self.peak).collect(), width_m })
     }
 
     /// The likeliest kind of those that the taxels are enough for; with few taxels a point, whose spread then is the prior's.
@@ -252,14 +256,18 @@ impl Touch {
             ContactKind::Blob => Some(half * self.unit_m),
         };
         let width = libm::exp(width) * self.unit_m;
+        let variance = (place_variance * widened).max(DVec2::ZERO);
         let sigma = FitSigma {
-            place: ((place_variance * widened).max(DVec2::ZERO).map(f64::sqrt) * self.unit_m).to_array(),
+            place: (variance.map(f64::sqrt) * self.unit_m).to_array(),
             force: force * share_of(Parameter::Force).hypot(LAYER_SHARE),
             angle: share_of(Parameter::Turn),
             width: width * share_of(Parameter::Width),
             length: length.unwrap_or(0.0) * share_of(Parameter::Length),
         };
+        let felt = best.felt(self);
+        let line = is_line.then_some(along);
         let fit = Fit {
+            blended: self.blended(FittedPlace { felt: &felt, place, variance, floor: best.floor, line }),
             kind: best.kind,
             place: (place * self.unit_m + self.origin).to_array(),
             force: is_whole.then_some(force),

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{Layer, Taxel, Touch};
+use super::{Layer, Pull, Taxel, Touch};
 
 pub(crate) const LAYER: Layer = Layer { sigma_m: 2e-3, gain_spread: 0.05, reach_m: 4e-3, steps: 6 };
 
@@ -18,7 +18,8 @@ pub(crate) fn touches(layer: Layer) -> Vec<Touch> {
             let (x, y) = (from.x * cos + from.y * sin, from.y * cos - from.x * sin);
             let pressure = (-0.5 * (x * x / (long * long) + y * y / (wide * wide))).exp();
             let pressure = if pressure > 0.02 { pressure } else { 0.0 };
-            Taxel { place_m, area_m2: 2.5e-5, pressure, threshold: 0.02, sigma: Some(2e-3) }
+            let pull = Pull { weight: 1.0, less: 0.0 };
+            Taxel { place_m, area_m2: 2.5e-5, pressure, threshold: 0.02, sigma: Some(2e-3), pull }
         };
         let taxels: Vec<Taxel> = (-5..=5).flat_map(|i| (-5..=5).map(move |j| taxel(i, j))).collect();
         Touch::new(&taxels, &layer)

@@ -33,12 +33,32 @@ pub(crate) struct Taxel {
     pub(crate) threshold: f64,
     /// Standard deviation of P for noise, if that is known.
     pub(crate) sigma: Option<f64>,
+    /// How it counts in the mean of the touch.
+    pub(crate) pull: Pull,
+}
+
+/// How a taxel counts in the weighted mean of its touch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Pull {
+    /// The weight of what it feels; 0 for a taxel of another touch.
+    pub(crate) weight: f64,
+    /// What a soft onset takes off what it feels before.
+    pub(crate) less: f64,
+}
+
+impl Pull {
+    /// That of a taxel that feels `pressure`.
+    pub(super) fn of(self, pressure: f64) -> f64 {
+        self.weight * (pressure - self.less).max(0.0)
+    }
 }
 
 /// A touch to be fitted.
 #[derive(Clone, Debug)]
 pub(crate) struct Touch {
     sensors: Vec<Sensor<f64>>,
+    /// By sensor.
+    pub(super) pulls: Vec<Pull>,
     /// What lengths and pressures are counted in, and from where.
     pub(super) unit_m: f64,
     pub(super) peak: f64,
@@ -112,6 +132,7 @@ impl Touch {
         };
         Self {
             sensors: taxels.iter().map(sensor).collect(),
+            pulls: taxels.iter().map(|taxel| Pull { less: taxel.pull.less / peak, ..taxel.pull }).collect(),
             unit_m,
             peak,
             origin,
