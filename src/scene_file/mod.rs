@@ -82,8 +82,8 @@ pub struct SceneFile {
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub fields: Vec<String>,
 
-    /// Compute only these quantities of `somatic outputs` [default: touches, and of fields all but self_contacts,
-    /// speed_in_world, filtered_* and *_sigma; force only if P has a unit].
+    /// Compute only these quantities of `somatic outputs` [default: touches, and of fields all but motion,
+    /// self_contacts, filtered_* and *_sigma; force only if P has a unit].
     #[serde(deserialize_with = "outputs")]
     #[cfg_attr(feature = "cli", schemars(with = "Vec<String>", transform = output_names))]
     pub outputs: Vec<AskedOutputs>,
@@ -165,7 +165,7 @@ pub struct SceneFile {
     /// Time constant of filtered_direction, in seconds; 0 follows at once [default: 0.1].
     pub filter_time_s: Option<f64>,
 
-    /// Measure the filtered_* outputs over this time, in seconds, instead of by `filter_window`.
+    /// Measure the filtered_* outputs over this time, in seconds [default: 0.2, unless `filter_window` has a lower end].
     ///
     /// Motion is measured from where the centroid was that long ago; the upper end of `filter_window` still counts.
     /// With 0.2 it is steady even if few sensors feel a touch.

@@ -40,7 +40,7 @@ fn at_rest((backend, knobs): (BackendKind, Knobs)) -> Options {
         | Outputs::RADIAL_DISTANCE
         | Outputs::SPEED
         | Outputs::RADIAL_SPEED;
-    let scene = Scene::default().outputs(Outputs::USUAL - moving).knobs(knobs);
+    let scene = Scene::default().outputs(Outputs::PLAIN - moving).knobs(knobs);
     Options::default().backend(backend).scene(scene)
 }
 

@@ -18,7 +18,7 @@ pub(in crate::cli) fn outputs_help() -> String {
     let names: Vec<String> = Outputs::all().names().collect();
     format!(
         "Compute only these quantities: touches, which touches.NAME adds to; and of fields {} [default: touches, and of fields all but \
-         self_contacts, speed_in_world, filtered_* and *_sigma; force only if P has a unit]\n\n`somatic outputs` lists them with their units.",
+         motion, self_contacts, filtered_* and *_sigma; force only if P has a unit]\n\n`somatic outputs` lists them with their units.",
         names.join(", ")
     )
 }

@@ -47,8 +47,8 @@ pub(in crate::cli) struct RunFlags {
     #[arg(long, value_name = "GLOB")]
     pub(in crate::cli) fields: Vec<String>,
 
-    /// Compute only these quantities of `somatic outputs` [default: touches, and of fields all but self_contacts,
-    /// speed_in_world, filtered_* and *_sigma; force only if P has a unit].
+    /// Compute only these quantities of `somatic outputs` [default: touches, and of fields all but motion,
+    /// self_contacts, filtered_* and *_sigma; force only if P has a unit].
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', long_help = outputs_help())]
     pub(in crate::cli) outputs: Vec<AskedOutputs>,
 
@@ -141,7 +141,7 @@ pub(in crate::cli) struct RunFlags {
         value_parser = seconds)]
     pub(in crate::cli) filter_time_s: Option<f64>,
 
-    /// Measure the filtered_* outputs over this time, such as 200ms, instead of by --filter-window.
+    /// Measure the filtered_* outputs over this time, such as 100ms [default: 200ms, unless --filter-window has a lower end].
     ///
     /// Motion is measured from where the centroid was that long ago; the upper end of --filter-window still counts.
     /// With 200ms it is steady even if few sensors feel a touch. A bare number is in seconds.

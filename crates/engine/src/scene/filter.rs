@@ -36,10 +36,12 @@ const LOW: f64 = 1.0 / 16.0;
 const HIGH: f64 = 3.0;
 /// How many times its low end the high end of a window is at least, unless both are given.
 const APART: f64 = 3.0;
+/// The time over which motion is measured, s: as the velocity of touches.
+const OVER_S: f64 = 0.2;
 
 impl Default for MotionFilter {
     fn default() -> Self {
-        Self { low_m: None, high_m: None, by: FilterBy::Distance, time_constant_s: 0.1, over_s: None }
+        Self { low_m: None, high_m: None, by: FilterBy::Distance, time_constant_s: 0.1, over_s: Some(OVER_S) }
     }
 }
 
