@@ -40,7 +40,7 @@ impl SceneFile {
         if states.is_none() && !self.sources.iter().any(carries_joints) {
             return Err(Error::usage(
                 "frames of this source carry no joint states; give a recording of them: `joint_states = \"FILE\"`, a CSV under \
-                 t,<joint>,..., NDJSON or a bag of ROS 2",
+                 t,<joint>,..., NDJSON or a ROS 2 bag",
             ));
         }
         if states.is_some() && self.repeat.is_some() {

@@ -140,7 +140,7 @@ impl Tuned {
                 "even the highest wiper position uses less than half of the range; press harder, or is it the right sensor?"
             }
             Self::CutOff => "even the lowest wiper position lets a firm press reach the end of the range",
-            Self::Unsettled => "still off after the last round; is its circuit another?",
+            Self::Unsettled => "still off after the last round; is its circuit different?",
             Self::NotSet => "its board does not set it",
         })
     }

@@ -421,7 +421,7 @@ fn what_does_not_go_together_is_refused_in_one_line() {
     assert!(lacking.contains("states.csv: no state has joint `elbow`, which moves `fore_arm`"), "{lacking}");
     let jointed = ["--joints", URDF, "--joint-states", STATES, "--up", "z"];
     let other = fails(1, &[&["run", "--body", "hand", "--source", TOUCH][..], &jointed].concat());
-    assert!(other.contains("none of its links is called as one of body `hand`"), "{other}");
+    assert!(other.contains("none of its links has the name of a link of body `hand`"), "{other}");
     let looped = ["--joints", URDF, "--up", "z", "--joint-states", STATES, "--loop=2"];
     assert!(run(2, &looped).contains("--loop lets the time"));
 }

@@ -90,7 +90,7 @@ impl IcubFile {
     pub fn read(text: &str) -> Result<Self> {
         let lines: Vec<&str> = text.trim_start_matches('\u{feff}').lines().map(str::trim).collect();
         let start = lines.iter().position(|line| line.eq_ignore_ascii_case("[calibration]")).ok_or_else(|| {
-            Error::failed("there is no line `[calibration]`: this is no position file of the iCub's skin")
+            Error::failed("there is no line `[calibration]`: this is not a position file of the iCub's skin")
         })?;
         let (part, ids) = header(&lines[..start])?;
         let mut raw = Vec::new();
@@ -232,7 +232,7 @@ impl IcubFile {
         let mut normals = self.taxels().map(|(_, taxel)| taxel.normal_in_link);
         let first = normals.next();
         if self.taxels().count() > 2 && normals.all(|normal| Some(normal) == first) {
-            notes.push("all normals are the same: they may be no surface's".into());
+            notes.push("all normals are the same: they may not be normals of a surface".into());
         }
         notes
     }
@@ -261,13 +261,13 @@ fn header(lines: &[&str]) -> Result<(String, Vec<i64>)> {
     let (list, _) = list.ok_or_else(|| Error::failed("its `taxel2Repr` should be a list in parentheses"))?;
     let id = |word: &str| match word.parse::<i64>() {
         Ok(id) if id >= THERMAL => Ok(id),
-        _ => Err(failed!("`{word}` in taxel2Repr is no id; ids are -2, -1, or count from 0")),
+        _ => Err(failed!("`{word}` in taxel2Repr is not an id; ids are -2, -1, or count from 0")),
     };
     Ok((part.to_owned(), list.split_whitespace().map(id).collect::<Result<_>>()?))
 }
 
 fn row(line: &str) -> Result<[DVec3; 2]> {
-    let wrong = || failed!("`{line}` is no row; six numbers belong there, x y z nx ny nz");
+    let wrong = || failed!("`{line}` is not a row; write six numbers, x y z nx ny nz");
     let words: Vec<&str> = line.split_whitespace().collect();
     let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
     let Some(&[x, y, z, nx, ny, nz]) = numbers.as_deref() else { return Err(wrong()) };

@@ -73,7 +73,7 @@ fn place(rows: &[TaxelRow], path: &Path) -> Result<Authored> {
     let file = Original::from_bytes(&path.display().to_string(), &glb.to_bytes()?, None)?;
     let mut made = author(file, &Recipe::none(), |_| {})?;
     if links.len() > 1 {
-        made.notes.push("a table does not say how links stand to each other: they lie side by side".to_owned());
+        made.notes.push("a table has no poses of links: they lie side by side".to_owned());
     }
     Ok(Authored { places, ..made })
 }

@@ -33,14 +33,16 @@ impl Listen {
         let address = address.map(|text| {
             let found = text.to_socket_addrs().ok().and_then(|mut found| found.next());
             found.ok_or_else(|| {
-                Error::usage(format!("`{text}` is no address of this machine; give HOST:PORT, such as 127.0.0.1:7879"))
+                Error::usage(format!(
+                    "`{text}` is not an address of this machine; give HOST:PORT, such as 127.0.0.1:7879"
+                ))
             })
         });
         let listen = Self { address: address.transpose()?, allow_hosts: allow_hosts.to_vec() };
         if listen.is_open_to_others() && allow_hosts.is_empty() {
             return Err(Error::usage(
-                "other machines reach this address; say by which name they may, with --allow-host NAME, or tunnel to \
-                 127.0.0.1 through SSH",
+                "other machines reach this address; name the hosts that may, with --allow-host NAME, or tunnel to 127.0.0.1 \
+                 through SSH",
             ));
         }
         Ok(listen)
@@ -63,7 +65,7 @@ impl Listen {
     /// The port is taken, or may not be used.
     pub(super) fn bind(&self) -> Result<TcpListener> {
         let fail = |address: SocketAddr, e: &std::io::Error| {
-            let hint = if e.kind() == ErrorKind::AddrInUse { "; port 0 takes any free one" } else { "" };
+            let hint = if e.kind() == ErrorKind::AddrInUse { "; port 0 uses any free one" } else { "" };
             Error::failed(format!("cannot listen: {e}{hint}")).at(format!("page {address}"))
         };
         if let Some(address) = self.address {

@@ -48,8 +48,8 @@ Examples:
   ssh -L 7879:127.0.0.1:7879 robot                then open the address here, as a tunnel
   somatic run --source serial:/dev/ttyUSB0 --sink page      live boards
 
-The page is served to this machine alone. Whoever has the address that is printed, with its
-token, may look and play; nobody can change a file.";
+The page is served to this machine alone. Anyone with the printed address and its token may look and
+play; nobody can change a file.";
 
 /// Show a body, a recording or a scene in a browser.
 #[derive(Args)]

@@ -257,7 +257,7 @@ impl Reader<'_> {
             "sphere" => ShapeKind::Sphere { radius_m: self.number(own, "radius")? },
             other => {
                 return Err(
-                    self.at(own, format!("a <{other}> is no shape of a URDF; it has mesh, box, cylinder and sphere"))
+                    self.at(own, format!("a <{other}> is not a shape of a URDF; use mesh, box, cylinder or sphere"))
                 );
             }
         };

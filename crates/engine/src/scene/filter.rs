@@ -107,7 +107,7 @@ impl MotionFilter {
         }
         match self.over_s {
             Some(over) if !(over.is_finite() && over > 0.0) => {
-                Err(Error::usage(format!("motion over {over} s is none; give seconds over 0")))
+                Err(Error::usage(format!("motion over {over} s is undefined; give seconds over 0")))
             }
             _ => Ok(()),
         }

@@ -51,7 +51,7 @@ pub fn joint_states_of_bag(bag: &BagName) -> Result<JointStates> {
         }
     }
     let mut losses = reader.losses();
-    losses.extend(odd.map(|(count, first)| format!("{name}: positions that are no finite numbers: {count}, {first}")));
+    losses.extend(odd.map(|(count, first)| format!("{name}: positions that are not finite numbers: {count}, {first}")));
     states.sort(losses);
     if states.joint_names().is_empty() {
         return Err(

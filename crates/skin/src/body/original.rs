@@ -128,7 +128,7 @@ impl Original {
                 Ok([0x89, b'P', b'N', b'G', ..]) => "\"image/png\"",
                 Ok([0xFF, 0xD8, 0xFF, ..]) => "\"image/jpeg\"",
                 _ => {
-                    self.notes.push(format!("the image `{uri}` was not taken in; keep it beside the file"));
+                    self.notes.push(format!("the image `{uri}` was not included; keep it next to the file"));
                     continue;
                 }
             };

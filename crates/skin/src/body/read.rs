@@ -154,7 +154,7 @@ fn joints_of(
     for (index, joint) in skin.joints.iter().enumerate() {
         let link = nodes
             .link_above(joint.value())
-            .ok_or_else(|| Error::failed("a joint is no link; export the file again"))?;
+            .ok_or_else(|| Error::failed("a joint is not a link; export the file again"))?;
         let joint_from_mesh = match inverse_binds.get(index) {
             Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from))),
             None => DAffine3::IDENTITY,
@@ -388,7 +388,7 @@ fn complete_normals(body: &mut Body) -> Result<()> {
             ));
         }
         body.findings.push(format!(
-            "{} taxels on link `{}` have no normal of their own; taken from the surface",
+            "{} taxels on link `{}` have no normal of their own; the surface's are used",
             taxels.len(),
             body.links[link].name
         ));

@@ -205,7 +205,7 @@ impl BoardKeys {
             let end = channel + ids.len();
             let most = channels.unwrap_or(MAX_CHANNELS as usize);
             if end > most {
-                let what = format!("this goes on to channel {}, and the board has {most} channels", end - 1);
+                let what = format!("this reaches channel {}, and the board has {most} channels", end - 1);
                 return Err(text.wrong(keys.span(), what));
             }
             taxels.resize(taxels.len().max(end), None);

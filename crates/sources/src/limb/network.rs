@@ -34,7 +34,7 @@ impl Network {
         let place = config.map_or_else(|| "zenoh".to_owned(), |path| path.display().to_string());
         let configured = match config {
             Some(path) => Config::from_file(path)
-                .map_err(|e| failed!("no configuration of Zenoh: {}", without_places(&e)).at(&place))?,
+                .map_err(|e| failed!("not a configuration of Zenoh: {}", without_places(&e)).at(&place))?,
             None => loopback(side).map_err(|e| failed!("{e}").at(&place))?,
         };
         let session = zenoh::open(configured).wait().map_err(|e| {

@@ -158,7 +158,7 @@ fn no_header(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> Error 
         _ => "",
     };
     Error::usage(format!(
-        "row 1 is a frame of {} cells, and no header `t,<taxel id>,...`; {rate}add --grid {}, which reads {}",
+        "row 1 is a frame of {} cells, not a header `t,<taxel id>,...`; {rate}add --grid {}, which reads {}",
         first.len(),
         grid_of(sensors.max(1)),
         reads.join(" and ")
@@ -185,7 +185,7 @@ fn header_id(column: usize, cell: &[u8], way_out: impl FnOnce() -> String) -> Re
     let remedy = if cell.starts_with(b"\xFF\xFE") || cell.starts_with(b"\xFE\xFF") {
         "the file is UTF-16; save it as UTF-8".to_owned()
     } else if word.contains('"') {
-        "ids stand without quotes: remove the quote".to_owned()
+        "ids have no quotes: remove the quote".to_owned()
     } else if word.contains([';', '\t']) {
         "columns are separated by commas".to_owned()
     } else if word.contains('\r') {

@@ -29,7 +29,7 @@ fn parse(shader: &Shader) -> Module {
 /// (name, offset) of every member of the WGSL struct `name`, and its size.
 fn members(module: &Module, name: &str) -> (Vec<(String, u32)>, u32) {
     let (_, found) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).expect("the struct is there");
-    let TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is no struct") };
+    let TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is not a struct") };
     (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
 }
 
@@ -61,7 +61,7 @@ fn constant(module: &Module, name: &str) -> Option<u32> {
     let (_, found) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
     match module.global_expressions[found.init] {
         naga::Expression::Literal(naga::Literal::U32(value)) => Some(value),
-        _ => panic!("{name} is no u32"),
+        _ => panic!("{name} is not a u32"),
     }
 }
 

@@ -172,7 +172,7 @@ impl Lines {
                 parts.push(format!("{} of {sent} frames lost on the line", account.lost));
             }
             if account.dropped > 0 {
-                parts.push(format!("{} of {sent} frames came faster than they were taken", account.dropped));
+                parts.push(format!("{} of {sent} frames came faster than they were read", account.dropped));
             }
             (!parts.is_empty()).then(|| format!("{}: {}", account.name(), parts.join(", ")))
         };

@@ -380,7 +380,7 @@ impl LineState {
                 return false;
             }
             self.config.baud = found;
-            self.notify(&format!("the board sends at {found} baud; taken instead of {own}"));
+            self.notify(&format!("the board sends at {found} baud; used instead of {own}"));
         }
         if self.stage != Stage::Speaking {
             (self.stage, self.since) = (Stage::Speaking, now);

@@ -163,8 +163,8 @@ impl Form {
                 let guess = if self.is_time_guessed { ", as it seems" } else { "" };
                 let _ = write!(text, ", {} is time in {}{guess}", self.called(&time), unit.symbol());
             }
-            None if has_rate => text += ", time goes on as --rate says",
-            None => text += ", time is that of arrival",
+            None if has_rate => text += ", time advances by --rate",
+            None => text += ", time is the time of arrival",
         }
         for why in ["counts frames", "rises like a time of unknown unit", "is not a sensor"] {
             let which = self.which(|column| *column == Use::LeftOut(why));

@@ -213,7 +213,7 @@ impl Listening<'_> {
         }
         Err(match was {
             Some(baud) => failed!(
-                "bytes come at {baud} baud, but they are no text; does the board send at another speed (text:PORT@9600), or speak \
+                "bytes come at {baud} baud, but they are not text; does the board send at another speed (text:PORT@9600), or speak \
                  the protocol of --source serial:?"
             ),
             None => Error::failed("the input is not text; send lines of numbers, such as `512,300,7`"),
