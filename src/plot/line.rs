@@ -12,7 +12,7 @@ struct Stretch {
 }
 
 /// The stretches of `series`, one list for each part that is drawn without a break. An angle with a `period` that goes past its end
-/// comes back at the other one, which is no motion through all that is between: there the line breaks.
+/// comes back at the other one, which is not motion through all that is between: there the line breaks.
 fn stretches(series: &Series, period: Option<f64>, x: impl Fn(f64) -> i32) -> Vec<Vec<Stretch>> {
     let most_step = period.map_or(f64::INFINITY, |period| period / 2.0);
     let mut runs: Vec<Vec<Stretch>> = Vec::new();

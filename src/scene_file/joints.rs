@@ -8,7 +8,7 @@ impl SceneFile {
     /// Where the joints' states come from: what is named, or the bag that the frames come from; `None` if they are in the frames.
     ///
     /// # Errors
-    /// A usage error if what is named is no topic, or no bag.
+    /// A usage error if what is named is not a topic or a bag.
     pub fn states(&self) -> Result<Option<StatesSpec>> {
         if let Some(states) = &self.joint_states {
             return StatesSpec::named(states).map(Some);

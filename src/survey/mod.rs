@@ -2,7 +2,7 @@
 //!
 //! At rest a sensor has a **baseline**, the mean of its values without those that stray, and **noise**, the distance from it that one value in a
 //! thousand exceeds. While it is pressed it has a **travel**, the farthest that it goes to its pressed side; a value counts
-//! as far as it is the middle one of three in succession, so that a single wrong value is no press. Which side is the
+//! as far as it is the middle one of three in succession, so that a single wrong value is not a press. Which side is the
 //! pressed one is told by most of the sensors.
 //!
 //! A sensor has **moved** during the rest where it strays far, again by the middle ones of three values, and farther than
@@ -210,7 +210,7 @@ impl Survey {
         let count = |side: usize| (0..self.ids.len()).filter(|&sensor| goes(sensor, side)).count();
         let (falling, rising) = (count(0), count(1));
         let raw_range = wishes.bits.map(|bits| [0.0, (1_u32 << bits) as f64 - 1.0]);
-        // Where nothing was pressed, what was seen of the range is no measure.
+        // Where nothing was pressed, what was seen of the range is not a measure.
         let is_range_known = raw_range.is_some() || falling + rising > 0;
         let range = raw_range.map_or_else(|| self.seen_range(), |[low, high]| high - low);
         let moved = self.moved(&at_rest, range, is_range_known);

@@ -163,7 +163,7 @@ pub struct Sensor {
     settable: bool,
     /// Up to so many raw units a way may be noise.
     noise: f64,
-    /// Up to so many raw units a way is no press.
+    /// Up to so many raw units a way is not a press.
     clear: f64,
     seen: Pressed,
     tuned: Tuned,
@@ -457,7 +457,7 @@ mod tests {
         let wipers = tuning.next_round().unwrap();
         assert_eq!(wipers.len(), 2);
         tuning.not_set(1, 0);
-        // A light touch in the next round is no firm press.
+        // A light touch in the next round is not a firm press.
         (0..9).for_each(|n| tuning.press(&both(&tuning.clone(), if n < 5 { f64::INFINITY } else { 90_000.0 })));
         assert!(tuning.next_round().unwrap().is_empty());
         let ended: Vec<(Tuned, u8, bool)> =

@@ -4,7 +4,7 @@
 //! `[calibration]` and a row per channel, `x y z nx ny nz` in metres in the link's frame. Six zeros mean no taxel.
 //! `taxel2Repr` has per row the representative taxel of its group (a triangle of up to 12), −1 for no taxel, and −2 for a
 //! thermal pad. Irregular files are accepted with notes: another number of ids than rows, coincident taxels, ids without a
-//! place, places without an id, normals that are no unit vectors.
+//! place, places without an id, normals that are not unit vectors.
 
 use std::collections::BTreeMap;
 
@@ -77,7 +77,7 @@ pub struct IcubFile {
     pub rows: Vec<IcubRow>,
     /// Number of ids in `taxel2Repr`.
     pub ids: usize,
-    /// Notes for the user, a line each; every row that is no ordinary taxel is counted in one of them.
+    /// Notes for the user, a line each; every row that is not an ordinary taxel is counted in one of them.
     pub notes: Vec<String>,
 }
 
@@ -193,7 +193,7 @@ impl IcubFile {
         glb
     }
 
-    /// The notes: everything that is no ordinary taxel, with its channels.
+    /// The notes: everything that is not an ordinary taxel, with its channels.
     fn describe(&self) -> Vec<String> {
         let rows = self.rows.len();
         let that = |is: &dyn Fn(&IcubRow) -> bool| -> Vec<u32> {

@@ -20,7 +20,7 @@ const GAP_M: f64 = 0.05;
 /// how links stand to each other: they lie side by side.
 ///
 /// # Errors
-/// The file cannot be read, is no such table, or leaves out a normal; with the line.
+/// The file cannot be read, is not such a table, or leaves out a normal; with the line.
 pub fn author_csv_skin(path: &Path) -> Result<Authored> {
     let file = limits::open(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
     let rows = read_taxel_table(file, false).map_err(|e| e.at(path.display()))?;

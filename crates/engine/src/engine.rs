@@ -321,7 +321,7 @@ impl Engine {
     /// engine.process_one(&frame)?;
     /// let mut presses = Vec::new();
     /// engine.presses_on_links(&mut presses);
-    /// // Counts are no newtons: there is no wrench.
+    /// // Counts are not newtons: there is no wrench.
     /// assert!(presses[0].total == 5.0 && presses[0].wrench.is_none());
     /// # Ok(())
     /// # }

@@ -23,7 +23,7 @@ impl Listen {
     /// machine's own names and `allow_hosts`.
     ///
     /// # Errors
-    /// A usage error: the address is none, or other machines reach it and no host is allowed; a host is no name.
+    /// A usage error: the address is none, or other machines reach it and no host is allowed; a host is not a name.
     pub fn new(address: Option<&str>, allow_hosts: &[String]) -> Result<Self> {
         if let Some(name) = allow_hosts.iter().find(|name| !is_host_name(name)) {
             return Err(Error::usage(format!(

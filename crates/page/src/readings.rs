@@ -100,7 +100,7 @@ impl Readings {
                 self.health[taxel] = reading.health as u8;
             }
         }
-        // NaN is no maximum.
+        // NaN is not a maximum.
         f64::from(self.pressures.iter().copied().fold(0.0, f32::max))
     }
 

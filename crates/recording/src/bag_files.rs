@@ -32,7 +32,7 @@ pub(super) fn not_mcap(first: &[u8]) -> String {
 /// before it wrote these, of their numbers.
 ///
 /// # Errors
-/// It is not there, or is no bag in MCAP.
+/// It is not there, or is not a bag in MCAP.
 pub(super) fn bag_files(path: &Path) -> Result<Vec<PathBuf>> {
     if !fs::metadata(path).map_err(|e| Error::io(path, &e))?.is_dir() {
         return Ok(vec![path.to_owned()]);

@@ -169,7 +169,7 @@ pub struct LimitedFile {
     file: File,
     left: u64,
     most: u64,
-    /// In bytes, as the file system has it; 0 of what is no file.
+    /// In bytes, as the file system has it; 0 of what is not a file.
     length: u64,
     is_device: bool,
 }

@@ -145,7 +145,7 @@ impl Opening<'_> {
     /// Serves `scene` and says where.
     fn start(&self, scene: PageScene) -> Result<Opened> {
         let (server, publisher) = Server::start(&self.listen, scene)?;
-        // A closed standard error is no reason to stop.
+        // A closed standard error is not a reason to stop.
         somatic::plain::announce(&server.announcement());
         let handed_over = match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
             Ok(file) => file,

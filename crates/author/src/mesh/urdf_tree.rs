@@ -9,7 +9,7 @@ use crate::limits::MAX_NODE_DEPTH;
 /// The links, a parent before its children, each with the joint to its parent.
 ///
 /// # Errors
-/// Names are there twice or lead nowhere, or the links are no tree with one root, or a joint follows itself.
+/// Names are there twice or lead nowhere, or the links are not a tree with one root, or a joint follows itself.
 pub fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&RobotJoint>)>> {
     let mut index_of = HashMap::new();
     for (index, link) in robot.links.iter().enumerate() {

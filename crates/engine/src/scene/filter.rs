@@ -58,7 +58,7 @@ impl MotionFilter {
     /// may be `inf`.
     ///
     /// # Errors
-    /// `text` is no such window, or one that lets nothing pass.
+    /// `text` is not such a window, or one that lets nothing pass.
     pub fn with_window(self, text: &str) -> Result<Self> {
         let wrong = |what: &str| {
             Error::usage(format!(

@@ -96,7 +96,7 @@ fn a_trail_leads_through_every_frame_and_ends_with_its_touch() {
     let way = number(&touch["position"][0]) - places[0];
     assert!(way > 0.002 && way < 0.01, "{way}");
     assert!(trail.iter().all(|point| point["frame"] == 0));
-    // A jump back: what came later is no part of it. Frames on the way are passed through.
+    // A jump back: what came later is not part of it. Frames on the way are passed through.
     let (state, again) = (bench.engine.percepts().clone(), bench.frame(1.0, values(0.5)));
     bench.publisher.pass(&state);
     bench.publisher.jump();

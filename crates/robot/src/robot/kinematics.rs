@@ -55,7 +55,7 @@ impl Kinematics {
     /// Reads the URDF at `path`. Its meshes are not opened.
     ///
     /// # Errors
-    /// It is no URDF, or its joints are no tree; with the line.
+    /// It is not a URDF, or its joints are not a tree; with the line.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Self::of(&Robot::load_joints(path)?).map_err(|e| e.at(path.display()))

@@ -223,7 +223,7 @@ fn carry_all<T>(shared: &Shared<T>, mut carrier: impl Carrier<T>) -> Result<()> 
     carrier.end()
 }
 
-/// Tells people something. A closed standard error is no reason to stop.
+/// Tells people something. A closed standard error is not a reason to stop.
 pub(crate) fn tell(line: &str) {
     crate::plain::say(line);
 }

@@ -38,7 +38,7 @@ impl Original {
     /// Opens the `.glb` or `.gltf` at `path`.
     ///
     /// # Errors
-    /// The file cannot be read or is no valid glTF.
+    /// The file cannot be read or is not a valid glTF.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = limits::read(path, MAX_BODY_BYTES).map_err(|e| Error::io(path, &e))?;

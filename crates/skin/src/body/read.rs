@@ -24,7 +24,7 @@ use crate::limits::{self, MAX_BODY_BYTES, MAX_FIELD_DEPTH, MAX_TRIANGLES, MAX_VE
 pub(super) struct Sources {
     /// Per surface its node, and the primitive within the node's mesh.
     pub(super) surfaces: Vec<(usize, usize)>,
-    /// Points that are no taxels: the node's name, and positions in the body at rest, m.
+    /// Points that are not taxels: the node's name, and positions in the body at rest, m.
     pub(super) points: Vec<(String, Vec<DVec3>)>,
     /// Per taxel of the body, in its order.
     pub(super) taxels: Vec<TaxelSource>,
@@ -49,7 +49,7 @@ impl Body {
     /// Reads the body in the `.glb` or `.gltf` at `path`.
     ///
     /// # Errors
-    /// The file cannot be read, is no valid glTF, is compressed, or its layout is inconsistent; with the place.
+    /// The file cannot be read, is not a valid glTF, is compressed, or its layout is inconsistent; with the place.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = limits::read(path, MAX_BODY_BYTES).map_err(|e| Error::io(path, &e))?;

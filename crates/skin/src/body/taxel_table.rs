@@ -40,7 +40,7 @@ pub struct TaxelRow {
 /// `flat` one may leave out `z`. Ids are unique for each link if `flat`, else in all of the table.
 ///
 /// # Errors
-/// It is no such table; with the line.
+/// It is not such a table; with the line.
 pub fn read_taxel_table(reader: impl Read, flat: bool) -> Result<Vec<TaxelRow>> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(reader);
     let broken = |e: &csv::Error| {

@@ -209,7 +209,7 @@ mod tests {
         let turned = curve.scaled(-1.0).unwrap();
         assert_eq!(turned.knots(), [[-30.0, 8.0], [-10.0, 1.0], [0.0, 0.0]]);
         assert_eq!((curve.rise(4.0), turned.rise(-4.0)), (4.0, 4.0));
-        // As it is written, a gain is no single-precision number.
+        // As it is written, a gain is not a single-precision number.
         let tenth = curve.scaled(-0.1).unwrap();
         assert_eq!(tenth.written(), [[-30.0, 0.8], [-10.0, 0.1], [0.0, 0.0]]);
         assert_eq!(tenth.knots(), [[-30.0, 0.8], [-10.0, 0.1], [0.0, 0.0]]);

@@ -29,7 +29,7 @@ impl Network {
     /// Opens a session: as the file at `config` says, in Zenoh's own form, else on this computer alone.
     ///
     /// # Errors
-    /// The file is no configuration of Zenoh's; the session cannot be opened.
+    /// The file is not a configuration of Zenoh's; the session cannot be opened.
     pub fn open(config: Option<&Path>, side: Side) -> Result<Self> {
         let place = config.map_or_else(|| "zenoh".to_owned(), |path| path.display().to_string());
         let configured = match config {

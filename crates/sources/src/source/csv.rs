@@ -30,7 +30,7 @@ pub struct CsvSource {
     /// Rows that were looked at before their turn, with the numbers of their lines.
     ahead: VecDeque<(ByteRecord, u64)>,
     taxels: Vec<u32>,
-    /// Columns that are no sensor, from 0, ascending.
+    /// Columns that are not a sensor, from 0, ascending.
     left_out: Vec<usize>,
     time: Time,
     frames: u64,

@@ -503,7 +503,7 @@ mod tests {
         assert!(second("hello").contains("one line like"));
         // With its newline, a line that is cut short is an error.
         assert!(second("{\"t\":1,\"val").contains("line 2"));
-        // The same taxel on the next line is no duplicate.
+        // The same taxel on the next line is not a duplicate.
         assert_eq!(read("{\"t\":0,\"values\":{\"4\":1}}\n{\"t\":1,\"values\":{\"4\":1}}\n").unwrap().0.len(), 2);
     }
 

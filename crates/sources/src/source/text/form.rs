@@ -28,7 +28,7 @@ pub(super) enum End {
 }
 
 impl End {
-    /// Whether `line`, which is no row, is one.
+    /// Whether `line`, which is not a row, is one.
     pub(super) fn is(&self, line: &str) -> bool {
         match self {
             Self::Blank => line.is_empty(),
@@ -76,7 +76,7 @@ pub(super) enum Use {
     /// The sensor at this place in a row.
     Sensor(usize),
     Time,
-    /// Numbers that are no sensor; why not.
+    /// Numbers that are not a sensor; why not.
     LeftOut(&'static str),
     /// A word.
     Word,

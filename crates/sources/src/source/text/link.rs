@@ -195,7 +195,7 @@ impl Link {
             Open::Port(port) => port.read(&mut self.buffer),
             Open::Tcp(stream) => stream.read(&mut self.buffer),
             Open::Udp(socket) => match socket.recv(&mut self.buffer) {
-                // An empty datagram is no end.
+                // An empty datagram is not an end.
                 Ok(0) => return Came::Nothing,
                 other => other,
             },

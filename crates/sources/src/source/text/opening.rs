@@ -58,7 +58,7 @@ struct Listening<'a> {
 /// people should know while nothing is understood yet.
 ///
 /// # Errors
-/// What comes is no text, holds no numbers, or is not what the flags say.
+/// What comes is not text, holds no numbers, or is not what the flags say.
 pub(super) fn listen(
     link: &mut Link,
     place: &TextPlace,

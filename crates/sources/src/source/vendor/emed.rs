@@ -115,7 +115,7 @@ impl Emed {
     fn page(&mut self, word: &str, to: &mut Frame) -> Result<bool> {
         let number = word.split_whitespace().next().and_then(|number| number.parse().ok());
         let Some(number) = number else {
-            // The largest and the mean of all, which are no frames.
+            // The largest and the mean of all, which are not frames.
             let complete = self.finish(to)?;
             self.place = Place::Summary;
             return Ok(complete);
