@@ -316,7 +316,7 @@ fn glb_of(json: &Value, bin: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn what_is_no_gltf_is_told_so() {
+fn what_is_not_gltf_is_reported() {
     let why = |bytes: &[u8]| sound("x", &Body::from_bytes("x", bytes).unwrap_err().to_string());
     assert!(why(b"").contains("the file is empty"));
     assert!(why(b"t,0,1\n0,1,2\n").contains("not a glTF"));

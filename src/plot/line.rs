@@ -107,7 +107,7 @@ mod tests {
         let turning = series([170.0, 178.0, 3.0, 10.0].map(|turn| Some(degrees(turn))));
         let drawn = |period| points(&turning, period, |t| t as i32, |value| value.to_degrees().round() as i32);
         assert_eq!(drawn(Some(std::f64::consts::PI)), [vec![(0, 170), (1, 178)], vec![(2, 3), (3, 10)]]);
-        assert_eq!(drawn(None).len(), 1, "what is no angle goes through");
+        assert_eq!(drawn(None).len(), 1, "a value that is not an angle goes through");
         // At one dot across too, with nothing between its ends.
         let close = points(&turning, Some(std::f64::consts::PI), |_| 0, |value| value.to_degrees().round() as i32);
         assert_eq!(close, [vec![(0, 170), (0, 178)], vec![(0, 3), (0, 10)]]);

@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_tuned_is_told_from_what_fits() {
+    fn what_cannot_be_tuned_is_distinguished_from_what_fits() {
         let outcome = |real: Real, wiper| {
             let tuning = real.tune(wiper, [1.0; MAX_ROUNDS]);
             let (sensor, tuned, _) = tuning.outcomes().next().unwrap();
@@ -442,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_that_is_not_set_or_not_pressed_again_is_told() {
+    fn a_sensor_that_is_not_set_or_not_pressed_again_is_reported() {
         let mut tuning = Tuning::new(&[(4, 1023.0, 0), (5, 1023.0, 0)]);
         let sensor = paper();
         let both = |tuning: &Tuning, ohm| {

@@ -386,7 +386,7 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
 }
 
 #[test]
-fn a_bag_of_another_robot_whose_ids_fit_is_told() {
+fn a_bag_of_another_robot_whose_ids_fit_is_reported() {
     let (folder, gripper) = gripper();
     let arm = folder.path().join("arm.glb");
     done(&["author", "--urdf-skin", &example("arm.urdf"), "-o", text_of(&arm)]);

@@ -61,7 +61,7 @@ fn a_survey_becomes_a_calibration_under_which_rest_is_nothing_and_a_press_is_fel
 
 /// Twelve barometers that rest at 100000 and fall to 60000, and say 30000 where they have no reading.
 #[test]
-fn codes_that_are_no_reading_are_left_out_and_written_down() {
+fn codes_that_are_not_readings_are_left_out_and_written_down() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
     let ids: Vec<String> = (0..12).map(|id| id.to_string()).collect();

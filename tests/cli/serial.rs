@@ -215,7 +215,7 @@ fn a_run_says_what_became_of_a_board_that_starts_again() {
 }
 
 #[test]
-fn what_happens_again_and_again_is_told_once_and_counted() {
+fn what_happens_again_and_again_is_reported_once_and_counted() {
     let boards = Boards::start(&["--wait", "--for", "6s", "--faults", "reset/0.1s,unplug=0.3s@2s"]);
     let folder = tempfile::tempdir().unwrap();
     let summary = folder.path().join("s.json");
@@ -363,7 +363,7 @@ fn both(boards: &Boards) -> std::path::PathBuf {
 }
 
 #[test]
-fn another_device_and_nobody_are_told_apart() {
+fn another_device_and_nobody_are_distinguished() {
     let (mut device, end) = serialport::TTYPort::pair().unwrap();
     let name = serialport::SerialPort::name(&end).unwrap();
     drop(end);

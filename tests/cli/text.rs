@@ -231,7 +231,7 @@ fn flags_say_what_is_not_found_out() {
 }
 
 #[test]
-fn lines_that_are_no_frames_are_counted_by_kind_and_what_holds_none_is_an_error() {
+fn lines_that_are_not_frames_are_counted_by_kind_and_what_holds_none_is_an_error() {
     let mut input: String = (0..30).map(|row| format!("{},2,3\n", row % 5)).collect();
     input += "1,2\n1,2\nhello world\n1,2,3,4\n1,x,3\n1,2,nan\n1,,3\n5,2,3\n";
     let output = fed(&input, &[]);

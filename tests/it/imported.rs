@@ -257,7 +257,7 @@ fn links_of_a_robot_are_links_where_its_joints_put_them() {
 }
 
 #[test]
-fn what_a_robot_lacks_is_said_with_its_line() {
+fn what_a_robot_lacks_is_reported_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = robot(folder.path());
     assert!(why(&path, &options()).contains("line 4: `package://arm/meshes/box.stl` is in the package `arm`"));

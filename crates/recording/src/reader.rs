@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_of_an_older_recording_are_turned_and_that_is_said_once() {
+    fn poses_of_an_older_recording_are_turned_and_that_is_reported_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("old.mcap");
         let read = |world: Option<&str>| {

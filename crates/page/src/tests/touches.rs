@@ -48,7 +48,7 @@ fn a_touch_is_sent_with_its_values_taxels_and_shares() {
         assert_eq!(touch["frame"], touch["link"], "no frame has a pose");
         assert_eq!((&touch["total"], &touch["peak"]), (&expected.total.into(), &expected.peak.into()));
         assert_eq!((&touch["active"], &touch["flags"]), (&expected.active.into(), &expected.flags.bits().into()));
-        assert_eq!(touch["force"], Value::Null, "counts are no newtons");
+        assert_eq!(touch["force"], Value::Null, "counts are not newtons");
         for axis in 0..3 {
             assert_eq!(touch["position"][axis].as_f64(), Some(f64::from(expected.position[axis] as f32)));
             assert_eq!(touch["normal"][axis].as_f64(), Some(f64::from(expected.normal[axis] as f32)));

@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn what_is_wrong_is_reported_with_its_line() {
         let why = |from: &str, to: &str| {
             assert!(ARM.contains(from));
             Kinematics::from_urdf("r.urdf", &ARM.replace(from, to)).unwrap_err().to_string()

@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_letter_is_told_where_it_has_a_name() {
+    fn a_letter_is_reported_where_it_has_a_name() {
         let mut names = names();
         names[0].letter = Some("change".into());
         names[0].signal = Some("raw".into());

@@ -181,7 +181,7 @@ mod tests {
     use crate::signal::FsrSignal::{Linear, Raw};
 
     #[test]
-    fn a_table_that_makes_no_sense_is_told_apart() {
+    fn a_table_that_makes_no_sense_is_distinguished() {
         let why = |raw: &[f64], p: &[f64]| Curve::new(raw, p).unwrap_err().to_string();
         assert_eq!(
             why(&[0.0, 1.0, 2.0], &[0.0, 9.0, 8.0]),

@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn what_is_wrong_is_reported_with_its_line() {
         let why = |text: &str| crate::keys::without_column(&Wiring::from_text(text).unwrap_err().to_string());
         let board = |rest: &str| format!("[[board]]\nid = 1\n{rest}\n");
         let run = |run: &str| board(&format!("taxels = [{run}]"));

@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_packet_is_told() {
+    fn what_is_not_a_packet_is_reported() {
         let mut frame = Vec::new();
         frame_packet(&mut frame, 0, 0, 0.0, 1, &[RawValue::new(1.0)]);
         for cut in 0..frame.len() {

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_ndjson_is_told() {
+    fn what_is_not_ndjson_is_reported() {
         for line in [
             r#""t":0,"frame":0,"touches":3,"fields":[]}"#,
             r#""t":0,"frame":0,"touches":[3],"fields":[]}"#,

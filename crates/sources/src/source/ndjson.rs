@@ -534,7 +534,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_is_told_from_json() {
+    fn csv_is_distinguished_from_json() {
         for line in ["t,4,7", "0.5, 1,-2e3,", "\u{feff}t,4", "4,7\r"] {
             assert!(why(&format!("{line}\n0,1,2\n")).ends_with("use --source csv:-"), "{}", why(line));
         }

@@ -222,7 +222,7 @@ fn a_device_that_is_lost_is_an_error_in_one_line_and_stays_one() {
 }
 
 #[test]
-fn an_error_that_nobody_asked_for_is_told_by_the_next_call() {
+fn an_error_that_nobody_asked_for_is_reported_by_the_next_call() {
     let mut gpu = on_noop();
     // A copy beyond a buffer's end, which no call of the backend's own makes.
     let mut encoder = gpu.device.encoder();
