@@ -41,8 +41,8 @@ impl Listen {
         let listen = Self { address: address.transpose()?, allow_hosts: allow_hosts.to_vec() };
         if listen.is_open_to_others() && allow_hosts.is_empty() {
             return Err(Error::usage(
-                "other machines reach this address; name the hosts that may, with --allow-host NAME, or tunnel to 127.0.0.1 \
-                 through SSH",
+                "other machines reach this address; give the name that they use, with --allow-host NAME, or tunnel to \
+                 127.0.0.1 through SSH",
             ));
         }
         Ok(listen)
