@@ -72,7 +72,7 @@ impl Joint {
             "x" => DVec3::X,
             "y" => DVec3::Y,
             "z" => DVec3::Z,
-            other => return Err(Error::usage(format!("`{other}` is no axis; write x, y or z"))),
+            other => return Err(Error::usage(format!("`{other}` is not an axis; write x, y or z"))),
         };
         let mut is_moved = vec![false; body.links.len()];
         // A parent comes before its children.

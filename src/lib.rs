@@ -80,7 +80,7 @@ pub use somatic_skin::error;
 #[doc(hidden)]
 pub use somatic_skin::{limits, plain, renamed};
 // The same paths in this crate as if they were its own.
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_skin::{colours, keys, length, parallel, random};
 
 /// Authoring: taxels placed on a surface, fields of them, and what is wrong with a layout.
@@ -88,7 +88,7 @@ pub mod author {
     #[cfg(feature = "meshes")]
     #[doc(inline)]
     pub use somatic_author::mesh;
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_author::*;
     #[doc(inline)]
     pub use somatic_author::{
@@ -108,7 +108,7 @@ pub mod backend {
     #[cfg(feature = "gpu")]
     #[doc(inline)]
     pub use somatic_engine::backend::gpu;
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_engine::backend::*;
     #[doc(inline)]
     pub use somatic_engine::backend::{BackendKind, processor};
@@ -116,7 +116,7 @@ pub mod backend {
 
 /// How much each sensor says of what it feels, from recorded touches.
 pub mod gains {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_engine::gains::*;
     #[doc(hidden)]
     pub use somatic_engine::gains::{GainsEstimate, GainsSurvey};
@@ -124,7 +124,7 @@ pub mod gains {
 
 /// What a field reports for a frame, and a touch: quantities that are present or absent with a reason.
 pub mod percept {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_engine::percept::*;
     #[doc(inline)]
     pub use somatic_engine::percept::{
@@ -136,7 +136,7 @@ pub mod percept {
 
 /// What is asked for, and the plan that an engine makes of it.
 pub mod scene {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_engine::scene::*;
     #[doc(inline)]
     pub use somatic_engine::scene::{
@@ -157,7 +157,7 @@ pub mod scene {
 
 /// Touches of the whole body, found on its skin.
 pub mod touch {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_engine::touch::*;
     #[doc(hidden)]
     pub use somatic_engine::touch::{Input, Reading, Skin, SkinParts, SkinTaxel, Splits, Touches, Unrolled};
@@ -168,7 +168,7 @@ pub mod touch {
 /// Recordings in MCAP, and bags of ROS 2.
 #[cfg(feature = "mcap")]
 pub mod recording {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_recording::*;
     #[doc(hidden)]
     pub use somatic_recording::{
@@ -181,7 +181,7 @@ pub mod recording {
 
 /// Where frames come from.
 pub mod source {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_sources::source::*;
     #[doc(hidden)]
     pub use somatic_sources::source::{
@@ -214,7 +214,7 @@ pub mod wire {
     pub use somatic_sources::board;
     #[doc(inline)]
     pub use somatic_wire::encode;
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_wire::*;
     #[doc(inline)]
     pub use somatic_wire::{
@@ -228,7 +228,7 @@ pub mod wire {
 /// The page that shows a run in a browser, and its server.
 #[cfg(feature = "page")]
 pub mod page {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_page::*;
     #[doc(hidden)]
     pub use somatic_page::{
@@ -243,7 +243,7 @@ pub mod page {
 pub mod robot {
     #[doc(inline)]
     pub use somatic_robot::robot::messages;
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_robot::robot::*;
     #[cfg(feature = "mcap")]
     #[doc(inline)]
@@ -276,7 +276,7 @@ pub mod sink {
     #[cfg(feature = "zenoh")]
     #[doc(inline)]
     pub use somatic_sinks::sink::ZenohSink;
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_sinks::sink::*;
     #[cfg(feature = "arrow")]
     #[doc(inline)]
@@ -312,13 +312,13 @@ pub mod body {
         Body, ChartKind, ChartSpec, FieldSpec, Link, LinkJoint, MAX_TAXEL_ID, MemberSpec, Modality, Surface, Taxel, Up,
     };
     // For this crate alone.
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_skin::body::*;
 }
 
 /// Receptive fields on a body's surface: distances, charts, cells and neighbours of taxels.
 pub mod field {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_skin::field::*;
     #[doc(inline)]
     pub use somatic_skin::field::{Chart, Field, FieldSet, Member, NoChart, TaxelGraph, WORLD};
@@ -331,7 +331,7 @@ pub mod field {
 
 /// What sensors say: frames of raw values, calibrations, wirings and drift.
 pub mod signal {
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_skin::signal::*;
     #[doc(hidden)]
     pub use somatic_skin::signal::{
@@ -349,7 +349,7 @@ pub mod output {
     #[cfg(unix)]
     #[doc(hidden)]
     pub use somatic_skin::output::OutputLink;
-    #[allow(unused_imports, reason = "which of them are used hangs on features")]
+    #[allow(unused_imports, reason = "which of them are used depends on features")]
     pub(crate) use somatic_skin::output::*;
     #[doc(hidden)]
     pub use somatic_skin::output::{GrowingFile, OutputFolder, PrivateFile, abandon_outputs, refuse_standard_output};
@@ -368,7 +368,7 @@ pub use percept::{
 pub use scene::{Plan, Scene};
 pub use signal::{Calibration, Frame, FrameTime, Letter, Pose, RawValue, Receptor};
 pub use somatic_engine::{Agreement, ComparedColumn, Comparison, Engine, EngineState, Options, Verdict};
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_engine::{engine, stage};
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_sources::limb;

@@ -316,7 +316,7 @@ fn glb_of(json: &Value, bin: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn what_is_no_gltf_is_told_so() {
+fn what_is_not_gltf_is_reported() {
     let why = |bytes: &[u8]| sound("x", &Body::from_bytes("x", bytes).unwrap_err().to_string());
     assert!(why(b"").contains("the file is empty"));
     assert!(why(b"t,0,1\n0,1,2\n").contains("not a glTF"));
@@ -391,7 +391,7 @@ fn attributes_of_the_wrong_shape_are_refused() {
     };
     assert!(changed("_NX", vector).contains("_NX is not SCALAR FLOAT"));
     assert!(changed("_TAXEL_ID", vector).contains("_TAXEL_ID is not SCALAR FLOAT"));
-    assert!(changed("POSITION", 1).contains("1 numbers an element where 3 belong"));
+    assert!(changed("POSITION", 1).contains("1 numbers an element instead of 3"));
     let mut draft = Draft::default();
     let mesh = draft.taxels(&[[0.0; 3], [0.1; 3]], &[1.0]);
     draft.node(json!({"mesh": mesh}));
@@ -479,8 +479,8 @@ fn a_buffer_is_not_read_from_a_device_or_a_network() {
         std::fs::write(&path, json.to_string()).unwrap();
         load(&path).unwrap_err()
     };
-    assert!(why("/dev/zero").contains("no plain file"));
-    assert!(why(".").contains("no plain file"));
+    assert!(why("/dev/zero").contains("not a regular file"));
+    assert!(why(".").contains("not a regular file"));
     assert!(why("absent.bin").contains("absent.bin: no such file"));
     assert!(why("https://example.org/a.bin").contains("nothing is fetched"));
     assert!(why("data:application/octet-stream;base64,AAAA").contains("holds 3 of its 8 bytes"));

@@ -66,7 +66,7 @@ pub(crate) fn values<'py>(
     }
     let expected = || format!("values should be float32 of shape {names} = {}", shown(shape));
     let array =
-        as_array(any).map_err(|why| usage(py, format!("{}; this is no array: {}", expected(), one_line(&why))))?;
+        as_array(any).map_err(|why| usage(py, format!("{}; this is not an array: {}", expected(), one_line(&why))))?;
     let got: Vec<usize> = array.getattr("shape")?.extract()?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if got != shape {
@@ -118,7 +118,7 @@ fn one_line(error: &PyErr) -> String {
 pub(crate) fn times<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     let py = any.py();
     let wrong = |got: &str| usage(py, format!("t should be float64 of shape [frames], in seconds; {got}"));
-    let array = as_array(any).map_err(|why| wrong(&format!("this is no array: {}", one_line(&why))))?;
+    let array = as_array(any).map_err(|why| wrong(&format!("this is not an array: {}", one_line(&why))))?;
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if shape.len() != 1 || !["f", "i", "u"].contains(&kind.as_str()) {
@@ -133,15 +133,15 @@ pub(crate) fn poses(any: &Bound<'_, PyAny>, frames: usize) -> PyResult<Vec<(Stri
     let py = any.py();
     let wrong =
         |what: String| usage(py, format!("pose should be a dict of links to [x, y, z, qx, qy, qz, qw]; {what}"));
-    let dict = any.cast::<PyDict>().map_err(|_| wrong("this is no dict".to_owned()))?;
+    let dict = any.cast::<PyDict>().map_err(|_| wrong("this is not a dict".to_owned()))?;
     let mut poses = Vec::new();
     for (link, pose) in dict.iter() {
-        let link: String = link.extract().map_err(|_| wrong("a key is no text".to_owned()))?;
+        let link: String = link.extract().map_err(|_| wrong("a key is not text".to_owned()))?;
         let array = as_array(&pose)?;
         let shape: Vec<usize> = array.getattr("shape")?.extract()?;
         let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
         if (shape != [7] && shape != [frames, 7]) || !["f", "i", "u"].contains(&kind.as_str()) {
-            let expected = format!("that of `{link}` should have shape [7] or [{frames}, 7]");
+            let expected = format!("the pose of `{link}` should have shape [7] or [{frames}, 7]");
             return Err(wrong(format!(
                 "{expected}, and is {} of shape {}",
                 array.getattr("dtype")?.str()?,
@@ -157,7 +157,9 @@ pub(crate) fn poses(any: &Bound<'_, PyAny>, frames: usize) -> PyResult<Vec<(Stri
             let length = quaternion.length();
             // As on standard input: a direction is taken, noise is not.
             if !(DVec3::new(x, y, z).is_finite() && (1e-3..=1e3).contains(&length)) {
-                return Err(wrong(format!("that of `{link}` is not finite, or its quaternion has length {length:e}")));
+                return Err(wrong(format!(
+                    "the pose of `{link}` is not finite, or its quaternion has length {length:e}"
+                )));
             }
             made.push(Pose { translation: DVec3::new(x, y, z), rotation: quaternion.normalize() });
         }

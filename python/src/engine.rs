@@ -300,7 +300,7 @@ impl PyEngine {
         pose: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         if self.backend() == "reference" {
-            return Err(usage(py, "this would compare the reference with itself; take backend cpu or gpu"));
+            return Err(usage(py, "this would compare the reference with itself; use backend cpu or gpu"));
         }
         let t = times(t)?;
         let t_s = t.as_slice()?;

@@ -56,7 +56,7 @@ impl PyPercepts {
         Err(usage(
             py,
             match name {
-                "touches" | "self_contacts" => format!("{name} are no column; see `.{name}`"),
+                "touches" | "self_contacts" => format!("{name} are not a column; see `.{name}`"),
                 _ if COLUMNS.iter().any(|column| column.name == name) => {
                     format!("`{name}` was not asked for; add it to the scene's outputs")
                 }

@@ -175,7 +175,7 @@ pub(crate) fn metadata<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'p
     use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
     let file = std::fs::File::open(&path).map_err(|e| Error::io(&path, &e)).or_raise_of(py, &path)?;
     let read = ParquetRecordBatchReaderBuilder::try_new(file);
-    let read = read.map_err(|why| Error::failed(format!("this is no whole Parquet: {why}")).at(path.display()));
+    let read = read.map_err(|why| Error::failed(format!("this is not a whole Parquet file: {why}")).at(path.display()));
     let told = PyDict::new(py);
     let schema = Arc::clone(read.or_raise_of(py, &path)?.schema());
     for (key, value) in schema.metadata() {

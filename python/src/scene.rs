@@ -47,7 +47,7 @@ fn toml_of(any: &Bound<'_, PyAny>, key: &str) -> PyResult<toml::Value> {
         let kind = any.get_type().name()?.to_string();
         return Err(usage(
             any.py(),
-            format!("{key}: a {kind} is no value of a scene; give a number, a text or a list"),
+            format!("{key}: a {kind} is not a value of a scene; give a number, a text or a list"),
         ));
     })
 }

@@ -125,7 +125,7 @@ impl PyTouches {
                 None => match new_name(name, TOUCH_COLUMNS.iter().map(|column| column.name)) {
                     Some(new) => return Err(usage(py, format!("`{name}` is `{new}` now"))),
                     None => format!(
-                        "is none; there are: {}",
+                        "does not exist; there are: {}",
                         outputs.columns().map(|column| column.name).collect::<Vec<_>>().join(", ")
                     ),
                 },

@@ -148,7 +148,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     }
     say(&format!("{} in {place}", count(frames, "frame")));
     if is_csv && posed > 0 {
-        say(&format!("a CSV has no place for poses: those of {} are left out", count(posed, "frame")));
+        say(&format!("a CSV has no place for poses: the poses of {} are left out", count(posed, "frame")));
     }
     if is_csv && source.has_stale() {
         say("a CSV cannot mark stale values: they are missing there");

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_told_in_short_words() {
+    fn errors_are_reported_in_short_words() {
         let touch = |place_m: f64, axis_rad: Option<f64>| Some(TouchError { place_m, axis_rad, force: -0.25 });
         let layout = errors(vec![touch(5.23e-4, None), touch(0.0125, Some(0.05)), None]);
         let [line, ideal] = lines(&[layout, errors(vec![None])]);

@@ -30,10 +30,10 @@ Examples:
   somatic plot --body mat before.csv after.csv -o compared.png     side by side, with one scale
   somatic plot touch.mcap --fields 'hand/palm*' -o palm.svg
 
-Above, quantities over time: load and area, or those of --outputs. Below, for each field with a
+Above, quantities over time: load and area, or the --outputs. Below, for each field with a
 chart, the highest pressure that each taxel felt, with the path of the centre of pressure from its
 first contact (ring) to its last (dot), and the pressure–time integral. All recordings have the
-same scales. Without --fields, it shows the topmost fields, or those below a single one.";
+same scales. Without --fields, it shows the topmost fields, or the fields below a single one.";
 
 /// Most recordings of a plot.
 const MAX_RECORDINGS: usize = 8;

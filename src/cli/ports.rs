@@ -32,7 +32,7 @@ pub(super) struct LineFlags {
 }
 
 impl LineFlags {
-    /// The lines that `sources` name, each with its speed in baud where one is given; none where they are no serial lines.
+    /// The lines that `sources` name, each with its speed in baud where one is given; none where they are not serial lines.
     pub(super) fn lines(&self, sources: &[String]) -> Result<Vec<(String, Option<u32>)>> {
         let sources = sources.iter().map(|text| text.parse()).collect::<Result<Vec<SourceSpec>>>()?;
         self.keys().lines(&sources).map_err(in_flags)

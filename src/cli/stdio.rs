@@ -15,7 +15,7 @@ pub(super) const FAILED: u8 = 1;
 /// Exit code: done, but some input was never processed.
 pub(super) const LOST: u8 = 3;
 
-/// Prints `line` on standard error. A closed standard error is no reason to stop.
+/// Prints `line` on standard error. A closed standard error is not a reason to stop.
 pub(crate) fn say(line: &str) {
     let line = if console::colors_enabled_stderr() { plain::coloured_line(line) } else { plain::line(line) };
     let _ = writeln!(io::stderr(), "somatic: {line}");

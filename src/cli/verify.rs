@@ -12,7 +12,7 @@ pub(super) fn has_another_to_compare(engine: &Engine, chosen: Option<&str>) -> R
     }
     if chosen.is_none() {
         return Err(Error::usage(
-            "--verify would compare the reference with itself; take backend cpu or gpu in single precision, or leave \
+            "--verify would compare the reference with itself; use backend cpu or gpu in single precision, or leave \
              --verify out",
         ));
     }

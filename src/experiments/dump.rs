@@ -61,7 +61,9 @@ pub fn write(
 /// Whether `outputs` can be written.
 pub fn check(outputs: Outputs) -> Result<()> {
     if outputs.contains(Outputs::SELF_CONTACTS) {
-        return Err(Error::usage("--dump writes arrays, and self_contacts are none; leave them out of --outputs"));
+        return Err(Error::usage(
+            "--dump writes arrays, and self_contacts are not arrays; leave them out of --outputs",
+        ));
     }
     Ok(())
 }

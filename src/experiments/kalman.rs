@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_lags_as_it_is_told_to_and_finds_a_steady_velocity() {
+    fn it_lags_as_asked_and_finds_a_steady_velocity() {
         for lag_s in [0.05, 0.1, 0.2] {
             assert!((Kalman::with_lag(lag_s, 0.02).lag_s() - lag_s).abs() < 1e-6);
         }

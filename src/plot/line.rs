@@ -12,7 +12,7 @@ struct Stretch {
 }
 
 /// The stretches of `series`, one list for each part that is drawn without a break. An angle with a `period` that goes past its end
-/// comes back at the other one, which is no motion through all that is between: there the line breaks.
+/// comes back at the other one, which is not motion through all that is between: there the line breaks.
 fn stretches(series: &Series, period: Option<f64>, x: impl Fn(f64) -> i32) -> Vec<Vec<Stretch>> {
     let most_step = period.map_or(f64::INFINITY, |period| period / 2.0);
     let mut runs: Vec<Vec<Stretch>> = Vec::new();
@@ -107,7 +107,7 @@ mod tests {
         let turning = series([170.0, 178.0, 3.0, 10.0].map(|turn| Some(degrees(turn))));
         let drawn = |period| points(&turning, period, |t| t as i32, |value| value.to_degrees().round() as i32);
         assert_eq!(drawn(Some(std::f64::consts::PI)), [vec![(0, 170), (1, 178)], vec![(2, 3), (3, 10)]]);
-        assert_eq!(drawn(None).len(), 1, "what is no angle goes through");
+        assert_eq!(drawn(None).len(), 1, "a value that is not an angle goes through");
         // At one dot across too, with nothing between its ends.
         let close = points(&turning, Some(std::f64::consts::PI), |_| 0, |value| value.to_degrees().round() as i32);
         assert_eq!(close, [vec![(0, 170), (0, 178)], vec![(0, 3), (0, 10)]]);

@@ -18,7 +18,7 @@ pub enum Arrival {
     End(Ending),
     /// It cannot go on.
     Failed(Error),
-    /// Something came that is no frame: percepts of a limb.
+    /// Something came that is not a frame: percepts of a limb.
     Woken,
 }
 

@@ -64,7 +64,7 @@ impl SceneFile {
     /// `is_placed`.
     ///
     /// # Errors
-    /// A usage error: the filter of motion is no filter.
+    /// A usage error: the filter of motion is not a filter.
     pub fn engine_options(&self, calibration: Option<Calibration>, is_placed: bool, batch: usize) -> Result<Options> {
         let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();

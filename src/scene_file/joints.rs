@@ -8,7 +8,7 @@ impl SceneFile {
     /// Where the joints' states come from: what is named, or the bag that the frames come from; `None` if they are in the frames.
     ///
     /// # Errors
-    /// A usage error if what is named is no topic, or no bag.
+    /// A usage error if what is named is not a topic or a bag.
     pub fn states(&self) -> Result<Option<StatesSpec>> {
         if let Some(states) = &self.joint_states {
             return StatesSpec::named(states).map(Some);
@@ -40,7 +40,7 @@ impl SceneFile {
         if states.is_none() && !self.sources.iter().any(carries_joints) {
             return Err(Error::usage(
                 "frames of this source carry no joint states; give a recording of them: `joint_states = \"FILE\"`, a CSV under \
-                 t,<joint>,..., NDJSON or a bag of ROS 2",
+                 t,<joint>,..., NDJSON or a ROS 2 bag",
             ));
         }
         if states.is_some() && self.repeat.is_some() {

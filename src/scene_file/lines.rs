@@ -30,7 +30,7 @@ impl SceneFile {
 }
 
 impl LineKeys {
-    /// The lines that `sources` name, each with its speed in baud where one is given; none where they are no serial lines.
+    /// The lines that `sources` name, each with its speed in baud where one is given; none where they are not serial lines.
     ///
     /// # Errors
     /// A usage error: sources of these kinds are not read together, or something is said of lines and there are none.
@@ -65,7 +65,7 @@ impl LineKeys {
     /// Which taxel is on which channel of which board, where a file says it.
     ///
     /// # Errors
-    /// There is no such file, or it is no wiring.
+    /// There is no such file, or it is not a wiring.
     pub fn wiring(&self) -> Result<Option<Wiring>> {
         self.wiring.as_ref().map(Wiring::load).transpose()
     }

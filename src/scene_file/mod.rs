@@ -322,7 +322,7 @@ impl SceneFile {
     /// [`SceneFile::check`], as more may be laid over it before.
     ///
     /// # Errors
-    /// It cannot be read; a usage error with line and column if it is no scene.
+    /// It cannot be read; a usage error with line and column if it is not a scene.
     pub fn load(path: &Path) -> Result<Self> {
         let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         let scene = Self::parse(&text).map_err(|e| e.at(path.display()))?;
@@ -332,7 +332,7 @@ impl SceneFile {
     /// What the scene file `text` asks for, its paths as they are written.
     ///
     /// # Errors
-    /// A usage error with line and column if it is no scene.
+    /// A usage error with line and column if it is not a scene.
     pub fn parse(text: &str) -> Result<Self> {
         let scene: Self = parse_toml(text).map_err(Error::into_usage)?;
         scene.check_accuracy().map_err(|(key, e)| Accuracy::placed(text, key, e))?;

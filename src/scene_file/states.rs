@@ -20,9 +20,9 @@ impl StatesSpec {
     /// What `states` names.
     ///
     /// # Errors
-    /// A usage error if it is no topic, or no bag.
+    /// A usage error if it is not a topic or a bag.
     pub fn named(states: &Path) -> Result<Self> {
-        // A path that is no text has no such beginning.
+        // A path that is not text has no such beginning.
         let text = states.to_str().unwrap_or_default();
         if let Some(topic) = text.strip_prefix("ros2:") {
             if !topic.starts_with('/') {

@@ -22,7 +22,7 @@ pub fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
 pub fn load_body(name: &str) -> Result<Body> {
     check_body_name(name)?;
     match bundled::body(name) {
-        // A link of this name to a serial port is no body.
+        // A link of this name to a serial port is not a body.
         Some(bytes) if !Path::new(name).is_file() => Body::from_bytes(name, bytes),
         _ => Body::load(name),
     }

@@ -62,10 +62,8 @@ impl Setup {
         };
         if let (Some(calibration), [source @ SourceSpec::Sim(_)]) = (&calibration, &self.sources[..]) {
             calibration.check_body(&body.name).map_err(|_| {
-                let what = format!(
-                    "it is on another body than `{}`; leave `body` out, or change that of the simulation",
-                    body.name
-                );
+                let what =
+                    format!("it is on another body than `{}`; leave `body` out, or change the simulation's", body.name);
                 Error::usage(what).at(source)
             })?;
         }

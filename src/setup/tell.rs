@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_told_once_is_told_once() {
+    fn what_is_reported_once_is_not_reported_again() {
         let heard = Arc::new(Mutex::new(Vec::new()));
         let to = Arc::clone(&heard);
         let tell = Tell::new(move |text| to.lock().unwrap().push(text.to_owned()));

@@ -10,7 +10,7 @@ const EXCEEDING_SHARE: f64 = 1e-3;
 pub(super) fn rest_of(kept: &[f32], unit: f64) -> Option<(f64, f64)> {
     /// The standard deviation of normal values over their median deviation.
     const SIGMAS: f64 = 1.482_6;
-    /// More values than this on one side alone are no strays.
+    /// More values than this on one side alone are not strays.
     const CUT_SHARE: f64 = 0.05;
     /// Of whole numbers, means are given with two decimals: what is left of noise after a minute of frames.
     const DECIMALS: f64 = 100.0;

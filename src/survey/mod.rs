@@ -2,7 +2,7 @@
 //!
 //! At rest a sensor has a **baseline**, the mean of its values without those that stray, and **noise**, the distance from it that one value in a
 //! thousand exceeds. While it is pressed it has a **travel**, the farthest that it goes to its pressed side; a value counts
-//! as far as it is the middle one of three in succession, so that a single wrong value is no press. Which side is the
+//! as far as it is the middle one of three in succession, so that a single wrong value is not a press. Which side is the
 //! pressed one is told by most of the sensors.
 //!
 //! A sensor has **moved** during the rest where it strays far, again by the middle ones of three values, and farther than
@@ -210,7 +210,7 @@ impl Survey {
         let count = |side: usize| (0..self.ids.len()).filter(|&sensor| goes(sensor, side)).count();
         let (falling, rising) = (count(0), count(1));
         let raw_range = wishes.bits.map(|bits| [0.0, (1_u32 << bits) as f64 - 1.0]);
-        // Where nothing was pressed, what was seen of the range is no measure.
+        // Where nothing was pressed, what was seen of the range is not a measure.
         let is_range_known = raw_range.is_some() || falling + rising > 0;
         let range = raw_range.map_or_else(|| self.seen_range(), |[low, high]| high - low);
         let moved = self.moved(&at_rest, range, is_range_known);
@@ -223,7 +223,7 @@ impl Survey {
         if let Some([low, high]) = raw_range.filter(|[low, high]| lowest < *low || highest > *high) {
             return Err(Error::usage(format!(
                 "raw values go from {lowest} to {highest}, and a converter of {} bits gives {low} to {high}; correct --bits, \
-                 or leave it out; --missing names raw values that are no reading",
+                 or leave it out; --missing names raw values that are not readings",
                 wishes.bits.unwrap_or_default()
             )));
         }
@@ -347,13 +347,13 @@ impl Findings {
         };
         let kinds: [(&str, Vec<u32>); 6] = [
             ("delivered nothing at rest, and are masked", ids(&|found| found.baseline.is_none())),
-            ("stand at the end of their range untouched, and are masked", ids(&at_its_end)),
+            ("are at the end of their range untouched, and are masked", ids(&at_its_end)),
             (
                 "were not pressed, and so have no travel",
                 ids(&|f| f.baseline.is_some() && f.travel.is_none() && !self.is_lost(f)),
             ),
             (
-                "go to the other side than the rest of them, and are masked (were they pressed during the rest?)",
+                "move the other way than the rest of them, and are masked (were they pressed during the rest?)",
                 ids(&|found| found.went_other_way && !found.moved && !at_its_end(found)),
             ),
             ("moved at rest, and are masked", ids(&|found| found.moved && !at_its_end(found))),
@@ -502,7 +502,7 @@ mod tests {
     fn one_sensor_that_was_pressed_during_the_rest_does_not_turn_the_others() {
         let found = twelve(12).finish(Wishes::default()).unwrap();
         assert!(!found.invert && found.sensors[0].went_other_way);
-        let masked = "1 of 12 sensors go to the other side than the rest of them, and are masked (were they pressed during the rest?): 0";
+        let masked = "1 of 12 sensors move the other way than the rest of them, and are masked (were they pressed during the rest?): 0";
         assert_eq!(found.remarks(), [masked]);
         assert!(found.calibration("a").contains("[taxel.0]\nmask = true"));
         // Nothing else was pressed: it says nothing of the others.

@@ -140,7 +140,7 @@ impl Tuned {
                 "even the highest wiper position uses less than half of the range; press harder, or is it the right sensor?"
             }
             Self::CutOff => "even the lowest wiper position lets a firm press reach the end of the range",
-            Self::Unsettled => "still off after the last round; is its circuit another?",
+            Self::Unsettled => "still off after the last round; is its circuit different?",
             Self::NotSet => "its board does not set it",
         })
     }
@@ -163,7 +163,7 @@ pub struct Sensor {
     settable: bool,
     /// Up to so many raw units a way may be noise.
     noise: f64,
-    /// Up to so many raw units a way is no press.
+    /// Up to so many raw units a way is not a press.
     clear: f64,
     seen: Pressed,
     tuned: Tuned,
@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_tuned_is_told_from_what_fits() {
+    fn what_cannot_be_tuned_is_distinguished_from_what_fits() {
         let outcome = |real: Real, wiper| {
             let tuning = real.tune(wiper, [1.0; MAX_ROUNDS]);
             let (sensor, tuned, _) = tuning.outcomes().next().unwrap();
@@ -442,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_that_is_not_set_or_not_pressed_again_is_told() {
+    fn a_sensor_that_is_not_set_or_not_pressed_again_is_reported() {
         let mut tuning = Tuning::new(&[(4, 1023.0, 0), (5, 1023.0, 0)]);
         let sensor = paper();
         let both = |tuning: &Tuning, ohm| {
@@ -457,7 +457,7 @@ mod tests {
         let wipers = tuning.next_round().unwrap();
         assert_eq!(wipers.len(), 2);
         tuning.not_set(1, 0);
-        // A light touch in the next round is no firm press.
+        // A light touch in the next round is not a firm press.
         (0..9).for_each(|n| tuning.press(&both(&tuning.clone(), if n < 5 { f64::INFINITY } else { 90_000.0 })));
         assert!(tuning.next_round().unwrap().is_empty());
         let ended: Vec<(Tuned, u8, bool)> =

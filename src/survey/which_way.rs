@@ -4,7 +4,7 @@ use somatic::error::{Error, Result};
 
 use super::{AtRest, Survey, several};
 
-/// Where fewer than one in so many sensors fall, and stay there, that is no press.
+/// Where fewer than one in so many sensors fall, and stay there, that is not a press.
 const FEW: usize = 4;
 
 impl Survey {

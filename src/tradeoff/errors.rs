@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_is_the_same_on_the_skin_whatever_chart_it_is_told_in() {
+    fn a_place_is_the_same_on_the_skin_whatever_chart_it_is_reported_in() {
         let body = Body::from_bytes("humanoid", bundled::HUMANOID).unwrap();
         let geometries = [Charts::Plane, Charts::Geodesic].map(|charts| {
             let charted = charts.applied(&body, FieldSet::new(&body).unwrap(), &[]).unwrap();

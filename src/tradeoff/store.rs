@@ -228,7 +228,7 @@ mod tests {
         let mut moved = body.clone();
         moved.taxels[0].position_in_link.x += 1e-3;
         assert!(why(find(&moved, &options, "a")).contains("the body before it changed"));
-        // Another scene has another file; knobs are no part of it.
+        // Another scene has another file; knobs are not part of it.
         let other = |scene: Scene| options.clone().scene(scene);
         let total = other(Scene::default().outputs(Outputs::TOTAL));
         assert!(matches!(find(&body, &total, "a"), Found::Nothing));

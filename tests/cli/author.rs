@@ -123,7 +123,7 @@ fn a_sheet_needs_no_mesh() {
 }
 
 #[test]
-fn what_no_sheet_can_be_is_said_in_a_line() {
+fn what_no_sheet_can_be_is_reported_in_a_line() {
     let (folder, mask) = file("mask.csv", "1,1\n1,oops\n");
     let path = folder.path().join("sole.glb");
     let why = |more: &[&str]| fails(2, &[&["author", "-o", text_of(&path)], more].concat());

@@ -387,7 +387,7 @@ fn bags_that_are_not_read_say_what_to_do_and_cut_ones_give_what_is_whole() {
     let hint = "and MCAP is read here; convert it: rosbags-convert --src";
     for (name, first, kind) in [
         ("skin.db3", &b"SQLite format 3\0"[..], "its storage is sqlite3"),
-        ("skin.bag", b"#ROSBAG V2.0\n", "it is a bag of ROS 1"),
+        ("skin.bag", b"#ROSBAG V2.0\n", "it is a ROS 1 bag"),
     ] {
         std::fs::write(at(name), first).unwrap();
         let path = at(name);
@@ -444,7 +444,7 @@ fn bags_that_are_not_read_say_what_to_do_and_cut_ones_give_what_is_whole() {
     position[0] = f64::NAN;
     write_mcap(&at("odd.mcap"), &odd, "cdr");
     let why = fails(3, &with(&run(text_of(&at("odd.mcap"))), &[]));
-    assert!(why.contains("positions that are no finite numbers: 1, the first of joint `elbow` at "), "{why}");
+    assert!(why.contains("positions that are not finite numbers: 1, the first of joint `elbow` at "), "{why}");
 }
 
 #[test]

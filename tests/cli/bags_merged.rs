@@ -376,7 +376,7 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
     let both = folder.path().join("both");
     let sink = format!("ros2-mcap:{}", text_of(&both));
     let (found, told) = run(&["--joint-states", text_of(&states), "--sink", &sink]);
-    let line = format!("at 0.5 s: frames carry joint states of their own; those of {} are used", text_of(&states));
+    let line = format!("at 0.5 s: frames carry joint states of their own; states of {} replace them", text_of(&states));
     assert!(told.matches(&line).count() == 1, "{told}");
     let (carried, told) = run(&[]);
     assert!(found != carried && !told.contains("frames carry"), "{told}");
@@ -386,7 +386,7 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
 }
 
 #[test]
-fn a_bag_of_another_robot_whose_ids_fit_is_told() {
+fn a_bag_of_another_robot_whose_ids_fit_is_reported() {
     let (folder, gripper) = gripper();
     let arm = folder.path().join("arm.glb");
     done(&["author", "--urdf-skin", &example("arm.urdf"), "-o", text_of(&arm)]);

@@ -48,7 +48,7 @@ fn a_limb_goes_on_behind_a_network_that_blocks_and_both_sides_count_what_is_left
     wait_for("the head", || {
         thread::sleep(PERIOD);
         send();
-        limb.told.has("somebody reads it") && head.running.out.has("peak")
+        limb.told.has("it has a subscriber") && head.running.out.has("peak")
     });
     relay.set(Link::Blocked);
     // 9 MB: more than systems keep for a connection.

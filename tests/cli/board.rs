@@ -234,7 +234,7 @@ fn the_books_of_sixteen_bad_lines_balance() {
 }
 
 #[test]
-fn what_makes_no_sense_is_said_in_a_line() {
+fn what_makes_no_sense_is_reported_in_a_line() {
     assert!(fails(2, &["board", "--faults", "nois=1"]).contains("did you mean `noise`"));
     assert!(fails(2, &["board", "--bits", "9"]).contains("8, 10, 12 or 16"));
     assert!(fails(2, &["board", "--for", "2 parsecs"]).contains("is not a time"));

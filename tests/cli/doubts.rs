@@ -31,7 +31,7 @@ fn recording(ids: &[u64], rows: u64, value: impl Fn(u64, u64) -> f64) -> String 
 }
 
 #[test]
-fn a_source_for_another_body_is_said_once() {
+fn a_source_for_another_body_is_reported_once() {
     let about = "touch.csv has 40 of the 2048 taxels of mat; ";
     let text = said(&["--body", "mat", "--source", TOUCH]);
     assert!(text.matches(about).count() == 1 && text.contains("lack over half of theirs, such as mat"), "{text}");
@@ -87,7 +87,7 @@ fn only_the_fields_that_are_asked_for_count() {
 }
 
 #[test]
-fn a_driver_for_another_body_is_said_after_a_second() {
+fn a_driver_for_another_body_is_reported_after_a_second() {
     let lines = |until: u32| -> String {
         (0..=until).map(|n| format!("{{\"t\":{},\"values\":{{\"4\":{n}}}}}\n", f64::from(n) * 0.5)).collect()
     };
@@ -103,7 +103,7 @@ fn a_driver_for_another_body_is_said_after_a_second() {
 }
 
 #[test]
-fn sensors_that_rest_pressed_are_said_once() {
+fn sensors_that_rest_pressed_are_reported_once() {
     let hand = taxels_of("hand");
     let falling = |id: u64, row: u64| if row == 10 && id < 9 { 200.0 } else { 1023.0 - (id % 7) as f64 };
     let about = "wholly pressed from the start on; do readings fall when pressed";

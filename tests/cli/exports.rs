@@ -72,7 +72,7 @@ fn a_converted_export_has_its_sensors_and_its_unit() {
 }
 
 #[test]
-fn what_is_known_of_an_export_is_said() {
+fn what_is_known_of_an_export_is_reported() {
     let known: Value = serde_json::from_str(&done(&["info", INSOLES, "--json"])).unwrap();
     assert_eq!((&known["kind"], &known["unit"], &known["frames"]), (&"XSENSOR".into(), &"mmHg".into(), &60.into()));
     assert_eq!((&known["panels"][1]["name"], &known["panels"][1]["taxels"]), (&"right".into(), &341.into()));
@@ -117,7 +117,7 @@ fn a_calibration_is_laid_over_that_of_an_export() {
 }
 
 #[test]
-fn what_was_understood_of_a_plain_table_is_said_in_a_line() {
+fn what_was_understood_of_a_plain_table_is_reported_in_a_line() {
     let rows = "millis,a,b,c,d\n1000,512,300,10,7\n1050,500,310,12,6\n1100,500,310,12,6\n";
     let (_folder, path) = file("millis.csv", rows);
     let grid = ["--grid", "2x2", "--pitch", "5mm"];

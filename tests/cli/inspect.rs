@@ -71,7 +71,7 @@ fn a_report_names_links_fields_and_why_a_chart_is_missing() {
 }
 
 #[test]
-fn findings_are_told_and_count_only_where_that_is_asked_for() {
+fn findings_are_reported_and_count_only_where_that_is_asked_for() {
     let (_folder, path) = file("bare.gltf", BARE);
     let text = done(&["inspect", text_of(&path)]);
     assert!(text.contains("no taxels") && text.contains("no fields"), "{text}");
@@ -95,7 +95,7 @@ fn a_file_goes_before_a_bundled_body_of_its_name() {
 }
 
 #[test]
-fn what_was_put_right_on_reading_is_said_by_inspect_and_by_run() {
+fn what_was_put_right_on_reading_is_reported_by_inspect_and_by_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("twice.glb");
     let taxel = |id: u32, x: f64| Taxel {

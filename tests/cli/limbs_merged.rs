@@ -96,7 +96,7 @@ fn percepts_of_limbs_pass_by_the_engine_as_they_are() {
 }
 
 #[test]
-fn a_limb_of_another_body_and_one_with_another_s_taxels_are_told() {
+fn a_limb_of_another_body_and_one_with_another_s_taxels_are_reported() {
     let (place, port) = (Place::new(), free_port());
     let head_config = place.config("head.json5", Some(port), None);
     let limb_config = place.config("limb.json5", None, Some(port));

@@ -108,7 +108,7 @@ fn q_ends_a_table_as_ctrl_c_does_and_both_leave_the_terminal_as_it_was() {
 }
 
 #[test]
-fn what_is_typed_where_frames_are_read_is_no_key() {
+fn what_is_typed_where_frames_are_read_is_not_a_key() {
     let Some((text, code)) = seen(&format!("{BINARY} run --backend cpu --source -"), "q\n") else { return };
     assert!(code == Some(1) && text.contains("line 1"), "{text}");
 }

@@ -169,7 +169,7 @@ fn what_xml_cannot_hold_is_written_so_that_people_can_read_it() {
 
 /// A flag, an output, a table or a way under the name that it had before.
 #[test]
-fn whoever_gives_an_old_name_is_told_the_new_one_in_one_line() {
+fn an_old_name_is_reported_with_the_new_one_in_one_line() {
     let told = |code: i32, arguments: &[&str], new: &str| {
         let said = fails(code, arguments);
         assert!(said.trim_end().ends_with(new) && said.lines().count() == 1, "{arguments:?}: {said}");

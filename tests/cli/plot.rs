@@ -77,7 +77,7 @@ fn fields_and_times_are_chosen() {
 }
 
 #[test]
-fn what_cannot_be_plotted_is_said_in_a_line() {
+fn what_cannot_be_plotted_is_reported_in_a_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| text_of(&folder.path().join(name)).to_owned();
     let svg = at("a.svg");

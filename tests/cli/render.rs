@@ -159,7 +159,7 @@ fn a_part_of_a_body_fills_a_picture_with_ids() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_told_in_a_line_and_leaves_nothing() {
+fn what_cannot_be_drawn_is_reported_in_a_line_and_leaves_nothing() {
     let (folder, path) = file("there.png", "not a picture");
     let why = |code: i32, arguments: &[&str]| {
         let why = fails(code, &[&["render", "hand", "-o"], arguments].concat());

@@ -125,7 +125,7 @@ fn frames_without_a_pose_are_counted_where_a_run_is_stopped_too() {
 }
 
 #[test]
-fn a_source_without_a_frame_is_told() {
+fn a_source_without_a_frame_is_reported() {
     let (_folder, path) = file("touch.csv", "t,4\n");
     let output = super::output(&["run", "--body", "hand", "--source", text_of(&path), "--sink", "-"]);
     assert!(stderr(&output).contains("the source has ended without a frame"), "{}", stderr(&output));
@@ -421,13 +421,13 @@ fn what_does_not_go_together_is_refused_in_one_line() {
     assert!(lacking.contains("states.csv: no state has joint `elbow`, which moves `fore_arm`"), "{lacking}");
     let jointed = ["--joints", URDF, "--joint-states", STATES, "--up", "z"];
     let other = fails(1, &[&["run", "--body", "hand", "--source", TOUCH][..], &jointed].concat());
-    assert!(other.contains("none of its links is called as one of body `hand`"), "{other}");
+    assert!(other.contains("none of its links has the name of a link of body `hand`"), "{other}");
     let looped = ["--joints", URDF, "--up", "z", "--joint-states", STATES, "--loop=2"];
     assert!(run(2, &looped).contains("--loop lets the time"));
 }
 
 #[test]
-fn states_that_cannot_be_meant_are_told_of() {
+fn states_that_cannot_be_meant_are_reported() {
     let (folder, body) = arm();
     let touch = folder.path().join("touch.csv");
     let rows: String = (0..100).map(|frame| format!("{},5\n", f64::from(frame) * 0.01)).collect();

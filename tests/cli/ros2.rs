@@ -288,7 +288,7 @@ fn a_bag_is_read_whole_and_our_percepts_come_back_from_it() {
 }
 
 #[test]
-fn what_a_bag_will_not_hold_is_said_once() {
+fn what_a_bag_will_not_hold_is_reported_once() {
     let (folder, flags) = arm_run();
     let body = flags[2].as_str();
     let said = |name: &str, more: &[&str]| {

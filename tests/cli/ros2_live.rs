@@ -246,7 +246,7 @@ fn frames_from_a_topic_are_those_from_standard_input() {
 }
 
 #[test]
-fn a_topic_that_does_not_fit_or_is_not_there_is_told_with_counts() {
+fn a_topic_that_does_not_fit_or_is_not_there_is_reported_with_counts() {
     let Some(python) = python() else { return };
     let refused = |domain: &str, source: &str, send: Option<(&str, &str, Value)>| {
         let peer = send
@@ -474,7 +474,7 @@ fn a_thousand_taxels_at_250_hz_arrive() {
 }
 
 #[test]
-fn another_node_is_told_how_a_board_is_doing_until_it_falls_silent() {
+fn another_node_hears_how_a_board_is_doing_until_it_falls_silent() {
     let Some(python) = python() else { return };
     let domain = domain();
     let mut peer =

@@ -271,7 +271,7 @@ fn what_is_not_there_is_named_in_one_line() {
 }
 
 #[test]
-fn ids_that_the_body_does_not_have_are_told_with_the_file() {
+fn ids_that_the_body_does_not_have_are_reported_with_the_file() {
     let (_folder, path) = file("touch.csv", "t,4,77\n0,1,2\n");
     let error = fails(1, &["run", "--backend", "cpu", "--source", text_of(&path)]);
     let start = format!("somatic: error: {}: header: taxel id 77 is not in the body", path.display());
@@ -466,7 +466,7 @@ fn a_bad_live_frame_names_its_line_and_keeps_what_was_answered() {
 }
 
 #[test]
-fn letters_and_signals_are_told_where_there_are_several() {
+fn letters_and_signals_are_reported_where_there_are_several() {
     let (_folder, path) = file("touch.csv", "t,4\n0,0\n0.1,5\n0.2,5\n0.3,0\n");
     let run = ["run", "--quiet", "--backend", "cpu", "--source", text_of(&path), "--fields", "hand/palm"];
     let seen = |more: &[&str]| -> Vec<Vec<String>> {

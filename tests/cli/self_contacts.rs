@@ -239,7 +239,7 @@ fn a_table_of_contacts_has_what_ndjson_has() {
 }
 
 #[test]
-fn links_that_are_near_at_rest_are_told() {
+fn links_that_are_near_at_rest_are_reported() {
     let (folder, urdf) = file("plates.urdf", &URDF.replace("xyz=\"0 0 0.05\"", "xyz=\"0 0 0.015\""));
     let body = folder.path().join("near.glb");
     done(&["author", "--urdf-skin", text_of(&urdf), "-o", text_of(&body)]);

@@ -187,7 +187,7 @@ fn a_taker_that_is_slow_loses_the_oldest_and_learns_how_many() {
     // In 3 s come 150 frames, of which 64 wait.
     assert!((50..150).contains(&account.dropped) && account.lost == 0, "{account:?}");
     assert!(seen.whole + account.dropped >= account.delivered && seen.frames > 100);
-    assert!(lines.losses()[0].contains("came faster than they were taken"), "{:?}", lines.losses());
+    assert!(lines.losses()[0].contains("came faster than they were read"), "{:?}", lines.losses());
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn a_run_says_what_became_of_a_board_that_starts_again() {
 }
 
 #[test]
-fn what_happens_again_and_again_is_told_once_and_counted() {
+fn what_happens_again_and_again_is_reported_once_and_counted() {
     let boards = Boards::start(&["--wait", "--for", "6s", "--faults", "reset/0.1s,unplug=0.3s@2s"]);
     let folder = tempfile::tempdir().unwrap();
     let summary = folder.path().join("s.json");
@@ -323,7 +323,7 @@ fn what_is_wrong_with_a_line_is_named() {
     let (line, code) = named(&[&format!("serial:{port}@57600")], &[]);
     assert!(line.contains("sends at 115200 baud, not 57600; write serial:") && code == Some(1), "{line}");
     let (line, code) = named(&[&format!("serial:{port}")], &[]);
-    assert!(line.contains("sends at 115200 baud; taken instead of 57600") && code == Some(0), "{line}");
+    assert!(line.contains("sends at 115200 baud; used instead of 57600") && code == Some(0), "{line}");
 
     let other = Boards::start(&["--board", "7", "--for", "30s"]);
     let (line, code) = named(&[&format!("serial:{}", other.ports[0])], &[]);
@@ -363,7 +363,7 @@ fn both(boards: &Boards) -> std::path::PathBuf {
 }
 
 #[test]
-fn another_device_and_nobody_are_told_apart() {
+fn another_device_and_nobody_are_distinguished() {
     let (mut device, end) = serialport::TTYPort::pair().unwrap();
     let name = serialport::SerialPort::name(&end).unwrap();
     drop(end);

@@ -89,7 +89,7 @@ fn a_table_puts_the_taxels_back_on_their_mesh() {
 }
 
 #[test]
-fn what_cannot_be_converted_is_said() {
+fn what_cannot_be_converted_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
     assert!(fails(2, &["convert", "hand", "-o", &at("hand.mcap")]).contains("becomes a .csv or a .urdf"));

@@ -121,7 +121,7 @@ fn a_board_that_prints_numbers_is_read_with_one_line() {
             .unwrap();
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(3), "{said}");
-    assert!(said.contains("columns 1–3 are a row of 3 sensors, time is that of arrival"), "{said}");
+    assert!(said.contains("columns 1–3 are a row of 3 sensors, time is the time of arrival"), "{said}");
     assert!(said.contains("1 line skipped, too few values: `512,30`"), "{said}");
     assert!(said.contains("a body is made: a row of 3 sensors, 10 mm apart"), "{said}");
     let totals = totals(&output);
@@ -202,7 +202,11 @@ fn flags_say_what_is_not_found_out() {
     let output = fed(&frame.repeat(6), &["--grid", "4x4", "--frame-end", "=="]);
     assert_eq!((totals(&output).len(), output.status.code()), (6, Some(0)), "{}", stderr(&output));
     let output = fed(&rows, &["--time", "arrival", "--columns", "1-4", "--grid", "2x2"]);
-    assert!(stderr(&output).contains("columns 1–4 are a 2 × 2 grid, time is that of arrival"), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("columns 1–4 are a 2 × 2 grid, time is the time of arrival"),
+        "{}",
+        stderr(&output)
+    );
     let output = fed(&rows, &["--time", "arrival", "--rate", "50"]);
     assert_eq!(totals(&output)[2].0, 0.04);
     for (flags, code, why) in [
@@ -210,7 +214,7 @@ fn flags_say_what_is_not_found_out() {
         (&["--columns", "no"], 2, "no column `no`"),
         (&["--grid", "5x5"], 1, "--grid 5x5 needs lines of 5 or 25 values, and most have 3"),
         (&["--ids", "1,2"], 2, "--ids names 2 taxels, and a frame has 3 sensors"),
-        (&["--ids", "x"], 2, "are no taxels"),
+        (&["--ids", "x"], 2, "is not a list of taxels"),
         (&["--time", "9"], 2, "there is no column `9`"),
         (&["--frame-end", "zzz"], 1, "no line ends a frame"),
         (&["--unit", "kPa"], 2, "--unit is for recordings"),
@@ -227,7 +231,7 @@ fn flags_say_what_is_not_found_out() {
 }
 
 #[test]
-fn lines_that_are_no_frames_are_counted_by_kind_and_what_holds_none_is_an_error() {
+fn lines_that_are_not_frames_are_counted_by_kind_and_what_holds_none_is_an_error() {
     let mut input: String = (0..30).map(|row| format!("{},2,3\n", row % 5)).collect();
     input += "1,2\n1,2\nhello world\n1,2,3,4\n1,x,3\n1,2,nan\n1,,3\n5,2,3\n";
     let output = fed(&input, &[]);
@@ -307,7 +311,7 @@ fn connections_and_datagrams_are_read_and_a_connection_is_made_again() {
     assert!(out.contains("\"total\":3") && out.contains("\"total\":7"), "{out}");
     let taken = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let said = super::fails(1, &["run", "--source", &format!("text:tcp://{taken}")]);
-    assert!(said.contains("nobody answers there"), "{said}");
+    assert!(said.contains("nothing answers there"), "{said}");
 }
 
 /// A run that prints the totals of what `source` sends, with `more` flags.
@@ -355,7 +359,7 @@ fn text_where_packets_belong_is_named() {
     assert!(said.contains("there is no such port"), "{said}");
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
     let said = super::fails(1, &["run", "--source", &format!("text:{}", file.display())]);
-    assert!(said.contains("this is a file, and no port"), "{said}");
+    assert!(said.contains("this is a file, not a port"), "{said}");
 }
 
 /// From the last byte of a line to the percept, of a board with 64 values at 1 kHz: figures of `docs/evidence/performance.md`.

@@ -132,7 +132,7 @@ fn a_ball_drawn_down_a_forearm_is_one_touch_with_place_speed_and_links() {
 }
 
 #[test]
-fn what_cannot_be_asked_of_touches_is_said() {
+fn what_cannot_be_asked_of_touches_is_reported() {
     assert!(fails(2, &["run", "--outputs", "touches.wrenches"]).contains("touches.wrench"));
     let scene = |text: &str| {
         let (_folder, path) = file("scene.toml", text);

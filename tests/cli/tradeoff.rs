@@ -101,7 +101,7 @@ fn a_body_alone_is_measured_on_touches_that_are_simulated_on_it() {
 }
 
 #[test]
-fn what_nothing_reaches_is_said_with_by_how_much() {
+fn what_nothing_reaches_is_reported_with_by_how_much() {
     let folder = tempfile::tempdir().unwrap();
     let rest = ["tradeoff", "--source", ROD, "--fields", "hand/back", "--backend", "cpu", "--within", "0.1 um"];
     let output = with_cache(folder.path(), &[&rest[..], &BRIEF].concat());

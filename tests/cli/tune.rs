@@ -235,7 +235,7 @@ fn boards_that_set_no_wipers_are_named_and_the_others_are_tuned() {
 }
 
 #[test]
-fn what_makes_no_sense_is_said_before_anything_is_set() {
+fn what_makes_no_sense_is_reported_before_anything_is_set() {
     let refused = |arguments: &[&str]| super::fails(2, &[&["tune"], arguments].concat());
     assert!(refused(&["--source", "a.csv", "--press", "3"]).contains("give --source serial:PORT"));
     assert!(refused(&["--source", "serial:a"]).contains("is not a terminal; give --press"));

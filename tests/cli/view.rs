@@ -216,7 +216,7 @@ fn what_cannot_be_shown_is_one_line() {
 }
 
 #[test]
-fn joints_move_the_links_of_a_view_and_self_contacts_are_told() {
+fn joints_move_the_links_of_a_view_and_self_contacts_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let body = folder.path().join("gripper.glb").display().to_string();
     let example = |name: &str| format!("{}/examples/robots/{name}", env!("CARGO_MANIFEST_DIR"));

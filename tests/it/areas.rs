@@ -176,7 +176,7 @@ fn an_area_that_the_table_gives_is_kept() {
 }
 
 #[test]
-fn a_taxel_alone_has_no_area_and_that_is_said() {
+fn a_taxel_alone_has_no_area_and_that_is_reported() {
     let mut mesh = MeshData::default();
     sheet(&mut mesh, 0.0);
     let (body, notes) = placed(&file(&mesh), &table([DVec3::ZERO])).unwrap();

@@ -481,7 +481,7 @@ fn places_that_are_given_are_taken_to_the_surface() {
     );
     assert!(refused("id,x,y,z\n1,1.05,0.02,0\n1,1.06,0.02,0\n").contains("id 1 is on line 2 already"));
     assert!(refused("id,x,y\n1,1.05,0.02\n").contains("no column `z`"));
-    assert!(refused("id,x,y,z\n1,1.05,zero,0\n").contains("`zero` is no coordinate"));
+    assert!(refused("id,x,y,z\n1,1.05,zero,0\n").contains("`zero` is not a coordinate"));
     assert!(refused("id,x,y,z,link\n1,1.05,0,0,shet\n").contains("did you mean `sheet`?"));
     assert!(refused("id,x,y,z\n1,1.05,0\n").contains("line 2"));
     assert!(refused("id,x,y,z\n").contains("no rows"));

@@ -226,7 +226,7 @@ fn the_chart_of_a_taxel_moved_in_blender_is_laid_again() {
 }
 
 #[test]
-fn taxels_deleted_and_duplicated_in_blender_are_told() {
+fn taxels_deleted_and_duplicated_in_blender_are_reported() {
     for python in blenders() {
         for file in ["hand.glb", "humanoid.glb"] {
             let before = Body::load(bundled(file)).unwrap();

@@ -147,7 +147,7 @@ fn touches_of_a_simulation_have_its_force() {
 }
 
 #[test]
-fn what_is_wrong_with_a_touch_of_the_body_is_said_in_one_line() {
+fn what_is_wrong_with_a_touch_of_the_body_is_reported_in_one_line() {
     const SOUND: &str = "body = \"hand\"\nrate_hz = 1\nduration_s = 1\n[layer]\nthickness_m = 0.002\n[[touch]]\non = \"body\"\n\
                          indenter = \"rod\"\nradius_m = 0.004\nlength_m = 0.02\npath = [{ taxel = 4 }]\nhold = { newton = 1 }\n";
     let open = |text: &str| SimulatedSource::from_text("a.toml", text, Path::new(""));

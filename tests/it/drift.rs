@@ -234,7 +234,7 @@ fn no_touch_is_lost_to_drift_and_none_is_left_behind() {
 }
 
 #[test]
-fn a_drift_that_nobody_can_tell_is_said_to_be_unknown_and_ends_with_the_touch() {
+fn a_drift_that_nobody_can_tell_is_reported_as_unknown_and_ends_with_the_touch() {
     let presses: Vec<Press> = (0..24).map(|taxel| Press { taxel, from_s: 20.0, to_s: 200.0, counts: 400.0 }).collect();
     let felt = run_boards(DRIFTING, &drifting(220.0, 8.0, &presses));
     // 3 minutes of drift are 24 counts.
@@ -342,7 +342,7 @@ fn wrong_shares(calibration: &str, touches: bool, drift: impl Fn(usize, f64) -> 
 }
 
 #[test]
-fn drift_under_one_field_is_told_by_taxels_away_from_the_touch() {
+fn drift_under_one_field_is_estimated_by_taxels_away_from_the_touch() {
     // A warm-up of 40 counts, and a room that warms by 15 counts in 10 minutes and cools again.
     let own = |taxel: usize| 1.0 + 0.05 * ((taxel * 7 % 11) as f64 / 5.0 - 1.0);
     let warm_up = |taxel: usize, t: f64| 40.0 * own(taxel) * (1.0 - (-t / 150.0).exp());

@@ -109,7 +109,7 @@ fn what_nothing_can_touch_gets_no_taxel_and_is_named() {
 }
 
 #[test]
-fn faces_that_look_inward_are_told_and_get_taxels_all_the_same() {
+fn faces_that_look_inward_are_reported_and_get_taxels_all_the_same() {
     let mut mesh = block(cube(0.1), 3, false);
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     let authored = made(&body(&[("box", mesh)]), "[[place]]\ntaxels = 50");

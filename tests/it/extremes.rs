@@ -88,7 +88,7 @@ fn near(a: Option<f64>, b: f64, within: f64) -> bool {
 }
 
 #[test]
-fn no_pressure_is_no_contact() {
+fn without_pressure_there_is_no_contact() {
     for values in [[0.0; 4], [-0.0; 4], [-5.0; 4]] {
         for p in percepts(&field(&SQUARE), &values) {
             assert_eq!((p.contact, p.flags), (false, Flags::NO_CONTACT));
@@ -167,7 +167,7 @@ fn collinear_taxels_have_their_line() {
 }
 
 #[test]
-fn vertical_is_no_special_case() {
+fn vertical_is_not_a_special_case() {
     for p in percepts(&field(&[[0.25, -0.5], [0.25, 0.5]]), &[2.0, 2.0]) {
         assert!(near(p.orientation, FRAC_PI_2, 1e-6) && near(p.principal_axis, FRAC_PI_2, 1e-6), "{p:?}");
     }
@@ -223,7 +223,7 @@ fn what_is_not_finite_is_left_out_and_told() {
 }
 
 #[test]
-fn what_is_too_small_counts_as_nothing_and_is_told() {
+fn what_is_too_small_counts_as_nothing_and_is_reported() {
     for tiny in [1e-300, 1e-45, 1e-40, 1e-38, 8.6e-19, -1e-20] {
         for p in percepts(&field(&SQUARE), &[2.0, tiny, 0.0, 2.0]) {
             assert_eq!((p.total, p.active, p.flags), (Some(4.0), Some(2), Flags::FAULTY_INPUT), "{tiny}");
@@ -271,7 +271,7 @@ fn a_missing_value_is_left_out_and_told() {
 }
 
 #[test]
-fn a_raw_value_that_is_no_reading_is_missing() {
+fn a_raw_value_that_is_not_a_reading_is_missing() {
     let body = field(&SQUARE);
     let calibration = Calibration::parse("[all]\nbaseline = 1\nmissing = [30000]", &[0, 1, 2, 3]).unwrap();
     for (way, code, is_missing) in ways().into_iter().flat_map(|way| [(way, 30_000.0, true), (way, 30_001.0, false)]) {

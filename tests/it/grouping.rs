@@ -298,7 +298,7 @@ fn a_parent_is_named_without_a_longer_name() {
     assert_eq!(complete(&sheet, &grouping).fields[0].members.len(), sheet.taxels.len());
     let again = "[[fields]]\nname = \"arm/fore\"\nparent = \"body\"\n[[fields]]\nname = \"arm/aft\"\nparent = \"bode\"";
     assert!(why(&sheet, again).contains("field rule 2: `parent`: `arm` is below `body`"), "{}", why(&sheet, again));
-    assert!(why(&sheet, "[[fields]]\nname = \"a/b\"\nparent = \"a\"").contains("cannot stand below itself"));
+    assert!(why(&sheet, "[[fields]]\nname = \"a/b\"\nparent = \"a\"").contains("cannot be below itself"));
     assert!(why(&sheet, "[[fields]]\nname = \"a\"\nparent = \"\"").contains("a level of it is empty"));
     let within = "[[fields]]\nname = \"a\"\n[[fields]]\nwithin = \"a\"\nparent = \"b\"\npatches = 2";
     assert!(why(&sheet, within).contains("`parent` has no effect"));

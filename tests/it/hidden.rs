@@ -275,7 +275,7 @@ fn a_mesh_that_is_bent_at_rest_is_seen_where_its_weights_put_it() {
 }
 
 #[test]
-fn faces_that_point_inwards_are_told_apart() {
+fn faces_that_point_inwards_are_distinguished() {
     let taxels = on_cube(0, DVec3::ZERO, 0.1).into_iter();
     let taxels = taxels.map(|taxel| Taxel { normal_in_link: -taxel.normal_in_link, ..taxel }).collect();
     let all: Vec<u32> = (0..6).collect();

@@ -257,7 +257,7 @@ fn links_of_a_robot_are_links_where_its_joints_put_them() {
 }
 
 #[test]
-fn what_a_robot_lacks_is_said_with_its_line() {
+fn what_a_robot_lacks_is_reported_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = robot(folder.path());
     assert!(why(&path, &options()).contains("line 4: `package://arm/meshes/box.stl` is in the package `arm`"));
@@ -272,7 +272,7 @@ fn what_a_robot_lacks_is_said_with_its_line() {
         ("<parent link=\"hand\"/>", "<parent link=\"hnad\"/>", "line 12: there is no link `hnad`"),
         ("<child link=\"tool\"/>", "<child link=\"hand\"/>", "child of two joints"),
         ("<box size=\"0.2 0.4 1\"/>", "<box size=\"0.2 0.4\"/>", "line 8: `size` is `0.2 0.4`"),
-        ("<box size=\"0.2 0.4 1\"/>", "<torus/>", "line 8: a <torus> is no shape"),
+        ("<box size=\"0.2 0.4 1\"/>", "<torus/>", "line 8: a <torus> is not a shape"),
         ("</robot>", "", "not valid XML"),
         ("robot", "model", "not <robot>"),
         ("name=\"base\"", "name=\"tool\"", "two links are called `tool`"),

@@ -274,7 +274,7 @@ fn taxels_and_fields_are_no_links() {
 }
 
 #[test]
-fn fields_without_taxels_are_told_of() {
+fn fields_without_taxels_are_reported() {
     let mut draft = Draft::default();
     draft.field(r#"{"version":1,"name":"palm","members":{"5":[1]}}"#);
     let body = draft.load().unwrap();

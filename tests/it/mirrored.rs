@@ -102,7 +102,7 @@ fn both_sides_get_the_same_taxels_in_pairs_of_ids_and_fields() {
 }
 
 #[test]
-fn ids_begin_where_they_are_told_and_rules_make_pairs_too() {
+fn ids_begin_where_they_are_set_and_rules_make_pairs_too() {
     let text = "mirror = \"y\"\n[[place]]\ntaxels = 200\nfirst_id = 1000\n\
                 [[fields]]\nname = \"left/arm\"\nlink = \"left_arm\"\npatches = { of = 9 }\nwrap = \"split\"\n\
                 [[fields]]\nname = \"right/arm\"\nlink = \"right_arm\"\npatches = { of = 9 }\nwrap = \"split\"\n\

@@ -156,7 +156,7 @@ fn a_touch_moves_with_its_link_and_its_wrench_stays_in_the_link() {
 }
 
 #[test]
-fn what_is_missing_masked_or_out_of_range_is_said_of_the_touches_it_is_in_or_beside() {
+fn what_is_missing_masked_or_out_of_range_is_reported_for_the_touches_it_is_in_or_next_to() {
     let body = hand();
     let frame = frames(&body, 1).remove(0);
     let mut plain = engine(&body, scene(), None, BackendKind::Cpu);

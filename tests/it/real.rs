@@ -183,7 +183,7 @@ fn thirty_grasps_of_five_fingertips() {
 }
 
 #[test]
-fn grasps_are_told_apart_by_how_much_the_total_rises() {
+fn grasps_are_distinguished_by_how_much_the_total_rises() {
     let (Some(folder), Some(layout)) = (data("recordings/icub_grasp"), data("layouts/ftx2_taxels.csv")) else { return };
     let body = fingertips(&std::fs::read_to_string(layout).unwrap());
     let ids: Vec<u32> = (0..60).collect();

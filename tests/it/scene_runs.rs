@@ -56,7 +56,7 @@ fn a_run_that_is_ended_early_leaves_no_part_of_a_recording() {
 }
 
 #[test]
-fn what_a_scene_finds_out_is_told_once_and_in_keys() {
+fn what_a_scene_finds_out_is_reported_once_and_in_keys() {
     let folder = tempfile::tempdir().unwrap();
     let export = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/exports/insoles.csv");
     std::fs::write(folder.path().join("cal.toml"), "[all]\ndead_band = 2\n").unwrap();

@@ -515,7 +515,7 @@ fn without_column(message: &str) -> String {
 }
 
 #[test]
-fn what_is_wrong_is_said_in_one_line() {
+fn what_is_wrong_is_reported_in_one_line() {
     assert!(SimulatedSource::from_text("a.toml", SOUND, Path::new("")).is_ok());
     let why = |from: &str, to: &str| {
         assert!(SOUND.contains(from), "{from}");

@@ -218,7 +218,7 @@ def test_scenes(tmp_path) -> None:
         ({"max_gap_s": -1}, "max_gap_s = -1"),
         ({"source": "a.csv"}, "for the command"),
         ({"accuracy": {"centroid": "1 mm"}}, "tradeoff"),
-        ({"outputs": object()}, "no value of a scene"),
+        ({"outputs": object()}, "not a value of a scene"),
         ({"batch": 0}, "batch"),
     ]:
         with pytest.raises(st.UsageError, match=why):

@@ -59,8 +59,8 @@ def test_other_masks_are_refused_with_the_shape(mask: object) -> None:
 @pytest.mark.parametrize(
     ("pose", "why"),
     [
-        ([1], "no dict"),
-        ({1: [0] * 7}, "no text"),
+        ([1], "not a dict"),
+        ({1: [0] * 7}, "not text"),
         ({"hand": [0, 0, 0, 0, 0, 1]}, r"shape \[7\] or \[2, 7\]"),
         ({"hand": [[0, 0, 0, 0, 0, 0, 1]] * 3}, r"shape \[7\] or \[2, 7\]"),
         ({"hand": [0, 0, 0, 0, 0, 0, 0]}, "length 0"),

@@ -120,7 +120,7 @@ def test_other_machines_need_a_name(hand: st.Body) -> None:
     engine = st.Engine(hand, backend="cpu")
     with pytest.raises(st.UsageError, match="other machines"):
         engine.view("0.0.0.0:0")
-    with pytest.raises(st.UsageError, match="no address"):
+    with pytest.raises(st.UsageError, match="not an address"):
         engine.view("here")
     with engine.view("0.0.0.0:0", allow_hosts=["robot.local"]) as view:
         assert view.url.startswith("http://robot.local:")

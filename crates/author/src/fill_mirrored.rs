@@ -28,7 +28,7 @@ impl Fill<'_> {
         let half = Half::new(rest_surface, chosen);
         if half.triangles.is_empty() {
             return Err(Error::failed(
-                "`mirror`: there is no surface to the left of the plane y = 0, in which taxels are mirrored; the body has to stand \
+                "`mirror`: there is no surface to the left of the plane y = 0, in which taxels are mirrored; move the body \
                  across it",
             ));
         }

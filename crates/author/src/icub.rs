@@ -4,7 +4,7 @@
 //! `[calibration]` and a row per channel, `x y z nx ny nz` in metres in the link's frame. Six zeros mean no taxel.
 //! `taxel2Repr` has per row the representative taxel of its group (a triangle of up to 12), −1 for no taxel, and −2 for a
 //! thermal pad. Irregular files are accepted with notes: another number of ids than rows, coincident taxels, ids without a
-//! place, places without an id, normals that are no unit vectors.
+//! place, places without an id, normals that are not unit vectors.
 
 use std::collections::BTreeMap;
 
@@ -77,7 +77,7 @@ pub struct IcubFile {
     pub rows: Vec<IcubRow>,
     /// Number of ids in `taxel2Repr`.
     pub ids: usize,
-    /// Notes for the user, a line each; every row that is no ordinary taxel is counted in one of them.
+    /// Notes for the user, a line each; every row that is not an ordinary taxel is counted in one of them.
     pub notes: Vec<String>,
 }
 
@@ -90,7 +90,7 @@ impl IcubFile {
     pub fn read(text: &str) -> Result<Self> {
         let lines: Vec<&str> = text.trim_start_matches('\u{feff}').lines().map(str::trim).collect();
         let start = lines.iter().position(|line| line.eq_ignore_ascii_case("[calibration]")).ok_or_else(|| {
-            Error::failed("there is no line `[calibration]`: this is no position file of the iCub's skin")
+            Error::failed("there is no line `[calibration]`: this is not a position file of the iCub's skin")
         })?;
         let (part, ids) = header(&lines[..start])?;
         let mut raw = Vec::new();
@@ -193,7 +193,7 @@ impl IcubFile {
         glb
     }
 
-    /// The notes: everything that is no ordinary taxel, with its channels.
+    /// The notes: everything that is not an ordinary taxel, with its channels.
     fn describe(&self) -> Vec<String> {
         let rows = self.rows.len();
         let that = |is: &dyn Fn(&IcubRow) -> bool| -> Vec<u32> {
@@ -232,7 +232,7 @@ impl IcubFile {
         let mut normals = self.taxels().map(|(_, taxel)| taxel.normal_in_link);
         let first = normals.next();
         if self.taxels().count() > 2 && normals.all(|normal| Some(normal) == first) {
-            notes.push("all normals are the same: they may be no surface's".into());
+            notes.push("all normals are the same: they may not be normals of a surface".into());
         }
         notes
     }
@@ -261,13 +261,13 @@ fn header(lines: &[&str]) -> Result<(String, Vec<i64>)> {
     let (list, _) = list.ok_or_else(|| Error::failed("its `taxel2Repr` should be a list in parentheses"))?;
     let id = |word: &str| match word.parse::<i64>() {
         Ok(id) if id >= THERMAL => Ok(id),
-        _ => Err(failed!("`{word}` in taxel2Repr is no id; ids are -2, -1, or count from 0")),
+        _ => Err(failed!("`{word}` in taxel2Repr is not an id; ids are -2, -1, or count from 0")),
     };
     Ok((part.to_owned(), list.split_whitespace().map(id).collect::<Result<_>>()?))
 }
 
 fn row(line: &str) -> Result<[DVec3; 2]> {
-    let wrong = || failed!("`{line}` is no row; six numbers belong there, x y z nx ny nz");
+    let wrong = || failed!("`{line}` is not a row; write six numbers, x y z nx ny nz");
     let words: Vec<&str> = line.split_whitespace().collect();
     let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
     let Some(&[x, y, z, nx, ny, nz]) = numbers.as_deref() else { return Err(wrong()) };

@@ -67,7 +67,7 @@ pub fn author_icub(files: &[impl AsRef<Path>]) -> Result<Authored> {
         first_id = (first_id + file.rows.len() as u32).next_multiple_of(ID_STEP);
     }
     if files.len() > 1 {
-        notes.push("position files do not say how links stand to each other: they lie side by side".to_owned());
+        notes.push("position files have no poses of links: they lie side by side".to_owned());
     }
     notes.push("areas are unknown without a surface: put them on a mesh by `icub` in a recipe to have them".to_owned());
     let mut file = Original::from_bytes("icub.glb", &glb.to_bytes()?, None)?;

@@ -79,5 +79,5 @@ pub use table_body::author_csv_skin;
 pub use crate::body::{blend_skinning, heaviest_four};
 
 // The same paths as in the crate that has all of this under its own name.
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_skin::{body, error, field, keys, length, limits, parallel, plain, random};

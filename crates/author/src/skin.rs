@@ -40,7 +40,7 @@ pub struct Authored {
 /// The same file and recipe give the same bytes. A place does not depend on other places.
 ///
 /// # Errors
-/// The file is no valid body, or the recipe requests something that it does not have or cannot hold; with the place.
+/// The file is not a valid body, or the recipe requests something that it does not have or cannot hold; with the place.
 pub fn author(file: Original, recipe: &Recipe, mut progress: impl FnMut(f64)) -> Result<Authored> {
     author_while(file, recipe, |share| {
         progress(share);

@@ -20,7 +20,7 @@ const GAP_M: f64 = 0.05;
 /// how links stand to each other: they lie side by side.
 ///
 /// # Errors
-/// The file cannot be read, is no such table, or leaves out a normal; with the line.
+/// The file cannot be read, is not such a table, or leaves out a normal; with the line.
 pub fn author_csv_skin(path: &Path) -> Result<Authored> {
     let file = limits::open(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
     let rows = read_taxel_table(file, false).map_err(|e| e.at(path.display()))?;
@@ -73,7 +73,7 @@ fn place(rows: &[TaxelRow], path: &Path) -> Result<Authored> {
     let file = Original::from_bytes(&path.display().to_string(), &glb.to_bytes()?, None)?;
     let mut made = author(file, &Recipe::none(), |_| {})?;
     if links.len() > 1 {
-        made.notes.push("a table does not say how links stand to each other: they lie side by side".to_owned());
+        made.notes.push("a table has no poses of links: they lie side by side".to_owned());
     }
     Ok(Authored { places, ..made })
 }

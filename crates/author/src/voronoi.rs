@@ -1,7 +1,7 @@
 //! The area of given taxels: their Voronoi cells, which end half a pitch outside the outermost taxels.
 //!
 //! Around each taxel the surface is unrolled: its neighbours become points of a plane around the taxel, at their distance
-//! along the surface. Taxels on another part of the surface are no neighbours. The cell is bounded by the perpendicular
+//! along the surface. Taxels on another part of the surface are not neighbours. The cell is bounded by the perpendicular
 //! bisectors to the neighbours. Where the layout ends, mirror images replace the missing neighbours. The part of the cell
 //! beyond the surface's edge is subtracted.
 

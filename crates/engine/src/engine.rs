@@ -289,7 +289,7 @@ impl Engine {
     pub fn remarks(&self) -> Vec<String> {
         let drift = self.drift.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
             "no taxel can tell the drift of a touched field: fewer than 3 are in other fields. While a touch lasts, baselines stay, \
-             and drift is taken for pressure; give the body more fields, or leave `time_constant_s` of [drift] out"
+             and drift counts as pressure; give the body more fields, or leave `time_constant_s` of [drift] out"
                 .to_owned()
         });
         let on_skin = self.on_skin.iter().flat_map(OnSkin::remarks).cloned();
@@ -321,7 +321,7 @@ impl Engine {
     /// engine.process_one(&frame)?;
     /// let mut presses = Vec::new();
     /// engine.presses_on_links(&mut presses);
-    /// // Counts are no newtons: there is no wrench.
+    /// // Counts are not newtons: there is no wrench.
     /// assert!(presses[0].total == 5.0 && presses[0].wrench.is_none());
     /// # Ok(())
     /// # }

@@ -246,8 +246,8 @@ fn estimate(touches: &[Observed], spots: &[Spot], progress: &mut dyn FnMut(f64) 
     const LEAST: usize = 50;
     if touches.len() < LEAST {
         return Err(failed!(
-            "{} touches press six taxels or more with nothing beside them, of {LEAST} that are needed; let a finger wander over all of \
-             the skin for two minutes",
+            "{LEAST} touches must press six taxels or more, away from others, and {} do; let a finger wander over all of the skin for \
+             two minutes",
             touches.len()
         ));
     }
@@ -284,7 +284,7 @@ fn estimate(touches: &[Observed], spots: &[Spot], progress: &mut dyn FnMut(f64) 
             }
         }
         if used < LEAST {
-            return Err(failed!("{used} touches can be explained as contacts, of {LEAST} that are needed"));
+            return Err(failed!("{LEAST} touches must be explained as contacts, and {used} can be"));
         }
         left = (squares.0 / f64::max(squares.1, 1.0)).sqrt();
         for ((gain, weight), sum) in gains.iter_mut().zip(&weights).zip(&sums) {

@@ -35,5 +35,5 @@ pub use backend::agreement::{Agreement, ComparedColumn, Comparison, Verdict};
 pub use engine::{Engine, EngineState, Options};
 #[cfg(test)]
 use somatic_bodies as bundled;
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_skin::{body, error, field, length, limits, parallel, random, signal};

@@ -49,7 +49,7 @@ const BYTES_A_MEMBERSHIP: u128 = 350;
 const BYTES_A_FIELD: u128 = 1500;
 
 impl Shape {
-    /// Refuses what is no skin: nothing of something, or more members than sensors.
+    /// Refuses what is not skin: nothing of something, or more members than sensors.
     pub fn check(&self) -> Result<()> {
         let given = [
             ("--sensors", self.sensors),

@@ -23,7 +23,7 @@ impl Listen {
     /// machine's own names and `allow_hosts`.
     ///
     /// # Errors
-    /// A usage error: the address is none, or other machines reach it and no host is allowed; a host is no name.
+    /// A usage error: the address is none, or other machines reach it and no host is allowed; a host is not a name.
     pub fn new(address: Option<&str>, allow_hosts: &[String]) -> Result<Self> {
         if let Some(name) = allow_hosts.iter().find(|name| !is_host_name(name)) {
             return Err(Error::usage(format!(
@@ -33,13 +33,15 @@ impl Listen {
         let address = address.map(|text| {
             let found = text.to_socket_addrs().ok().and_then(|mut found| found.next());
             found.ok_or_else(|| {
-                Error::usage(format!("`{text}` is no address of this machine; give HOST:PORT, such as 127.0.0.1:7879"))
+                Error::usage(format!(
+                    "`{text}` is not an address of this machine; give HOST:PORT, such as 127.0.0.1:7879"
+                ))
             })
         });
         let listen = Self { address: address.transpose()?, allow_hosts: allow_hosts.to_vec() };
         if listen.is_open_to_others() && allow_hosts.is_empty() {
             return Err(Error::usage(
-                "other machines reach this address; say by which name they may, with --allow-host NAME, or tunnel to \
+                "other machines reach this address; give the name that they use, with --allow-host NAME, or tunnel to \
                  127.0.0.1 through SSH",
             ));
         }
@@ -63,7 +65,7 @@ impl Listen {
     /// The port is taken, or may not be used.
     pub(super) fn bind(&self) -> Result<TcpListener> {
         let fail = |address: SocketAddr, e: &std::io::Error| {
-            let hint = if e.kind() == ErrorKind::AddrInUse { "; port 0 takes any free one" } else { "" };
+            let hint = if e.kind() == ErrorKind::AddrInUse { "; port 0 uses any free one" } else { "" };
             Error::failed(format!("cannot listen: {e}{hint}")).at(format!("page {address}"))
         };
         if let Some(address) = self.address {

@@ -112,7 +112,7 @@ struct RawSeries {
 /// The message in `text`, of a page that shows what `counts` counts.
 ///
 /// # Errors
-/// It is no message, or refers to what is not there; a reason of at most 123 bytes.
+/// It is not a message, or refers to what is not there; a reason of at most 123 bytes.
 pub(super) fn parse(text: &str, counts: &Counts) -> Result<Message, String> {
     if text.len() > MAX_MESSAGE_BYTES {
         return Err("a message is over 64 KiB".to_owned());

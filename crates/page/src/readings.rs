@@ -100,7 +100,7 @@ impl Readings {
                 self.health[taxel] = reading.health as u8;
             }
         }
-        // NaN is no maximum.
+        // NaN is not a maximum.
         f64::from(self.pressures.iter().copied().fold(0.0, f32::max))
     }
 
@@ -156,7 +156,7 @@ mod tests {
     use somatic_engine::scene::Scene;
 
     #[test]
-    fn what_is_wrong_with_a_taxel_is_told_from_zero() {
+    fn what_is_wrong_with_a_taxel_is_distinguished_from_zero() {
         let body = Body::from_bytes("hand", bundled::HAND).unwrap();
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let text = format!("[all]\ngain = 0.5\np_max = 100\nraw_range = [-10, 500]\n[taxel.{}]\nmask = true", ids[6]);

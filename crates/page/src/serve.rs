@@ -250,7 +250,7 @@ impl Serving {
                 }
                 Ok(Message::Taxel(taxel)) => viewer.set_hovered(taxel),
                 Ok(Message::Request(request)) => pass_on(connection, *id, request, requests, exchange, content),
-                Ok(Message::Hello { .. }) => connection.close(CloseReason::Policy, "hello is said once"),
+                Ok(Message::Hello { .. }) => connection.close(CloseReason::Policy, "hello came twice"),
                 Err(reason) => connection.close(CloseReason::Policy, &reason),
             }
         });
@@ -361,7 +361,7 @@ fn greet(connection: &mut Connection, message: &str, token: &str, run: &str, con
         }
         // That the page is of another version is told.
         Err(reason) if reason.contains("version") => return connection.close(CloseReason::Policy, &reason),
-        _ => return connection.close(CloseReason::Policy, "the first message is no hello"),
+        _ => return connection.close(CloseReason::Policy, "the first message is not a hello"),
     };
     let seen = after_event.unwrap_or_else(|| exchange.lock().log.forgotten());
     let mut viewer = Viewer::new(seen);

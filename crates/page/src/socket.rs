@@ -25,11 +25,11 @@ const BYTES_AT_ONCE: usize = 16 << 10;
 pub(super) enum CloseReason {
     /// The server ends.
     GoingAway,
-    /// What was sent is no WebSocket.
+    /// What was sent is not a WebSocket.
     Protocol,
     /// A binary message.
     Unsupported,
-    /// Text that is no UTF-8.
+    /// Text that is not UTF-8.
     Invalid,
     /// What the page's protocol does not know, or no token.
     Policy,
@@ -210,7 +210,7 @@ impl Socket {
                 Err(Error::Capacity(CapacityError::MessageTooLong { .. })) => {
                     Received::Wrong(CloseReason::TooLarge, "a message is over 64 KiB")
                 }
-                Err(Error::Utf8(_)) => Received::Wrong(CloseReason::Invalid, "text that is no UTF-8"),
+                Err(Error::Utf8(_)) => Received::Wrong(CloseReason::Invalid, "text that is not UTF-8"),
                 Err(Error::Protocol(ProtocolError::ResetWithoutClosingHandshake)) => Received::Gone,
                 Err(Error::Protocol(_)) => Received::Wrong(CloseReason::Protocol, "not a WebSocket's frame"),
                 Err(_) => Received::Gone,

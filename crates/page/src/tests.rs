@@ -427,7 +427,7 @@ fn a_viewer_owes_what_it_has_not_drawn() {
 }
 
 #[test]
-fn a_page_is_told_what_pressure_is_measured_in() {
+fn a_page_gets_the_unit_of_pressure() {
     let welcome = |calibration: &str| -> Value {
         let bench = Bench::new(Outputs::TOTAL | Outputs::FORCE, &ALL_LETTERS[..1], calibration);
         serde_json::from_str(&bench.scene.welcome("00ff", bench.scene.scale)).unwrap()

@@ -29,7 +29,7 @@ pub(super) struct Account {
 
 /// How a file ends before its end.
 struct Cut {
-    /// Bytes that are no whole chunk.
+    /// Bytes that are not a whole chunk.
     bytes: u64,
     /// Whether its data are over.
     is_in_summary: bool,
@@ -99,7 +99,7 @@ impl Account {
         self.damaged_to = Some(to);
     }
 
-    /// Notes that the file ends before its end, in `bytes` that are no whole chunk; or, if `is_in_summary`, after its data.
+    /// Notes that the file ends before its end, in `bytes` that are not a whole chunk; or, if `is_in_summary`, after its data.
     pub(super) fn cut(&mut self, bytes: u64, is_in_summary: bool) {
         self.cut.get_or_insert(Cut { bytes, is_in_summary });
     }

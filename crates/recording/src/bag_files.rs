@@ -20,7 +20,7 @@ pub(super) fn not_mcap(first: &[u8]) -> String {
         return format!("its storage is sqlite3, and MCAP is read here; {}", CONVERTED.replace("BAG", "FOLDER"));
     }
     if first.starts_with(b"#ROSBAG V") {
-        return format!("it is a bag of ROS 1, and MCAP is read here; {CONVERTED}");
+        return format!("it is a ROS 1 bag, and MCAP is read here; {CONVERTED}");
     }
     if first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD]) {
         return "it is compressed as a whole; unpack it: unzstd FILE".to_owned();
@@ -32,7 +32,7 @@ pub(super) fn not_mcap(first: &[u8]) -> String {
 /// before it wrote these, of their numbers.
 ///
 /// # Errors
-/// It is not there, or is no bag in MCAP.
+/// It is not there, or is not a bag in MCAP.
 pub(super) fn bag_files(path: &Path) -> Result<Vec<PathBuf>> {
     if !fs::metadata(path).map_err(|e| Error::io(path, &e))?.is_dir() {
         return Ok(vec![path.to_owned()]);
@@ -189,7 +189,7 @@ mod tests {
                 &b"SQLite format 3\0\x10\0\x01\x01"[..],
                 "its storage is sqlite3, and MCAP is read here; convert it",
             ),
-            ("a.bag", b"#ROSBAG V2.0\nE\0\0\0", "it is a bag of ROS 1, and MCAP is read here; convert it"),
+            ("a.bag", b"#ROSBAG V2.0\nE\0\0\0", "it is a ROS 1 bag, and MCAP is read here; convert it"),
             ("a.mcap.zstd", b"\x28\xB5\x2F\xFD\0", "it is compressed as a whole; unpack it"),
             ("a.mcap", b"mine", "this is not an MCAP file"),
         ] {

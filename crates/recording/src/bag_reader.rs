@@ -50,7 +50,7 @@ impl BagReader {
     /// Opens the bag at `path`, an MCAP file or a folder of such.
     ///
     /// # Errors
-    /// It cannot be read, is no bag in MCAP, or has no such topics, or too many; their messages are not in CDR.
+    /// It cannot be read, is not a bag in MCAP, or has no such topics, or too many; their messages are not in CDR.
     pub fn open(path: &Path, wanted: &WantedTopics<'_>) -> Result<Self> {
         let files = bag_files(path)?;
         let (topics, kind) = choose(&topics_of(&files)?, wanted, path).map_err(|e| e.at(path.display()))?;

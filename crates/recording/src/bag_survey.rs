@@ -52,7 +52,7 @@ impl BagSurvey {
     /// Reads the bag at `path`, an MCAP file or a folder of such, to its end; `progress` gets the share that has been read.
     ///
     /// # Errors
-    /// It cannot be read, or is no bag in MCAP.
+    /// It cannot be read, or is not a bag in MCAP.
     pub fn of(path: &Path, mut progress: impl FnMut(f64)) -> Result<Self> {
         let files = bag_files(path)?;
         let mut survey = Self { files: files.len(), ..Self::default() };

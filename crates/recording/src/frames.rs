@@ -101,7 +101,7 @@ fn value_of(bits: [u8; 4]) -> RawValue {
 }
 
 impl FrameMessage {
-    /// Reads it from `bytes`; `None` where they are no such message, or have no time.
+    /// Reads it from `bytes`; `None` where they are not such a message, or have no time.
     pub(super) fn read(bytes: &[u8]) -> Option<Self> {
         Self::decode(bytes).ok().filter(|message| message.t.is_some_and(f64::is_finite))
     }
@@ -111,7 +111,7 @@ impl FrameMessage {
         !self.stale.is_empty()
     }
 
-    /// Puts it into `frame`, which has `width` values, with `stale` for those that are. `None` where it is no such frame.
+    /// Puts it into `frame`, which has `width` values, with `stale` for those that are. `None` where it is not such a frame.
     pub(super) fn put_into(&self, frame: &mut Frame, width: usize, stale: RawValue) -> Option<()> {
         (frame.t_s, frame.t_rest_ns) = (self.t.unwrap_or_default(), self.t_rest);
         let (words, rest) = self.values.as_deref().unwrap_or_default().as_chunks::<4>();

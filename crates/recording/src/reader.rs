@@ -59,7 +59,7 @@ impl Reader {
     /// Opens the recording at `path`.
     ///
     /// # Errors
-    /// The file cannot be read, is no MCAP, or holds no frames of touch.
+    /// The file cannot be read, is not an MCAP, or holds no frames of touch.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let name = path.display().to_string();
@@ -102,7 +102,7 @@ impl Reader {
     /// Chunks without a checksum are read, too: recorders of ROS 2 leave it out for speed.
     ///
     /// # Errors
-    /// The file cannot be read, or is no MCAP.
+    /// The file cannot be read, or is not an MCAP.
     pub(super) fn open_any(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, &e))?;
         let (mut reader, _) = Self::begin(&path.display().to_string(), file, "message").map_err(|e| e.at(path))?;
@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_of_an_older_recording_are_turned_and_that_is_said_once() {
+    fn poses_of_an_older_recording_are_turned_and_that_is_reported_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("old.mcap");
         let read = |world: Option<&str>| {

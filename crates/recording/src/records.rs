@@ -211,7 +211,7 @@ fn is_plausible(record: Record, told: &[u8]) -> bool {
                 u64::from(parts.u32()?) == rest(&parts)
             }
             op::DATA_END => record.length == 4,
-            // One of another program, if it is no chunk whose kind is damaged.
+            // One of another program, if it is not a chunk whose kind is damaged.
             0x80.. => !is_plausible(Record { kind: op::CHUNK, ..record }, told),
             _ => false,
         })

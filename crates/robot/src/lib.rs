@@ -10,14 +10,14 @@
 pub mod dds;
 pub mod robot;
 
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_author as author;
 #[cfg(test)]
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_bodies as bundled;
 #[cfg(feature = "mcap")]
 use somatic_recording as recording;
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_skin::{body, error, output, signal};
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_sources::source;

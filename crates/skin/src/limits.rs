@@ -127,7 +127,7 @@ pub fn read(path: impl AsRef<Path>, most: u64) -> io::Result<Vec<u8>> {
 pub fn read_to_string(path: impl AsRef<Path>, most: u64) -> io::Result<String> {
     String::from_utf8(read(path, most)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
-        io::Error::new(io::ErrorKind::InvalidData, format!("it is no text: byte {at} is not UTF-8; save it as UTF-8"))
+        io::Error::new(io::ErrorKind::InvalidData, format!("it is not text: byte {at} is not UTF-8; save it as UTF-8"))
     })
 }
 
@@ -169,7 +169,7 @@ pub struct LimitedFile {
     file: File,
     left: u64,
     most: u64,
-    /// In bytes, as the file system has it; 0 of what is no file.
+    /// In bytes, as the file system has it; 0 of what is not a file.
     length: u64,
     is_device: bool,
 }

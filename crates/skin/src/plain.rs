@@ -67,12 +67,12 @@ pub fn is_xml(c: char) -> bool {
     matches!(c, '\t' | '\n' | '\r' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'..)
 }
 
-/// Says `text` on standard error, as a line of this program. A closed standard error is no reason to stop.
+/// Says `text` on standard error, as a line of this program. A closed standard error is not a reason to stop.
 pub fn say(text: &str) {
     let _ = writeln!(io::stderr(), "somatic: {}", line(text));
 }
 
-/// Writes `text` of some lines to standard error. A closed standard error is no reason to stop.
+/// Writes `text` of some lines to standard error. A closed standard error is not a reason to stop.
 pub fn announce(text: &str) {
     let _ = io::stderr().write_all(lines(text).as_bytes());
 }

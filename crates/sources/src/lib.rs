@@ -12,10 +12,10 @@ pub mod board;
 pub mod limb;
 pub mod source;
 
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_bodies as bundled;
 #[cfg(feature = "mcap")]
 use somatic_recording as recording;
-#[allow(unused_imports, reason = "which of them are used hangs on features")]
+#[allow(unused_imports, reason = "which of them are used depends on features")]
 use somatic_skin::{body, error, field, keys, length, limits, output, random, signal};
 use somatic_wire as wire;

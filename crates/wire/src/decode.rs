@@ -1,6 +1,6 @@
 //! Decodes packets from bytes, in pieces of any size.
 //!
-//! Bytes that are no packet give an [`Event::Corrupt`], and the next zero byte starts a new packet: zeros only delimit
+//! Bytes that are not a packet give an [`Event::Corrupt`], and the next zero byte starts a new packet: zeros only delimit
 //! packets. Memory is bounded by one packet and a few numbers per board.
 
 use super::format::{
@@ -48,7 +48,7 @@ pub enum Event<'a> {
         /// The command.
         command: Command,
     },
-    /// Bytes that are no packet.
+    /// Bytes that are not a packet.
     Corrupt {
         /// What is wrong with them.
         why: Corruption,
@@ -57,7 +57,7 @@ pub enum Event<'a> {
     },
 }
 
-/// Why bytes are no packet.
+/// Why bytes are not a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Corruption {
     /// The first bytes since the line was opened, possibly the end of a valid packet.

@@ -194,7 +194,7 @@ mod tests {
         assert_eq!(dialogue.receive(&answer(7, 255, Command::Start, Status::Done)), None, "once is enough");
         assert_ne!(dialogue.send(at(101)).unwrap(), sent);
         let ended = dialogue.receive(&answer(7, 1, Command::Stop, Status::Bad)).unwrap();
-        assert_eq!((ended.ticket, ended.outcome), (second, Outcome::Refused(Status::Bad)), "0 is no request");
+        assert_eq!((ended.ticket, ended.outcome), (second, Outcome::Refused(Status::Bad)), "0 is not a request");
         assert!(dialogue.is_idle());
     }
 

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_counted_and_starts_are_told_from_them() {
+    fn gaps_are_counted_and_distinguished_from_starts() {
         let mut frame_counts = FrameCounts::default();
         assert_eq!(frame_counts.count(&head(1, 40, 0), true).lost, 0, "what was before listening is not lost");
         assert_eq!(frame_counts.count(&head(1, 41, 0), true).lost, 0);

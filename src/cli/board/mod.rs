@@ -248,7 +248,7 @@ impl Play {
         Ok(Feed::start(Self::open(self.spec.as_ref(), &self.ids)?, ReadMode { most: 1, gather: false, speed }))
     }
 
-    /// Whole counts within the bits of a value. What is missing or no number is no reading.
+    /// Whole counts within the bits of a value. What is missing or no number is not a reading.
     fn read(&self, frame: &Frame, readings: &mut [Option<u16>]) {
         for (reading, value) in readings.iter_mut().zip(&frame.values) {
             *reading = value.number().map(|value| value.round().clamp(0.0, self.most) as u16);

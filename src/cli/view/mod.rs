@@ -48,8 +48,8 @@ Examples:
   ssh -L 7879:127.0.0.1:7879 robot                then open the address here, as a tunnel
   somatic run --source serial:/dev/ttyUSB0 --sink page      live boards
 
-The page is served to this machine alone. Whoever has the address that is printed, with its
-token, may look and play; nobody can change a file.";
+The page is served to this machine alone. Anyone with the printed address and its token may look and
+play; nobody can change a file.";
 
 /// Show a body, a recording or a scene in a browser.
 #[derive(Args)]
@@ -145,7 +145,7 @@ impl Opening<'_> {
     /// Serves `scene` and says where.
     fn start(&self, scene: PageScene) -> Result<Opened> {
         let (server, publisher) = Server::start(&self.listen, scene)?;
-        // A closed standard error is no reason to stop.
+        // A closed standard error is not a reason to stop.
         somatic::plain::announce(&server.announcement());
         let handed_over = match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
             Ok(file) => file,

@@ -235,7 +235,7 @@ impl Grouper<'_> {
         Ok(discs)
     }
 
-    /// The link of `links` that `seed` is on, the nearest taxel there, and the seed's place if it is no taxel.
+    /// The link of `links` that `seed` is on, the nearest taxel there, and the seed's place if it is not a taxel.
     fn locate_seed(&self, seed: &Seed, links: &[LinkDistances]) -> (usize, usize, Option<(usize, DVec3)>) {
         let body = self.body;
         let on = |p: DVec3, distances: &LinkDistances| {

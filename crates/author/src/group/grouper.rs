@@ -171,7 +171,7 @@ impl<'a> Grouper<'a> {
     pub(super) fn add(&mut self, name: &str, taxels: &[usize], rule: &FieldRule) -> Result<()> {
         for name in [Some(name), rule.parent.as_deref()].into_iter().flatten() {
             if name.split('/').any(|level| level.trim().is_empty()) {
-                return Err(failed!("`{name}` is no name for a field: a level of it is empty"));
+                return Err(failed!("`{name}` is not a name for a field: a level of it is empty"));
             }
         }
         let above = self.top(name, rule)?;
@@ -214,7 +214,7 @@ impl<'a> Grouper<'a> {
         let Some(parent) = &rule.parent else { return Ok(None) };
         let top = name.split('/').next().unwrap_or(name);
         if parent.split('/').next() == Some(top) {
-            return Err(failed!("`parent`: `{top}` cannot stand below itself"));
+            return Err(failed!("`parent`: `{top}` cannot be below itself"));
         }
         if let Some(&there) = self.index_of.get(top) {
             let above = self.made[there].spec.parent.as_deref();

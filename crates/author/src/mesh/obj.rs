@@ -53,7 +53,7 @@ fn add(line: &[u8], corners: &mut Vec<u32>, mesh: &mut Triangles) -> Result<()> 
     Ok(())
 }
 
-/// The vertex that `word` means, of `count` so far: from 1 on, or back from the last one; after a slash are no places.
+/// The vertex that `word` means, of `count` so far: from 1 on, or back from the last one; what follows a slash is not a place.
 fn corner(word: &[u8], count: usize) -> Result<u32> {
     let own = word.split(|&byte| byte == b'/').next().and_then(|own| std::str::from_utf8(own).ok());
     let index = match own.and_then(|own| own.parse::<i64>().ok()) {

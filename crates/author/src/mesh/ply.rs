@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_short_or_no_ply_is_said() {
+    fn what_is_cut_short_or_no_ply_is_reported() {
         let whole = binary(false);
         for end in 0..whole.len() {
             let why = read(&whole[..end]).unwrap_err().to_string();

@@ -127,7 +127,7 @@ impl Robot {
     /// Reads the URDF at `path`.
     ///
     /// # Errors
-    /// It is no URDF, or a xacro, or names a package that is not given; with the line.
+    /// It is not a URDF, is a xacro, or names a package that is not given; with the line.
     pub fn load(path: &Path, options: &MeshOptions) -> Result<Self> {
         let text = xml::text_of(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -257,7 +257,7 @@ impl Reader<'_> {
             "sphere" => ShapeKind::Sphere { radius_m: self.number(own, "radius")? },
             other => {
                 return Err(
-                    self.at(own, format!("a <{other}> is no shape of a URDF; it has mesh, box, cylinder and sphere"))
+                    self.at(own, format!("a <{other}> is not a shape of a URDF; use mesh, box, cylinder or sphere"))
                 );
             }
         };

@@ -9,7 +9,7 @@ use crate::limits::MAX_NODE_DEPTH;
 /// The links, a parent before its children, each with the joint to its parent.
 ///
 /// # Errors
-/// Names are there twice or lead nowhere, or the links are no tree with one root, or a joint follows itself.
+/// Names are there twice or lead nowhere, or the links are not a tree with one root, or a joint follows itself.
 pub fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&RobotJoint>)>> {
     let mut index_of = HashMap::new();
     for (index, link) in robot.links.iter().enumerate() {
@@ -38,7 +38,7 @@ pub fn order(robot: &Robot) -> Result<Vec<(&RobotLink, Option<&RobotJoint>)>> {
     let mut next = 0;
     while let Some(&(round, index, depth)) = placed.get(next) {
         if depth > MAX_NODE_DEPTH {
-            return Err(failed!("its links hang on each other over {MAX_NODE_DEPTH} deep; split the robot"));
+            return Err(failed!("its links are nested over {MAX_NODE_DEPTH} deep; split the robot"));
         }
         placed.extend(below[index].iter().map(|&child| (round + usize::from(child < index), child, depth + 1)));
         next += 1;
@@ -170,7 +170,7 @@ mod tests {
             format!("<robot>{links}{joints}</robot>")
         };
         assert_eq!(names(&chain(MAX_NODE_DEPTH)).unwrap().len(), MAX_NODE_DEPTH);
-        assert!(names(&chain(20_000)).unwrap_err().to_string().contains("hang on each other over"));
+        assert!(names(&chain(20_000)).unwrap_err().to_string().contains("are nested over"));
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub(super) fn parse(text: &str) -> Result<Document<'_>> {
     })
 }
 
-/// Counts depth, attributes and namespaces. Text that is no XML is left to the parser, which stops at the same place.
+/// Counts depth, attributes and namespaces. Text that is not XML is left to the parser, which stops at the same place.
 fn check(text: &str) -> Result<()> {
     let bytes = text.as_bytes();
     let after = |from: usize, end: &str| text[from..].find(end).map(|at| from + at + end.len());

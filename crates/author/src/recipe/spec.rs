@@ -189,7 +189,7 @@ impl Recipe {
     /// The same with sampled taxels at least so far from borders of links and seams, such as `5 mm`.
     ///
     /// # Errors
-    /// It is no length.
+    /// It is not a length.
     pub fn with_clear(self, length: &str) -> Result<Self> {
         let length: Length = length.parse().map_err(|e: Error| Error::usage(e.to_string()))?;
         Ok(Self { clear_m: Some(length.metres), ..self })

@@ -139,7 +139,7 @@ impl SheetGrid {
             return Err(failed!("a grid of {rows} rows and {columns} columns; give it 1 to {MAX_CELLS} cells"));
         }
         if self.present.as_ref().is_some_and(|present| present.len() != (rows * columns) as usize) {
-            return Err(failed!("the cells that are there are not those of {rows} rows and {columns} columns"));
+            return Err(failed!("the cells that are there do not fit {rows} rows and {columns} columns"));
         }
         for pitch_m in [self.row_pitch_m, self.column_pitch_m] {
             if !(pitch_m.is_finite() && pitch_m > 0.0) {

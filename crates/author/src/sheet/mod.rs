@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_sheet_is_said() {
+    fn what_is_wrong_with_a_sheet_is_reported() {
         let good = SheetGrid::new(1, 2, 0.01).sheet("a").unwrap();
         let why = |sheet: Sheet| sheets(&[sheet]).err().expect("it is wrong").to_string();
         assert!(why(Sheet::new("a", Vec::new())).contains("no cells"));

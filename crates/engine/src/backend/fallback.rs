@@ -27,7 +27,7 @@ impl Fallback {
                 let Some(kept) = self.kept.take() else { return Err(error) };
                 self.running = Box::new(cpu::Cpu::new(&self.plan));
                 self.running.restore(&kept)?;
-                self.notice = Some(format!("{error}: the run goes on on the CPU, from the last state"));
+                self.notice = Some(format!("{error}: the run continues on the CPU, from the last state"));
                 call(&mut *self.running)
             }
             given => given,
@@ -160,7 +160,7 @@ mod tests {
             let told = notice.as_deref().unwrap_or_default();
             assert_eq!(
                 (call == 3, call == 3),
-                (told.contains("stopped answering"), told.contains("goes on on the CPU"))
+                (told.contains("stopped answering"), told.contains("continues on the CPU"))
             );
         }
         // Asked for by name it is an error of its own kind.

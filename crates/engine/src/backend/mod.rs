@@ -48,11 +48,11 @@ impl BackendKind {
     pub fn with(self, arithmetic: Option<Arithmetic>) -> Result<Self> {
         match (self, arithmetic) {
             (Self::Gpu, Some(Arithmetic::Double)) => {
-                Err(Error::usage("shaders have no double precision: take backend cpu, or arithmetic compensated"))
+                Err(Error::usage("shaders have no double precision; use backend cpu, or arithmetic compensated"))
             }
             (_, Some(Arithmetic::Double)) => Ok(Self::Reference),
             (Self::Reference, Some(arithmetic)) => Err(Error::usage(format!(
-                "the reference is always in double precision: take backend cpu or gpu for arithmetic {arithmetic}"
+                "the reference is always in double precision; use backend cpu or gpu for arithmetic {arithmetic}"
             ))),
             _ => Ok(self),
         }

@@ -202,7 +202,7 @@ touch_columns! {
     FIT_KIND "fit_kind" Kind 1 "What kind of contact presses: point, line, segment or blob." |touch| one_of(touch.fit.and_then(|fit| ContactKind::ALL.iter().position(|kind| *kind == fit.kind)).map(|kind| kind as f64));
     FIT_PLACE "fit_place" Metre 3 "Where it presses, on the skin; of a line the point nearest to the touch's mean." |touch| vector(touch.fit.map(|fit| fit.place));
     FIT_SIGMAS "fit_place_sigma" Metre 2 "The standard deviation of that along u and v of the touch's chart." |touch| sigma(touch).map(|sigma| [sigma.place[0], sigma.place[1], 0.0]);
-    FIT_FORCE "fit_force" Force 1 "How hard it presses in all, taxels or not; absent where it goes on beyond the sensors." |touch| one_of(touch.fit.and_then(|fit| fit.force));
+    FIT_FORCE "fit_force" Force 1 "Total contact force, including between taxels; absent if the contact extends beyond the sensors." |touch| one_of(touch.fit.and_then(|fit| fit.force));
     FIT_SIGMAS "fit_force_sigma" Force 1 "The standard deviation of that." |touch| one_of(sigma(touch).filter(|_| has(touch, |fit| fit.force)).map(|sigma| sigma.force));
     FIT_DIRECTION "fit_direction" One 3 "Unit vector along it; absent for a point." |touch| vector(touch.fit.and_then(|fit| fit.direction));
     FIT_DIRECTION "fit_angle" Radian 1 "The same as an angle in the touch's chart, rad in [0, π)." |touch| one_of(touch.fit.and_then(|fit| fit.angle_rad));

@@ -60,7 +60,7 @@ impl MotionFilter {
     /// may be `inf`.
     ///
     /// # Errors
-    /// `text` is no such window, or one that lets nothing pass.
+    /// `text` is not such a window, or one that lets nothing pass.
     pub fn with_window(self, text: &str) -> Result<Self> {
         let wrong = |what: &str| {
             Error::usage(format!(
@@ -109,7 +109,7 @@ impl MotionFilter {
         }
         match self.over_s {
             Some(over) if !(over.is_finite() && over > 0.0) => {
-                Err(Error::usage(format!("motion over {over} s is none; give seconds over 0")))
+                Err(Error::usage(format!("motion over {over} s is undefined; give seconds over 0")))
             }
             _ => Ok(()),
         }

@@ -11,7 +11,7 @@
 //! c(x) = p₀ + (x − x₀) · s with s = (p₁ − p₀)/(x₁ − x₀), kept within p₀ and p₁ so that it stays monotone; before the
 //! first knot and after the last it is that knot's p. The knot is found by halving.
 //!
-//! **Bound.** What the constants' rounding makes of P is no estimate: P̃, the exact result with the rounded constants, is
+//! **Bound.** What the constants' rounding makes of P is not an estimate: P̃, the exact result with the rounded constants, is
 //! worked out beside P, and |P̃ − P| is what it is (and u² of P for f64's own rounding). To this comes what the arithmetic
 //! loses of P̃. On a straight line two roundings: 2u·P̃; none where difference and product are single-precision
 //! numbers themselves. On a curve x̂ = x(1 + δ), |δ| ≤ u, and as c is monotone it is at most

@@ -217,7 +217,7 @@ mod tests {
         }
         let full = push(Clock::Runs(0.02), 0.010, 0.0);
         assert!((full.speed - 0.05).abs() < 1e-12 && full.direction == 0.0 && full.flags.is_empty());
-        // Turning round at once: half of the time forth, half of it back, are no motion.
+        // Turning round at once: half of the time forth, half of it back, are not motion.
         for frame in 0..9 {
             push(Clock::Runs(0.02), 0.009 - 1e-3 * f64::from(frame), 0.0);
         }

@@ -44,7 +44,7 @@ pub(crate) fn pairs(sides: &[Side], tolerance_m: impl Fn(usize, usize) -> f64) -
                 continue;
             }
             let distance_m = a.position.distance(b.position);
-            // A distance that is not a number is no contact.
+            // A distance that is not a number is not a contact.
             if !matches!(distance_m.partial_cmp(&tolerance_m(a.link, b.link)), Some(order) if order.is_le()) {
                 continue;
             }

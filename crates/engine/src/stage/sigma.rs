@@ -17,7 +17,7 @@
 //! cut off below 0, adds up to a bias, [`RECTIFIED`] σ each, which is held to the same share. Nothing has a sigma where no taxel is
 //! [`LEAST_PEAK`] σ over its threshold, nor an axis of which sigma is over [`MAX_TURN`]: one that may come of noise alone. These
 //! numbers are fitted to simulations. One pressed taxel, `one_taxel`, tells nothing of how its neighbours stray; without `noise` of
-//! every pressed taxel all is absent, `noise_unknown`, as it is for changes of pressure. What noise does not explain is no part of
+//! every pressed taxel all is absent, `noise_unknown`, as it is for changes of pressure. What noise does not explain is not part of
 //! it: few sensors, and the pressure at which they begin to feel, shift a quantity by as much in every frame.
 //!
 //! This stage is the host's, in f64, from the raw values: where there is contact for certain it has the same bits on every

@@ -73,7 +73,7 @@ mod tests {
         }
         let flat = DVec3::new(0.3, -0.2, 0.0);
         assert_eq!(place(flat, DVec3::Z, DVec3::Z), flat);
-        // A height over the plane is no distance on it.
+        // A height over the plane is not a distance on it.
         assert_eq!(place(flat + DVec3::Z, DVec3::Z, DVec3::Z), flat);
         assert!(place(flat, DVec3::Z, -DVec3::Z).is_finite());
     }

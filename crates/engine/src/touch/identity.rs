@@ -99,7 +99,7 @@ impl Identities {
         self.went_to.clear();
         self.went_to.resize(memory.touches.len(), None);
         self.claim(memory, totals.len(), region_of);
-        // What is under both thresholds is no touch.
+        // What is under both thresholds is not a touch.
         let least = options.on.min(options.off);
         self.claims.retain(|claim| totals[claim.region as usize] > least);
         self.claims.sort_unstable_by(|a, b| {

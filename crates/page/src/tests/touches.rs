@@ -48,7 +48,7 @@ fn a_touch_is_sent_with_its_values_taxels_and_shares() {
         assert_eq!(touch["frame"], touch["link"], "no frame has a pose");
         assert_eq!((&touch["total"], &touch["peak"]), (&expected.total.into(), &expected.peak.into()));
         assert_eq!((&touch["active"], &touch["flags"]), (&expected.active.into(), &expected.flags.bits().into()));
-        assert_eq!(touch["force"], Value::Null, "counts are no newtons");
+        assert_eq!(touch["force"], Value::Null, "counts are not newtons");
         for axis in 0..3 {
             assert_eq!(touch["position"][axis].as_f64(), Some(f64::from(expected.position[axis] as f32)));
             assert_eq!(touch["normal"][axis].as_f64(), Some(f64::from(expected.normal[axis] as f32)));
@@ -96,7 +96,7 @@ fn a_trail_leads_through_every_frame_and_ends_with_its_touch() {
     let way = number(&touch["position"][0]) - places[0];
     assert!(way > 0.002 && way < 0.01, "{way}");
     assert!(trail.iter().all(|point| point["frame"] == 0));
-    // A jump back: what came later is no part of it. Frames on the way are passed through.
+    // A jump back: what came later is not part of it. Frames on the way are passed through.
     let (state, again) = (bench.engine.percepts().clone(), bench.frame(1.0, values(0.5)));
     bench.publisher.pass(&state);
     bench.publisher.jump();

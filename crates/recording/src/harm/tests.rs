@@ -197,7 +197,7 @@ fn the_kind_of_a_chunk_that_is_damaged_costs_no_frame() {
 }
 
 #[test]
-fn what_is_cut_out_or_put_in_is_told_with_how_much() {
+fn what_is_cut_out_or_put_in_is_reported_with_how_much() {
     let mut harm = Harm::new();
     let whole = harm.whole.clone();
     let all = records(&whole);
@@ -236,7 +236,7 @@ fn what_is_cut_out_or_put_in_is_told_with_how_much() {
 }
 
 #[test]
-fn without_a_summary_damage_is_told_too() {
+fn without_a_summary_damage_is_reported_too() {
     let mut harm = Harm::new();
     let whole = harm.whole.clone();
     let summary = records(&whole).iter().find(|(kind, _)| *kind == 0x0F).unwrap().1.end;
@@ -307,14 +307,14 @@ pub(crate) fn fuzz(seed: u64, rounds: u64, seconds: u64) {
 }
 
 #[test]
-fn any_damage_is_told() {
+fn any_damage_is_reported() {
     fuzz(1, 600, 60);
 }
 
 /// `SOMATIC_FUZZ_SECONDS=300 cargo test -p somatic-recording --lib harm -- --ignored` (all bits: `SOMATIC_ALL_BITS=1`)
 #[test]
 #[ignore = "runs for SOMATIC_FUZZ_SECONDS"]
-fn any_damage_is_told_for_as_long_as_one_likes() {
+fn any_damage_is_reported_for_as_long_as_one_likes() {
     let seconds = std::env::var("SOMATIC_FUZZ_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(60);
     fuzz(std::process::id().into(), u64::MAX, seconds);
 }

@@ -109,7 +109,8 @@ impl Node {
     }
 
     fn topic(&self, topic: &str, kind: &str, qos: &QosPolicies) -> Result<Topic> {
-        let name = Name::parse(topic).map_err(|e| Error::usage(format!("`{topic}` is no name of a topic: {e}")))?;
+        let name =
+            Name::parse(topic).map_err(|e| Error::usage(format!("`{topic}` is not the name of a topic: {e}")))?;
         let (package, kind) = kind.split_once("/msg/").unwrap_or(("", kind));
         let kind = MessageTypeName::new(package, kind).dds_msg_type();
         self.participant

@@ -29,7 +29,7 @@ impl<M: DeserializeOwned + 'static> Reader<M> {
     /// The next message that has come.
     ///
     /// # Errors
-    /// What has come is no such message.
+    /// What has come is not such a message.
     pub(crate) fn take(&mut self) -> Result<Option<M>> {
         self.reader.drain_read_notifications();
         let taken = self.reader.try_take_one().map_err(|e| failed!("topic {}: {e}", self.topic))?;

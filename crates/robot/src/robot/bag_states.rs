@@ -20,7 +20,7 @@ pub(super) fn states_of(bag: &BagName) -> Result<BagReader> {
 /// Reads `sensor_msgs/msg/JointState` from a bag in MCAP: from the topic that is named, or the only one of that type.
 ///
 /// The time of a state is its stamp; that of one whose stamp is 0 is when it came, by the recorder's clock. Several
-/// publishers may each tell of some joints. A position that is no finite number tells nothing, and is among
+/// publishers may each tell of some joints. A position that is not a finite number tells nothing, and is among
 /// [`JointStates::losses`], as is what is damaged or cut off.
 ///
 /// # Errors
@@ -51,7 +51,7 @@ pub fn joint_states_of_bag(bag: &BagName) -> Result<JointStates> {
         }
     }
     let mut losses = reader.losses();
-    losses.extend(odd.map(|(count, first)| format!("{name}: positions that are no finite numbers: {count}, {first}")));
+    losses.extend(odd.map(|(count, first)| format!("{name}: positions that are not finite numbers: {count}, {first}")));
     states.sort(losses);
     if states.joint_names().is_empty() {
         return Err(

@@ -35,7 +35,7 @@ impl JointRemarks {
     pub(super) fn carried(&mut self, name: &str, t_s: f64) {
         if !std::mem::replace(&mut self.has_told_of_carried, true) {
             self.notices.push(format!(
-                "at {t_s} s: frames carry joint states of their own; those of {name} are used, as --joint-states names it"
+                "at {t_s} s: frames carry joint states of their own; states of {name} replace them, as --joint-states names it"
             ));
         }
     }

@@ -55,7 +55,7 @@ impl Kinematics {
     /// Reads the URDF at `path`. Its meshes are not opened.
     ///
     /// # Errors
-    /// It is no URDF, or its joints are no tree; with the line.
+    /// It is not a URDF, or its joints are not a tree; with the line.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Self::of(&Robot::load_joints(path)?).map_err(|e| e.at(path.display()))
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn what_is_wrong_is_reported_with_its_line() {
         let why = |from: &str, to: &str| {
             assert!(ARM.contains(from));
             Kinematics::from_urdf("r.urdf", &ARM.replace(from, to)).unwrap_err().to_string()

@@ -48,8 +48,8 @@ impl LinkMatches {
         if matched.is_empty() {
             let some: Vec<&str> = body.links.iter().take(3).map(|link| link.name.as_str()).collect();
             return Err(failed!(
-                "none of its links is called as one of body `{}`, whose links are {} and so on; author the body from this \
-                 URDF, or name its nodes as the URDF does",
+                "none of its links has the name of a link of body `{}`, whose links are {} and so on; author the body from \
+                 this URDF, or name its nodes as the URDF does",
                 body.name,
                 some.join(", ")
             ));
@@ -76,8 +76,8 @@ impl LinkMatches {
         let is_alone = |taxel: &Taxel| !is_matched(&body.links[taxel.link].name);
         if let Some(taxel) = body.taxels.iter().find(|taxel| is_alone(taxel)).filter(|_| needed.is_empty()) {
             return Err(failed!(
-                "no joint of it moves a link with taxels of body `{}`, whose link `{}` it does not have; is it the URDF of this \
-                 robot?",
+                "none of its joints moves a link with taxels of body `{}`, and it has no link `{}` of the body; is it the URDF of \
+                 this robot?",
                 body.name,
                 body.links[taxel.link].name
             ));

@@ -13,7 +13,7 @@ pub(super) const FRAME_TYPES: [&str; 2] = [PointCloud2::TYPE, Float32MultiArray:
 const VALUE_FIELDS: [&str; 4] = ["value", "raw", "pressure", "intensity"];
 const ID_FIELDS: [&str; 2] = ["taxel", "id"];
 
-/// That messages of the type `kind` are no frames.
+/// That messages of the type `kind` are not frames.
 pub(super) fn not_read(kind: &str) -> Error {
     failed!("its messages are {kind}; frames are read from {}", FRAME_TYPES.join(" and "))
 }
@@ -69,7 +69,7 @@ impl Places {
     /// Gives `put` the index in a frame and the value of each point of a cloud.
     ///
     /// # Errors
-    /// Its points are no taxels of the body, or do not fit its bytes.
+    /// Its points are not taxels of the body, or do not fit its bytes.
     pub(super) fn points(&mut self, cloud: &PointCloud2, mut put: impl FnMut(usize, RawValue)) -> Result<()> {
         let points = cloud.width as usize * cloud.height as usize;
         let named =

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn stamps_since_1970_are_told_apart_to_the_nanosecond() {
+    fn stamps_since_1970_are_distinguished_to_the_nanosecond() {
         let at = |ns: i64| FrameTime::from_ns(1_700_000_000_123_456_789 + ns);
         let mut states = StampedStates::default();
         states.add("a", at(0), 0.0);

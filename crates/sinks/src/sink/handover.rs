@@ -223,7 +223,7 @@ fn carry_all<T>(shared: &Shared<T>, mut carrier: impl Carrier<T>) -> Result<()> 
     carrier.end()
 }
 
-/// Tells people something. A closed standard error is no reason to stop.
+/// Tells people something. A closed standard error is not a reason to stop.
 pub(crate) fn tell(line: &str) {
     crate::plain::say(line);
 }
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_carrier_that_fails_is_told_with_the_next_item() {
+    fn a_carrier_that_fails_is_reported_with_the_next_item() {
         let (mut handover, open, _got) = gate(4);
         open.send(()).unwrap();
         handover.hand_over(|to| *to = 99).unwrap();

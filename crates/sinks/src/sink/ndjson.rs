@@ -108,7 +108,7 @@ impl NdjsonSink {
 
 impl Sink for NdjsonSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
-        assert_eq!(percepts.fields(), self.lines.fields(), "a sink is told the name of every field");
+        assert_eq!(percepts.fields(), self.lines.fields(), "a sink has the name of every field");
         for frame in 0..percepts.frames() {
             if self.closed {
                 return Ok(Flow::Closed);
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_letter_is_told_where_it_has_a_name() {
+    fn a_letter_is_reported_where_it_has_a_name() {
         let mut names = names();
         names[0].letter = Some("change".into());
         names[0].signal = Some("raw".into());

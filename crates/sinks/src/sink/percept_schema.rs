@@ -150,7 +150,7 @@ mod tests {
             other => panic!("{at}: {other}"),
         };
         if !is_of_kind {
-            found.push(format!("{at}: {value} is no {}", schema["type"]));
+            found.push(format!("{at}: {value} is not of type {}", schema["type"]));
         }
         let is_of_length = |of: &Value, count: usize| of.as_u64().is_none_or(|wanted| wanted == count as u64);
         for item in value.as_array().into_iter().flatten() {

@@ -68,7 +68,7 @@ impl Sink for RecordingSink {
 
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
         if let Some(lines) = &self.percepts {
-            assert_eq!(percepts.fields(), lines.fields(), "a sink is told the name of every field");
+            assert_eq!(percepts.fields(), lines.fields(), "a sink has the name of every field");
             for frame in 0..percepts.frames() {
                 self.line.clear();
                 lines.write(percepts, frame, &mut self.line);

@@ -66,7 +66,9 @@ impl FromStr for SinkSpec {
             "mcap" => Ok(Self::Mcap(rest.into())),
             "ros2-mcap" => Ok(Self::Ros2Mcap(rest.into())),
             "ros2" if is_namespace(rest) => Ok(Self::Ros2(rest.to_owned())),
-            "ros2" => bad(format!("`{rest}` is no namespace; write ros2, or ros2:/left_arm (letters, digits and _)")),
+            "ros2" => {
+                bad(format!("`{rest}` is not a namespace; write ros2, or ros2:/left_arm (letters, digits and _)"))
+            }
             "page" if rest.is_empty() => bad("nothing follows `page:`; give HOST:PORT, or `page` alone".to_owned()),
             "page" => Ok(Self::Page(Some(rest.to_owned()))),
             "zenoh" | "zenoh-percepts" => {
@@ -472,7 +474,7 @@ mod tests {
         assert!(why("page:").contains("HOST:PORT") && why("pgae:x").contains("did you mean `page:`"));
         assert!(why("ndjson:").contains("nothing follows"));
         for text in ["ros2:", "ros2:arm", "ros2:/", "ros2:/a/", "ros2:/2a", "ros2:/a b", "ros2:/a__b"] {
-            assert!(why(text).contains("is no namespace"), "{text}");
+            assert!(why(text).contains("is not a namespace"), "{text}");
         }
         assert!(why("a.txt").contains("ndjson:FILE"));
         assert_eq!(parsed("csv:a"), SinkSpec::Csv("a".into()));

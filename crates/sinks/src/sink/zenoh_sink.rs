@@ -170,7 +170,7 @@ impl Carrier<Vec<u8>> for LimbCarrier {
             self.told = Some(now);
             let is_read = self.publication.is_read();
             if self.is_read.replace(is_read) != Some(is_read) {
-                let what = if is_read { "somebody reads it" } else { "nobody reads it, as far as is known" };
+                let what = if is_read { "it has a subscriber" } else { "it has no known subscriber" };
                 tell(&format!("{}: {what}", self.name));
             }
             if let Some(taxels) = &self.taxels {

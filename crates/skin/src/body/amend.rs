@@ -24,7 +24,7 @@ impl Original {
     /// Returns a line for each mesh whose points cannot be changed because several nodes show it.
     ///
     /// # Errors
-    /// The file is no valid body any more.
+    /// The file is not a valid body any more.
     pub fn amend(&mut self, read: &Body, now: &Body, details: &Details) -> Result<Vec<String>> {
         let (columns, notes) = self.columns(read, now, details)?;
         let mut addition = self.addition();

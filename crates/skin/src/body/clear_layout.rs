@@ -53,7 +53,7 @@ fn clear_layout(original: &mut Original, keep_taxels: bool) -> Result<()> {
         used.into_iter().find(|name| !EXTENSIONS_WITHOUT_NODES.iter().any(|known| name.starts_with(known)));
     if let Some(name) = numbering_extension.filter(|_| shifts) {
         return Err(failed!(
-            "its old layout stands between nodes that the extension {name} may number; remove the taxels and fields in an \
+            "its old layout lies between nodes that the extension {name} may number; remove the taxels and fields in an \
              editor, or start from the file without them"
         ));
     }

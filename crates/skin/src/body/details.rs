@@ -77,7 +77,7 @@ impl Paint {
     }
 }
 
-/// Places marked by hand: an empty node, or the points of a mesh that are no taxels.
+/// Places marked by hand: an empty node, or the points of a mesh that are not taxels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
     /// The node's name.

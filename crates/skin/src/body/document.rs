@@ -67,7 +67,7 @@ impl Document {
     /// The numbers of accessor `index`, row by row, and the number of columns.
     pub(super) fn numbers(&self, index: usize) -> Result<(usize, Vec<f32>)> {
         let Some(Checked::Valid(shape)) = self.root.accessors.get(index).map(|accessor| accessor.type_) else {
-            return Err(failed!("accessor {index} is of no type that glTF has"));
+            return Err(failed!("the type of accessor {index} is not a type of glTF"));
         };
         let flat = match shape {
             Type::Scalar => self.floats::<1>(index)?.into_flattened(),
@@ -134,7 +134,7 @@ impl Document {
         let damaged = |what: &str| failed!("{what}: the file is damaged; export it again");
         let accessor = self.root.accessors.get(index).ok_or_else(|| damaged("there is no such accessor"))?;
         let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
-            return Err(damaged("its type is none that glTF has"));
+            return Err(damaged("its type is not a type of glTF"));
         };
         let component = component.0;
         let width = shape.multiplicity();
@@ -151,7 +151,7 @@ impl Document {
             None => bytes,
             Some(sparse) => {
                 let Checked::Valid(kind) = sparse.indices.component_type else {
-                    return Err(damaged("its sparse indices have no type that glTF has"));
+                    return Err(damaged("the type of its sparse indices is not a type of glTF"));
                 };
                 let (changed, offset) = (sparse.count.0, sparse.indices.byte_offset.0);
                 let places = self.strided(sparse.indices.buffer_view.value(), offset, changed, kind.0.size())?;
@@ -218,7 +218,7 @@ impl Elements<'_> {
         if self.width == width {
             return Ok(());
         }
-        Err(failed!("it has {} numbers an element where {width} belong; export the mesh again", self.width))
+        Err(failed!("it has {} numbers an element instead of {width}; export the mesh again", self.width))
     }
 
     fn rows<T: Copy + Default, const N: usize>(&self, number: &dyn Fn(&[u8]) -> T) -> Vec<[T; N]> {
@@ -367,7 +367,7 @@ pub(super) fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
             .map_err(|e| failed!("its data URI is not base64: {e}; export it again"));
     }
     if uri.contains("://") {
-        return Err(failed!("it lies at {uri}, and nothing is fetched from a network; save it beside the file"));
+        return Err(failed!("it lies at {uri}, and nothing is fetched from a network; save it next to the file"));
     }
     let folder =
         folder.ok_or_else(|| failed!("it lies in a file of its own, `{uri}`; give a .glb, which holds everything"))?;
@@ -378,7 +378,7 @@ pub(super) fn fetch(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>> {
     let kind = std::fs::metadata(&path).map_err(|e| Error::io(&path, &e))?;
     if !kind.is_file() {
         // A device may be endless.
-        return Err(Error::failed("this is no plain file; save the buffer beside the body").at(path.display()));
+        return Err(Error::failed("this is not a regular file; save the buffer next to the body").at(path.display()));
     }
     limits::read(&path, MAX_BODY_BYTES).map_err(|e| Error::io(&path, &e))
 }

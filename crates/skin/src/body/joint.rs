@@ -100,7 +100,7 @@ impl LinkJoint {
             return Err(failed!("joint version {version} is newer than this program; update it"));
         }
         let json: JointJson = serde_json::from_str(text)
-            .map_err(|e| failed!("its joint is no JSON of a joint: {e}; repair or remove `{JOINT_KEY}`"))?;
+            .map_err(|e| failed!("its joint is not the JSON of a joint: {e}; repair or remove `{JOINT_KEY}`"))?;
         let axis = DVec3::from_array(json.axis).try_normalize();
         let axis = axis.ok_or_else(|| Error::failed("the axis of its joint has no direction; give it one"))?;
         if let Some([least, greatest]) = json.limits

@@ -114,7 +114,7 @@ impl FieldSpec {
             return Err(bad(format!("layout version {version} is newer than this program; update it")));
         }
         let json: FieldJson =
-            serde_json::from_str(text).map_err(|e| bad(format!("its field JSON is not that of a field: {e}")))?;
+            serde_json::from_str(text).map_err(|e| bad(format!("its JSON is not the JSON of a field: {e}")))?;
         if json.name.is_empty() {
             return Err(bad("a field has an empty name; give it one".into()));
         }

@@ -66,7 +66,7 @@ impl<'a> Nodes<'a> {
             depth[node] = parent[node].map_or(1, |up: usize| depth[up] + 1);
             if depth[node] > MAX_NODE_DEPTH {
                 return Err(failed!(
-                    "node {node} has {MAX_NODE_DEPTH} nodes above it, and no more may stand within each other; is the file damaged?"
+                    "node {node} has {MAX_NODE_DEPTH} nodes above it, one too many; is the file damaged?"
                 ));
             }
             let local = local_transform(&raw[node]);

@@ -38,7 +38,7 @@ impl Original {
     /// Opens the `.glb` or `.gltf` at `path`.
     ///
     /// # Errors
-    /// The file cannot be read or is no valid glTF.
+    /// The file cannot be read or is not a valid glTF.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = limits::read(path, MAX_BODY_BYTES).map_err(|e| Error::io(path, &e))?;
@@ -128,7 +128,7 @@ impl Original {
                 Ok([0x89, b'P', b'N', b'G', ..]) => "\"image/png\"",
                 Ok([0xFF, 0xD8, 0xFF, ..]) => "\"image/jpeg\"",
                 _ => {
-                    self.notes.push(format!("the image `{uri}` was not taken in; keep it beside the file"));
+                    self.notes.push(format!("the image `{uri}` was not included; keep it next to the file"));
                     continue;
                 }
             };

@@ -24,7 +24,7 @@ use crate::limits::{self, MAX_BODY_BYTES, MAX_FIELD_DEPTH, MAX_TRIANGLES, MAX_VE
 pub(super) struct Sources {
     /// Per surface its node, and the primitive within the node's mesh.
     pub(super) surfaces: Vec<(usize, usize)>,
-    /// Points that are no taxels: the node's name, and positions in the body at rest, m.
+    /// Points that are not taxels: the node's name, and positions in the body at rest, m.
     pub(super) points: Vec<(String, Vec<DVec3>)>,
     /// Per taxel of the body, in its order.
     pub(super) taxels: Vec<TaxelSource>,
@@ -49,7 +49,7 @@ impl Body {
     /// Reads the body in the `.glb` or `.gltf` at `path`.
     ///
     /// # Errors
-    /// The file cannot be read, is no valid glTF, is compressed, or its layout is inconsistent; with the place.
+    /// The file cannot be read, is not a valid glTF, is compressed, or its layout is inconsistent; with the place.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = limits::read(path, MAX_BODY_BYTES).map_err(|e| Error::io(path, &e))?;
@@ -154,7 +154,7 @@ fn joints_of(
     for (index, joint) in skin.joints.iter().enumerate() {
         let link = nodes
             .link_above(joint.value())
-            .ok_or_else(|| Error::failed("a joint is no link; export the file again"))?;
+            .ok_or_else(|| Error::failed("a joint is not a link; export the file again"))?;
         let joint_from_mesh = match inverse_binds.get(index) {
             Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from))),
             None => DAffine3::IDENTITY,
@@ -388,7 +388,7 @@ fn complete_normals(body: &mut Body) -> Result<()> {
             ));
         }
         body.findings.push(format!(
-            "{} taxels on link `{}` have no normal of their own; taken from the surface",
+            "{} taxels on link `{}` have no normal of their own; the surface's are used",
             taxels.len(),
             body.links[link].name
         ));

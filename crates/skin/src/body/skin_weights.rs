@@ -12,7 +12,7 @@ use crate::error::Result;
 /// reduced by [`heaviest_four`].
 ///
 /// # Panics
-/// A corner is no vertex of `skinning`.
+/// A corner is not a vertex of `skinning`.
 #[must_use]
 pub fn blend_skinning(skinning: &Skinning, corners: [u32; 3], barycentric: [f64; 3]) -> ([u16; 4], [f32; 4]) {
     let mut carriers: Vec<(u16, f64)> = Vec::new();

@@ -43,7 +43,7 @@ impl StoredEdges {
     /// The edges in the JSON string `text`.
     #[doc(hidden)]
     pub fn from_json(text: &str) -> Result<Self> {
-        let json: EdgesJson = serde_json::from_str(text).map_err(|e| failed!("they are no JSON of edges: {e}"))?;
+        let json: EdgesJson = serde_json::from_str(text).map_err(|e| failed!("they are not the JSON of edges: {e}"))?;
         if json.version > VERSION {
             return Err(failed!("their version {} is newer than this program", json.version));
         }
@@ -117,7 +117,7 @@ mod tests {
         assert!(why(r#"{"version":1,"edges":{"1":[0.1,1]}}"#).contains("higher"));
         assert!(why(r#"{"version":1,"edges":{"1":[0.1,5,3]}}"#).contains("order"));
         assert!(why(r#"{"version":1,"edges":{"1":[0],"01":[0]}}"#).contains("twice"));
-        assert!(why("[]").contains("no JSON of edges"));
+        assert!(why("[]").contains("not the JSON of edges"));
         let two = [r#"{"version":1,"edges":{"1":[0]}}"#.to_owned(), r#"{"version":1,"edges":{"2":[0]}}"#.to_owned()];
         assert!(StoredEdges::of_nodes(two.iter()).unwrap_err().to_string().contains("several"));
         assert_eq!(StoredEdges::of_nodes([&two[0], &two[0]].into_iter()).unwrap().unwrap().rows.len(), 1);

@@ -40,7 +40,7 @@ pub struct TaxelRow {
 /// `flat` one may leave out `z`. Ids are unique for each link if `flat`, else in all of the table.
 ///
 /// # Errors
-/// It is no such table; with the line.
+/// It is not such a table; with the line.
 pub fn read_taxel_table(reader: impl Read, flat: bool) -> Result<Vec<TaxelRow>> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(reader);
     let broken = |e: &csv::Error| {
@@ -120,11 +120,12 @@ impl Columns {
         let given = |column: Option<usize>| column.map(cell).filter(|text| !text.is_empty());
         let number = |column: usize| {
             let number = cell(column).parse().ok().filter(|x: &f64| x.is_finite());
-            number.ok_or_else(|| failed!("`{}` is no coordinate; give metres", cell(column)))
+            number.ok_or_else(|| failed!("`{}` is not a coordinate; give metres", cell(column)))
         };
         let id = cell(self.id).parse().ok().filter(|id| *id <= MAX_TAXEL_ID);
-        let id =
-            id.ok_or_else(|| failed!("`{}` is no id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(self.id)))?;
+        let id = id.ok_or_else(|| {
+            failed!("`{}` is not an id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(self.id))
+        })?;
         let [x, y, z] = self.place.map(|column| column.map_or(Ok(0.0), number));
         let normal = match self.normal {
             Some([x, y, z]) if [x, y, z].iter().any(|&column| !cell(column).is_empty()) => {
@@ -150,7 +151,7 @@ impl Columns {
 
 fn area_of(text: &str) -> Result<f64> {
     let area = text.parse().ok().filter(|area: &f64| *area > 0.0 && *area <= MAX_TAXEL_AREA_M2);
-    area.ok_or_else(|| failed!("`{text}` is no area of a taxel; give square metres, 1e-4 for a square centimetre"))
+    area.ok_or_else(|| failed!("`{text}` is not an area of a taxel; give square metres, 1e-4 for a square centimetre"))
 }
 
 fn modality_of(text: &str) -> Result<Modality> {
@@ -209,8 +210,8 @@ mod tests {
         assert!(why("id,x,y,z,weight\n").contains("line 1: there is no column `weight`"));
         assert!(why("id,x,y,z,nx\n1,0,0,0,1\n").contains("three columns"));
         assert!(why("id,x,y,z\n1,0,0,0\n1,0,0,0\n").contains("line 3: id 1 is on line 2 already"));
-        assert!(why("id,x,y,z\n1,0,zero,0\n").contains("line 2: `zero` is no coordinate"));
-        assert!(why("id,x,y,z,area\n1,0,0,0,25\n").contains("line 2: `25` is no area"));
+        assert!(why("id,x,y,z\n1,0,zero,0\n").contains("line 2: `zero` is not a coordinate"));
+        assert!(why("id,x,y,z,area\n1,0,0,0,25\n").contains("line 2: `25` is not an area"));
         assert!(why("id,x,y,z,nx,ny,nz\n1,0,0,0,0,0,0\n").contains("its normal is zero"));
         assert!(why("id,x,y,z,modality\n1,0,0,0,taste\n").contains("no modality `taste`"));
         assert!(why("id,x,y,z\n").contains("no rows"));

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_plane_cannot_show_is_said_by_name() {
+    fn what_a_plane_cannot_show_is_reported_by_name() {
         let (before, Recharted { fields, kept }) = recharted(bundled::HUMANOID, ChartKind::Plane);
         for (name, why) in &kept {
             let at = before.fields.iter().position(|field| field.name == *name).unwrap();

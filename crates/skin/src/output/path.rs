@@ -27,7 +27,7 @@ impl OutputPath {
     /// The file at `path`, an input to be edited in place.
     ///
     /// # Errors
-    /// It does not exist, or is no regular file.
+    /// It does not exist, or is not a regular file.
     pub fn edit(path: impl AsRef<Path>) -> Result<Self> {
         let name = path.as_ref().to_owned();
         match Destination::of(&name).map_err(|e| Error::io(&name, &e))? {

@@ -26,7 +26,7 @@ fn refused(made: Result<OutputPath>) -> String {
 }
 
 #[test]
-fn an_input_is_no_output_however_it_is_spelt() {
+fn an_input_is_not_an_output_however_it_is_spelt() {
     let (folder, input) = with_input();
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("inner")).unwrap();
@@ -115,7 +115,7 @@ fn a_part_takes_nobodys_name() {
 }
 
 #[test]
-fn what_cannot_be_written_is_told_before() {
+fn what_cannot_be_written_is_reported_before() {
     let (folder, file) = with_input();
     assert_eq!(OutputPath::new(folder.path().join("no/such"), false, &[]).unwrap_err().kind(), ErrorKind::NotFound);
     for is_folder in [folder.path().to_owned(), folder.path().join("new/"), folder.path().join(".."), "".into()] {

@@ -117,7 +117,7 @@ pub struct Calibration {
     pub body: Option<String>,
     /// One entry a taxel, in the body's order.
     pub taxels: Vec<TaxelCalibration>,
-    /// By taxel, the raw values that are no reading, in single precision as raw values are; empty if no taxel has any.
+    /// By taxel, the raw values that are not readings, in single precision as raw values are; empty if no taxel has any.
     pub missing: Vec<Vec<f32>>,
     /// The curves that [`Response::Curve`] indexes.
     pub curves: Vec<Curve>,
@@ -173,7 +173,7 @@ impl Calibration {
         curve.map(Some)
     }
 
-    /// Whether `value` of the taxel `index` is one of those that are no reading.
+    /// Whether `value` of the taxel `index` is not a reading.
     #[doc(hidden)]
     pub fn is_no_reading(&self, index: usize, value: RawValue) -> bool {
         self.missing.get(index).is_some_and(|codes| {

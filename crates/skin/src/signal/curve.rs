@@ -181,7 +181,7 @@ mod tests {
     use crate::signal::FsrSignal::{Linear, Raw};
 
     #[test]
-    fn a_table_that_makes_no_sense_is_told_apart() {
+    fn a_table_that_makes_no_sense_is_distinguished() {
         let why = |raw: &[f64], p: &[f64]| Curve::new(raw, p).unwrap_err().to_string();
         assert_eq!(
             why(&[0.0, 1.0, 2.0], &[0.0, 9.0, 8.0]),
@@ -209,7 +209,7 @@ mod tests {
         let turned = curve.scaled(-1.0).unwrap();
         assert_eq!(turned.knots(), [[-30.0, 8.0], [-10.0, 1.0], [0.0, 0.0]]);
         assert_eq!((curve.rise(4.0), turned.rise(-4.0)), (4.0, 4.0));
-        // As it is written, a gain is no single-precision number.
+        // As it is written, a gain is not a single-precision number.
         let tenth = curve.scaled(-0.1).unwrap();
         assert_eq!(tenth.written(), [[-30.0, 0.8], [-10.0, 0.1], [0.0, 0.0]]);
         assert_eq!(tenth.knots(), [[-30.0, 0.8], [-10.0, 0.1], [0.0, 0.0]]);

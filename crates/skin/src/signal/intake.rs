@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_raw_value_that_is_no_reading_is_missing_and_held_as_such() {
+    fn a_raw_value_that_is_not_a_reading_is_missing_and_held_as_such() {
         let calibration = Calibration::parse("[taxel.2]\nmissing = [30000]", &[1, 2, 3]).unwrap();
         let mut intake = Intake::new(calibration.clone(), Vec::new(), 0.0);
         assert!(intake.picks(&[0, 1, 2]).is_none());

@@ -205,7 +205,7 @@ impl BoardKeys {
             let end = channel + ids.len();
             let most = channels.unwrap_or(MAX_CHANNELS as usize);
             if end > most {
-                let what = format!("this goes on to channel {}, and the board has {most} channels", end - 1);
+                let what = format!("this reaches channel {}, and the board has {most} channels", end - 1);
                 return Err(text.wrong(keys.span(), what));
             }
             taxels.resize(taxels.len().max(end), None);
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn what_is_wrong_is_reported_with_its_line() {
         let why = |text: &str| crate::keys::without_column(&Wiring::from_text(text).unwrap_err().to_string());
         let board = |rest: &str| format!("[[board]]\nid = 1\n{rest}\n");
         let run = |run: &str| board(&format!("taxels = [{run}]"));

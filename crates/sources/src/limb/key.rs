@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 pub fn checked_key(key: &str) -> Result<String> {
     if key.split('/').any(str::is_empty) {
         return Err(Error::usage(format!(
-            "`{key}` is no key; write words between single slashes, such as robot/left_arm"
+            "`{key}` is not a key; write words between single slashes, such as robot/left_arm"
         )));
     }
     if let Some(sign) = key.chars().find(|sign| "*$?#".contains(*sign)) {

@@ -29,12 +29,12 @@ impl Network {
     /// Opens a session: as the file at `config` says, in Zenoh's own form, else on this computer alone.
     ///
     /// # Errors
-    /// The file is no configuration of Zenoh's; the session cannot be opened.
+    /// The file is not a configuration of Zenoh's; the session cannot be opened.
     pub fn open(config: Option<&Path>, side: Side) -> Result<Self> {
         let place = config.map_or_else(|| "zenoh".to_owned(), |path| path.display().to_string());
         let configured = match config {
             Some(path) => Config::from_file(path)
-                .map_err(|e| failed!("no configuration of Zenoh: {}", without_places(&e)).at(&place))?,
+                .map_err(|e| failed!("not a configuration of Zenoh: {}", without_places(&e)).at(&place))?,
             None => loopback(side).map_err(|e| failed!("{e}").at(&place))?,
         };
         let session = zenoh::open(configured).wait().map_err(|e| {

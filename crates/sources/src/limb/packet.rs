@@ -145,7 +145,7 @@ pub fn open(bytes: &[u8]) -> Result<(Head, Packet<'_>), String> {
     let of_limb = |boot, sequence, time_us| Head { board: 0, boot, sequence, time_us };
     if bytes.first() == Some(&b'{') {
         let line: Percepts<'_> =
-            serde_json::from_slice(bytes).map_err(|e| format!("it sends JSON that are no percepts: {e}"))?;
+            serde_json::from_slice(bytes).map_err(|e| format!("it sends JSON that is not percepts: {e}"))?;
         if line.somatic_limb != u32::from(VERSION) {
             return Err(other_version(line.somatic_limb));
         }
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_packet_is_told() {
+    fn what_is_not_a_packet_is_reported() {
         let mut frame = Vec::new();
         frame_packet(&mut frame, 0, 0, 0.0, 1, &[RawValue::new(1.0)]);
         for cut in 0..frame.len() {

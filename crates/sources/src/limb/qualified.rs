@@ -16,7 +16,7 @@ use super::packet::Percepts;
 pub(crate) fn qualified(key: &str, percepts: &Percepts<'_>) -> Result<String, String> {
     let mut to = format!(",\"frame\":{}", percepts.frame);
     let written = Qualifier { key, to: &mut to }.keys(percepts);
-    written.map_err(|e| format!("it sends JSON that are no percepts: {e}"))?;
+    written.map_err(|e| format!("it sends JSON that is not percepts: {e}"))?;
     to.push('}');
     Ok(to)
 }
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_ndjson_is_told() {
+    fn what_is_not_ndjson_is_reported() {
         for line in [
             r#""t":0,"frame":0,"touches":3,"fields":[]}"#,
             r#""t":0,"frame":0,"touches":[3],"fields":[]}"#,
@@ -180,7 +180,7 @@ mod tests {
             r#""t":0,"frame":0,"fields":[{"field":"a","touches":"b"}]}"#,
         ] {
             let why = told("left", line).unwrap_err();
-            assert!(why.starts_with("it sends JSON that are no percepts: ") && !why.contains('\n'), "{why}");
+            assert!(why.starts_with("it sends JSON that is not percepts: ") && !why.contains('\n'), "{why}");
         }
     }
 }

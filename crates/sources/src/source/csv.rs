@@ -30,7 +30,7 @@ pub struct CsvSource {
     /// Rows that were looked at before their turn, with the numbers of their lines.
     ahead: VecDeque<(ByteRecord, u64)>,
     taxels: Vec<u32>,
-    /// Columns that are no sensor, from 0, ascending.
+    /// Columns that are not a sensor, from 0, ascending.
     left_out: Vec<usize>,
     time: Time,
     frames: u64,
@@ -172,7 +172,7 @@ impl CsvSource {
         let taxel = index.checked_sub(before).and_then(|index| self.taxels.get(index));
         let place = taxel.map_or(format!("column {}", index + 1), |id| format!("column {} (taxel {id})", index + 1));
         let word = shortened(&String::from_utf8_lossy(cell.trim_ascii()));
-        Some(failed!("`{word}` has a quote; numbers stand without quotes: remove it").at(place))
+        Some(failed!("`{word}` has a quote; numbers have no quotes: remove it").at(place))
     }
 
     fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
@@ -304,7 +304,7 @@ impl Read for LimitedReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.row_bytes as u64 > MAX_LINE_BYTES {
             return Err(io::Error::other(format!(
-                "a row of over {} MiB: no CSV, or its lines have no end",
+                "a row of over {} MiB: not a CSV, or without ends of lines",
                 MAX_LINE_BYTES >> 20
             )));
         }
@@ -536,13 +536,13 @@ mod tests {
         }
         assert_eq!(
             source.next_frame(&mut frame).unwrap_err().to_string(),
-            "a.csv: line 11: column 3 (taxel 7): `\"2` has a quote; numbers stand without quotes: remove it"
+            "a.csv: line 11: column 3 (taxel 7): `\"2` has a quote; numbers have no quotes: remove it"
         );
         assert!(why("t,4\n\"0,1\n1,2\n", None).starts_with("a.csv: line 2: column 1: `\"0` has a quote"));
         assert!(why("t,4\n0,1\"\"2\n", None).starts_with("a.csv: line 2: column 2 (taxel 4): `1\"\"2` has a quote"));
         // A comma for the decimal point, as some spreadsheets write it.
         assert!(why("t,4\n0,\"1,5\"\n1,2\n", None).starts_with("a.csv: line 2: column 2 (taxel 4): `\"1` has"));
-        assert!(why("t,\"4\n0,1\n", None).contains("column 2 is headed `\"4`, which is not a taxel id; ids stand"));
+        assert!(why("t,\"4\n0,1\n", None).contains("column 2 is headed `\"4`, which is not a taxel id; ids have"));
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub(super) struct Header {
     /// The first column, if it is the time.
     pub(super) time: Option<TimeColumn>,
     pub(super) taxels: Vec<u32>,
-    /// Columns that are no sensor, from 0, ascending.
+    /// Columns that are not a sensor, from 0, ascending.
     pub(super) left_out: Vec<usize>,
     /// What is to be said of how it was understood.
     pub(super) notes: Vec<String>,
@@ -33,7 +33,7 @@ pub(super) fn is_doubtful(first: &ByteRecord) -> bool {
 /// Reads the header `first`; `below` are the rows under it if it is doubtful. `has_rate` is whether a rate is given.
 ///
 /// # Errors
-/// It is no header. A usage error where flags are the way out.
+/// It is not a header. A usage error where flags are the way out.
 pub(super) fn read(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> Result<Header> {
     let unit = first.get(0).map(|cell| unit_in_head(&word(cell))).transpose().map_err(|e| e.at("column 1"))?.flatten();
     if unit.is_some() && has_rate {
@@ -158,7 +158,7 @@ fn no_header(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> Error 
         _ => "",
     };
     Error::usage(format!(
-        "row 1 is a frame of {} cells, and no header `t,<taxel id>,...`; {rate}add --grid {}, which reads {}",
+        "row 1 is a frame of {} cells, not a header `t,<taxel id>,...`; {rate}add --grid {}, which reads {}",
         first.len(),
         grid_of(sensors.max(1)),
         reads.join(" and ")
@@ -185,7 +185,7 @@ fn header_id(column: usize, cell: &[u8], way_out: impl FnOnce() -> String) -> Re
     let remedy = if cell.starts_with(b"\xFF\xFE") || cell.starts_with(b"\xFE\xFF") {
         "the file is UTF-16; save it as UTF-8".to_owned()
     } else if word.contains('"') {
-        "ids stand without quotes: remove the quote".to_owned()
+        "ids have no quotes: remove the quote".to_owned()
     } else if word.contains([';', '\t']) {
         "columns are separated by commas".to_owned()
     } else if word.contains('\r') {

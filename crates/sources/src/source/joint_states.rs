@@ -44,7 +44,7 @@ impl JointStates {
     /// Reads the recording at `path`: NDJSON if its first byte is `{`, else CSV.
     ///
     /// # Errors
-    /// It cannot be read, or a line is no joint state; with the line.
+    /// It cannot be read, or a line is not a joint state; with the line.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let failed = |e: std::io::Error| Error::io(path, &e);

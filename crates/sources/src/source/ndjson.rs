@@ -503,7 +503,7 @@ mod tests {
         assert!(second("hello").contains("one line like"));
         // With its newline, a line that is cut short is an error.
         assert!(second("{\"t\":1,\"val").contains("line 2"));
-        // The same taxel on the next line is no duplicate.
+        // The same taxel on the next line is not a duplicate.
         assert_eq!(read("{\"t\":0,\"values\":{\"4\":1}}\n{\"t\":1,\"values\":{\"4\":1}}\n").unwrap().0.len(), 2);
     }
 
@@ -534,7 +534,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_is_told_from_json() {
+    fn csv_is_distinguished_from_json() {
         for line in ["t,4,7", "0.5, 1,-2e3,", "\u{feff}t,4", "4,7\r"] {
             assert!(why(&format!("{line}\n0,1,2\n")).ends_with("use --source csv:-"), "{}", why(line));
         }

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_is_told_once() {
+    fn a_loss_is_reported_once() {
         let (frames, losses) = played("t,4\n0,1\n1,2\n2", Cut { times: 3, ..Cut::WHOLE }, 99);
         assert_eq!((frames.len(), losses.len()), (6, 1), "{losses:?}");
     }

@@ -116,7 +116,7 @@ impl SourceSpec {
         let ending = |wanted: &str| Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
         if kinds.contains(&"serial") && is_port(text) {
             return bad(format!(
-                "a serial port is written text:{text} where its board prints numbers, and serial:{text} where that speaks somatic's protocol"
+                "`{text}` is a serial port; write text:{text} if its board prints numbers, or serial:{text} if it speaks somatic's protocol"
             ));
         }
         let (kind, rest) = match text.split_once(':') {
@@ -162,7 +162,7 @@ impl SourceSpec {
                 let (topic, kind) = rest.split_once('@').map_or((rest, None), |(topic, kind)| (topic, Some(kind)));
                 if !topic.starts_with('/') || kind.is_some_and(str::is_empty) {
                     return bad(format!(
-                        "`{rest}` is no topic; write ros2:/TOPIC, or ros2:/TOPIC@sensor_msgs/msg/PointCloud2"
+                        "`{rest}` is not a topic; write ros2:/TOPIC, or ros2:/TOPIC@sensor_msgs/msg/PointCloud2"
                     ));
                 }
                 // As ROS 1 and people write types.
@@ -253,7 +253,7 @@ impl SourceSpec {
             Self::Sim(path) => Ok(Box::new(SimulatedSource::open(path)?)),
             Self::Ros2Mcap(name) => {
                 let what = if cfg!(feature = "mcap") {
-                    "a bag of ROS 2 is read for a body: by `somatic run`, or `robot::BagSource`"
+                    "a ROS 2 bag is read for a body: by `somatic run`, or `robot::BagSource`"
                 } else {
                     "this build reads no MCAP; build with feature `mcap`"
                 };

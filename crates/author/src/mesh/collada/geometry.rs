@@ -163,7 +163,7 @@ impl<'a> Mesh<'_, 'a> {
         for input in node.children().filter(|child| child.has_tag_name("input")) {
             let offset: u16 = match input.attribute("offset").map(|text| text.trim().parse()) {
                 None => 0,
-                Some(offset) => offset.map_err(|_| file.at(input, "`offset` is no small whole number"))?,
+                Some(offset) => offset.map_err(|_| file.at(input, "`offset` is not a small whole number"))?,
             };
             width = width.max(usize::from(offset) + 1);
             if input.attribute("semantic") == Some("VERTEX") {
@@ -300,7 +300,7 @@ mod tests {
             (whole("1", "4294967295", "0 0 0 1 0 2"), "fewer corners than <vcount>"),
             (whole("1", "3", "0 0 0 1 0 2 0 3"), "more corners than <vcount>"),
             (whole("1", "3", "0 0 0 1 0 4"), "a corner is vertex 4, of 4"),
-            (whole("1", "3", "0 0 0 1 0 -1"), "<p> has `-1`, which is no such number"),
+            (whole("1", "3", "0 0 0 1 0 -1"), "<p> has `-1`, which is not a valid number"),
             (whole("1", "3", "0 0 0 1 0"), "ends within a corner"),
             (format!("<triangles count=\"1\">{INPUTS}<p>0 0 0 1 0 2 0 3</p></triangles>"), "within a triangle"),
             (format!("<polygons>{INPUTS}<ph><p>0 0 0 1 0 2</p></ph></polygons>"), "holes"),

@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leads_nowhere_is_said_with_its_line() {
+    fn what_leads_nowhere_is_reported_with_its_line() {
         for (part, other, wanted) in [
             ("url=\"#g\"", "url=\"#h\"", "line 10: not a valid COLLADA mesh: there is no <geometry> called `h`"),
             ("url=\"#g\"", "url=\"b.dae#g\"", "`b.dae#g` is in another file"),

@@ -18,7 +18,7 @@ impl<'a> File<'a> {
         words.flat_map(str::split_ascii_whitespace).map(move |word| {
             let wrong = || {
                 let word: String = word.chars().take(20).collect();
-                self.at(node, format!("<{}> has `{word}`, which is no such number", node.tag_name().name()))
+                self.at(node, format!("<{}> has `{word}`, which is not a valid number", node.tag_name().name()))
             };
             word.parse().map_err(|_| wrong())
         })

@@ -132,7 +132,7 @@ fn place(places: &mut Places<'_>, sensor: &MjSensor, first_id: u32, skin: &mut S
             SensorKind::TouchGrid { .. } => "look past every shape",
         };
         skin.notes.push(format!(
-            "sensor `{}`: {missing} of its {count} taxels {why}, and are left out; ids stay those of its data",
+            "sensor `{}`: {missing} of its {count} taxels {why}, and are left out; ids stay as in its data",
             sensor.name
         ));
     }
@@ -168,7 +168,7 @@ fn on_vertices(places: &Places<'_>, sensor: &MjSensor, geom: &str, mesh: &str) -
     }
     if vertices.positions.is_empty() {
         return Err(failed!(
-            "mesh `{mesh}` has no vertices that are known here; save it as an .stl or .obj file, or take a builtin plate or wedge"
+            "mesh `{mesh}` has no vertices that are known here; save it as an .stl or .obj file, or use a builtin plate or wedge"
         ));
     }
     let mut normals = vec![DVec3::ZERO; vertices.positions.len()];

@@ -21,7 +21,7 @@ const TOUCH_GRID: &str = "mujoco.sensor.touch_grid";
 /// The model in the file at `path`.
 ///
 /// # Errors
-/// It is no MJCF, or has parts that only MuJoCo can put together; with the line.
+/// It is not an MJCF, or has parts that only MuJoCo can put together; with the line.
 pub(super) fn read(path: &Path) -> Result<Model> {
     let text = included(path)?;
     Reader::read(&text, path.parent().unwrap_or(Path::new(""))).map_err(|e| e.at(path.display()))

@@ -171,7 +171,7 @@ impl Gate {
         }
         *last = *bits;
         let faulty = calibrate::tile(simd, plan, tile, index * LANES, bits, p, status);
-        // Pressures are no NaN, and no −0: where they are equal their bits are.
+        // Pressures are never NaN or −0: where they are equal their bits are.
         if self.known && same(simd, cast_ref(p), cast_ref(&pressures[index])) && same(simd, status, &statuses[index]) {
             return;
         }

@@ -129,7 +129,7 @@ fn open_with(backends: wgpu::Backends, features: wgpu::Features) -> Result<Devic
     device_of(&best(backends)?, features)
 }
 
-/// The best adapter of `backends`: one that is no hardware only where there is no other.
+/// The best adapter of `backends`: one that is not hardware only where there is no other.
 fn best(backends: wgpu::Backends) -> Result<wgpu::Adapter> {
     pollster::block_on(async {
         let options = wgpu::RequestAdapterOptions {

@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_gpus_without_a_driver_are_told() {
+    fn only_gpus_without_a_driver_are_reported() {
         let bus = tempfile::tempdir().unwrap();
         for (place, class, vendor) in [
             ("0000:00:00.0", "0x060000\n", "0x8086\n"),

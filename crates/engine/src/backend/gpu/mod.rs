@@ -122,7 +122,7 @@ impl Gpu {
         let pressures = working("pressures", quads * slots * 16);
         let statuses = working("statuses", quads * slots * 4);
         let results = working("results", frames * fields * 4 * columns.count() as u64);
-        // What the frame before left; buffers begin as zeros, and zero is no contact.
+        // What the frame before left; buffers begin as zeros, and zero is not a contact.
         let (touched, last) = (working("touched", fields * 4), working("last", fields * 16));
 
         let wanted = plan.stages();

@@ -29,7 +29,7 @@ fn parse(shader: &Shader) -> Module {
 /// (name, offset) of every member of the WGSL struct `name`, and its size.
 fn members(module: &Module, name: &str) -> (Vec<(String, u32)>, u32) {
     let (_, found) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).expect("the struct is there");
-    let TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is no struct") };
+    let TypeInner::Struct { members, span } = &found.inner else { panic!("{name} is not a struct") };
     (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
 }
 
@@ -61,7 +61,7 @@ fn constant(module: &Module, name: &str) -> Option<u32> {
     let (_, found) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
     match module.global_expressions[found.init] {
         naga::Expression::Literal(naga::Literal::U32(value)) => Some(value),
-        _ => panic!("{name} is no u32"),
+        _ => panic!("{name} is not a u32"),
     }
 }
 
@@ -222,7 +222,7 @@ fn a_device_that_is_lost_is_an_error_in_one_line_and_stays_one() {
 }
 
 #[test]
-fn an_error_that_nobody_asked_for_is_told_by_the_next_call() {
+fn an_error_that_nobody_asked_for_is_reported_by_the_next_call() {
     let mut gpu = on_noop();
     // A copy beyond a buffer's end, which no call of the backend's own makes.
     let mut encoder = gpu.device.encoder();

@@ -16,7 +16,7 @@ use crate::stage::angle;
 pub(super) const PENALTY: f64 = 4.6;
 /// χ² a pressed taxel more than parameters over which it is doubtful that a contact explains a touch: residuals of 2σ on average.
 const MISFIT: f64 = 4.0;
-/// What a force is off by for a layer that is no Gaussian, as a share of it: the standard deviation over layers.
+/// What a force is off by for a layer that is not a Gaussian, as a share of it: the standard deviation over layers.
 const LAYER_SHARE: f64 = 0.04;
 /// A descent has come to rest when it could still lower χ² by this: parameters are within 0.1σ.
 const AT_REST: f64 = 0.01;

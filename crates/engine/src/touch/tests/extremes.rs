@@ -155,7 +155,7 @@ fn shares_of_fields_and_links_add_up() {
     assert_eq!(links, [(0, 3.0), (1, 5.0)]);
     // (1·1 + 2·2 + 2·3 + 3·4) / 8 pitches, in the second link.
     assert!(touch.position.distance(DVec3::X * (0.01 * 23.0 / 8.0 - 0.03)) < 1e-8);
-    // All that is pressed on a link, with what is no part of the touch.
+    // All that is pressed on a link, with what is not part of the touch.
     let frame = step(&mut touches, 0.1, &[1.0, 0.0, 2.0, 2.0, 3.0, 0.0]);
     assert_eq!(frame.touches.len(), 2);
     let mut on_links = Vec::new();

@@ -124,7 +124,7 @@ fn two_fingers_are_two_and_a_rod_is_one() {
 }
 
 #[test]
-fn fingers_that_meet_are_told_apart_longer_than_they_would_be_found() {
+fn fingers_that_meet_are_distinguished_longer_than_they_would_be_found() {
     // Towards each other and apart again: joined at a smaller distance than parted, once each.
     let mut touches = touches(grid_parts(30, 9, 0.005));
     let at = |apart_m: f64| [-0.5, 0.5].map(|side| (DVec3::new(0.072 + side * apart_m, 0.02, 0.0), 1.0));

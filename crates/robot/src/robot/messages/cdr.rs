@@ -71,7 +71,7 @@ pub trait Cdr: Sized {
     /// Writes it.
     fn write(&self, to: &mut CdrWriter);
 
-    /// Reads it; `None` where the bytes are no such value.
+    /// Reads it; `None` where the bytes are not such a value.
     fn read(from: &mut CdrReader<'_>) -> Option<Self>;
 
     /// Writes all of `items`, without their number.

@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_is_told_in_the_frame_that_the_touch_was_in_last() {
+    fn an_end_is_reported_in_the_frame_that_the_touch_was_in_last() {
         let skin =
             SkinNames { links: ["arm", "hand"].map(str::to_owned).into(), world: "map".into(), ..SkinNames::default() };
         let mut touches = Touches::new(skin);

@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn why_a_link_has_none_is_said() {
+    fn why_a_link_has_none_is_reported() {
         let (mut body, ids) = hand();
         let remarks = |body: &Body, calibration: &str, scene: Scene, sent: &[u32]| {
             LinkWrenches::new(body, engine(body, &ids, calibration, scene).plan(), sent).remarks().join("\n")

@@ -101,7 +101,7 @@ impl ArrowTable {
     /// # Panics
     /// The percepts have another number of fields than the session.
     pub fn push(&mut self, percepts: &Percepts, frame: usize) {
-        assert_eq!(percepts.fields(), self.words.names.len(), "a table is told the name of every field");
+        assert_eq!(percepts.fields(), self.words.names.len(), "a table has the name of every field");
         match self.kind {
             TableKind::Touches => touch_rows(percepts, frame).for_each(|row| self.push_row(&row)),
             TableKind::SelfContacts => self_contact_rows(percepts, frame).for_each(|row| self.push_row(&row)),

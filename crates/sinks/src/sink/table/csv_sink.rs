@@ -231,7 +231,7 @@ fn flow_of(written: io::Result<()>, name: &str) -> Result<Flow> {
 
 impl Sink for CsvSink {
     fn write(&mut self, percepts: &Percepts) -> Result<Flow> {
-        assert_eq!(percepts.fields(), self.words.names.len(), "a sink is told the name of every field");
+        assert_eq!(percepts.fields(), self.words.names.len(), "a sink has the name of every field");
         if self.closed {
             return Ok(Flow::Closed);
         }

@@ -239,7 +239,7 @@ impl Cells {
             }
             marched.run();
         }
-        // Per edge the point that all of it belongs to on this side, if it is no border yet.
+        // Per edge the point that all of it belongs to on this side, if it is not a border yet.
         let mut owner = vec![NONE; topology.across.len()];
         let (mut candidates, mut scratch) = (Vec::new(), Scratch::default());
         let mut from = 0;

@@ -149,7 +149,7 @@ fn on_a_sphere_and_a_cylinder_cells_are_measured_along_the_surface() {
     });
     let cells = Cells::new(&topology, &places(&topology, &points));
     assert_near(&cells.areas, &exact, 0.025);
-    // The chord through the cylinder is no way.
+    // The chord through the cylinder is not a way.
     let thin = sheet(sides, 4, |p| on(p) * DVec3::new(0.02, 0.02, 1.0));
     let ends = places(&thin, &[DVec3::new(0.02, 0.0, 1.5), DVec3::new(-0.02, 0.0, 1.5)]);
     let cells = Cells::new(&thin, &ends);
@@ -195,7 +195,7 @@ fn points_at_one_place_share_its_cell_and_parts_without_points_are_left() {
     let areas = Divided::with_areas(&positions, &triangles, &|_| 0, None, &points).0;
     assert!((areas.iter().sum::<f64>() - 2.0).abs() < 1e-9, "{areas:?}");
     assert!((areas[1] - 0.46).abs() < 0.05 && areas[1] == areas[2], "{areas:?}");
-    // What is no skin has no area, and no border where cells meet on it.
+    // What is not skin has no area, and no border where cells meet on it.
     let is_skin = |triangle: usize| triangles[triangle].iter().any(|&v| positions[v as usize].x < 0.45);
     let (areas, divided) = Divided::with_areas(&positions, &triangles, &|_| 0, Some(&is_skin), &points);
     let skin = (0..triangles.len()).filter(|&triangle| is_skin(triangle));

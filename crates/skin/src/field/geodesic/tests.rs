@@ -228,7 +228,7 @@ fn a_way_bends_around_a_slit_by_as_much_as_it_must() {
 }
 
 #[test]
-fn around_a_tube_two_ways_are_told() {
+fn around_a_tube_two_ways_are_reported() {
     let topology = sheet(24, 12, |p| {
         let (sin, cos) = (p.x * TAU).sin_cos();
         DVec3::new(sin, 3.0 * p.y, cos)
@@ -246,7 +246,7 @@ fn around_a_tube_two_ways_are_told() {
 }
 
 #[test]
-fn what_is_out_of_reach_is_told_apart() {
+fn what_is_out_of_reach_is_distinguished() {
     let topology = sheet(10, 10, |p| DVec3::new(p.x, p.y, 0.0));
     let at = |x: f64, y: f64| find(&topology, DVec3::new(x, y, 0.0));
     let map = LogMap::new(&topology, at(0.05, 0.05), DVec3::X, 0.2).unwrap();

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn raw_values_that_are_no_reading_are_listed_for_all_and_for_single_taxels() {
+    fn raw_values_that_are_not_readings_are_listed_for_all_and_for_single_taxels() {
         let read = |text: &str| Calibration::parse(text, &[3, 7]).map_err(|e| without_column(&e.to_string()));
         let both = read("[all]\nmissing = [30000, -1]\n[taxel.7]\nmissing = [0.1]").unwrap();
         assert_eq!(both.missing, [vec![30_000.0, -1.0], vec![0.1]]);

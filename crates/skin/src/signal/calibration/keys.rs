@@ -37,7 +37,7 @@ pub(super) struct Keys {
 }
 
 impl Keys {
-    /// The raw values that are no reading, in single precision as raw values are; `None` if the key is not given.
+    /// The raw values that are not readings, in single precision as raw values are; `None` if the key is not given.
     pub(super) fn missing(&self, text: Text<'_>) -> Result<Option<Vec<f32>>> {
         let Some(codes) = &self.missing else { return Ok(None) };
         if codes.get_ref().len() > MAX_MISSING {

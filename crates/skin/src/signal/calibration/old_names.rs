@@ -14,7 +14,7 @@ impl Calibration {
     /// `[upkeep]` is `[drift]` now. Nobody can change a recording, so it is not refused as a file is.
     #[must_use]
     pub fn with_names_of_now(text: String) -> (String, Vec<String>) {
-        // What is no TOML is told by whoever reads it.
+        // What is not TOML is reported by whoever reads it.
         let Ok(mut file) = toml::from_str::<Table>(&text) else { return (text, Vec::new()) };
         let mut told = Vec::new();
         rename(&mut file, &TABLES, |was, new| told.push(format!("`[{was}]` is `[{new}]` now")));
@@ -77,7 +77,7 @@ mod tests {
             _ => panic!("{text}"),
         };
         assert_eq!([wiper(0), wiper(1)], [7, 12]);
-        // What has the names of now, or is no calibration, stays as it is to the byte.
+        // What has the names of now, or is not a calibration, stays as it is to the byte.
         for same in ["# mine\n[layer]\nsigma_m = 0.002 # m\n", "[all"] {
             assert_eq!(Calibration::with_names_of_now(same.to_owned()), (same.to_owned(), Vec::new()));
         }

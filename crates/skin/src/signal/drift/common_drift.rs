@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_drifts_while_nobody_is_untouched_is_told_later_and_once() {
+    fn what_drifts_while_nobody_is_untouched_is_reported_later_and_once() {
         let mut common = CommonDrift::new(vec![vec![Some(0), Some(0), Some(0), None, None, None], vec![Some(0); 6]]);
         let estimate = |common: &mut CommonDrift, board: bool, others: bool, level: f64, now_s: f64| {
             let levels: Vec<_> = (0..6).map(|of| (if of < 3 { board } else { others }).then_some(level)).collect();

@@ -54,7 +54,7 @@ impl BoardState {
 pub struct BoardAccount {
     /// Its id; of a limb its number from 1.
     pub board: u16,
-    /// The key of a limb on a network, which is no board.
+    /// The key of a limb on a network, which is not a board.
     pub limb: Option<String>,
     /// The port it was last found on; of a limb its key, once it was heard.
     pub port: Option<String>,
@@ -172,7 +172,7 @@ impl Lines {
                 parts.push(format!("{} of {sent} frames lost on the line", account.lost));
             }
             if account.dropped > 0 {
-                parts.push(format!("{} of {sent} frames came faster than they were taken", account.dropped));
+                parts.push(format!("{} of {sent} frames came faster than they were read", account.dropped));
             }
             (!parts.is_empty()).then(|| format!("{}: {}", account.name(), parts.join(", ")))
         };

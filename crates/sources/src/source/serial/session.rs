@@ -274,7 +274,7 @@ impl LineState {
                  is it another device?"
             ));
         } else {
-            // The board may not be powered yet, so this is no error.
+            // The board may not be powered yet, so this is not an error.
             let why = format!(
                 "nothing answers at {baud} baud or any usual rate; is the board powered, and the cable right? Waiting for it"
             );
@@ -380,7 +380,7 @@ impl LineState {
                 return false;
             }
             self.config.baud = found;
-            self.notify(&format!("the board sends at {found} baud; taken instead of {own}"));
+            self.notify(&format!("the board sends at {found} baud; used instead of {own}"));
         }
         if self.stage != Stage::Speaking {
             (self.stage, self.since) = (Stage::Speaking, now);

@@ -44,7 +44,7 @@ impl Blur {
     }
 
     /// What a square of ± `margin_m` whose middle lies at (`across_m`, `along_m`) feels of `part`, a load that is spread
-    /// evenly from −`half_m` to `half_m` along. Kernels that are no Gaussian are those of points only.
+    /// evenly from −`half_m` to `half_m` along. Kernels that are not Gaussian are those of points only.
     pub(super) fn share(self, part: f64, across_m: f64, along_m: f64, half_m: f64, margin_m: f64) -> f64 {
         match self {
             Self::Gaussian { sigma_across_m, sigma_along_m } => {

@@ -100,7 +100,7 @@ impl SimulatedSource {
         Self::from_text(&path.display().to_string(), &text, folder)
     }
 
-    /// Whether the file at `path` has the keys of a simulation, and so is no scene.
+    /// Whether the file at `path` has the keys of a simulation, and so is not a scene.
     #[must_use]
     pub fn is_named(path: impl AsRef<Path>) -> bool {
         let keys = limits::read_to_string(path, MAX_TOML_BYTES).ok().and_then(|text| text.parse::<toml::Table>().ok());

@@ -152,7 +152,7 @@ impl Assembler {
             return;
         }
         if std::mem::take(&mut self.is_joining) {
-            // Its first number may be the end of a longer one, so none of it is used; where it looks whole, that is no loss.
+            // Its first number may be the end of a longer one, so none of it is used; where it looks whole, that is not a loss.
             match self.row(text, false) {
                 _ if text.is_empty() => {}
                 Ok(()) => self.skipped.leave_out(text),

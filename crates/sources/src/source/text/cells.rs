@@ -145,11 +145,11 @@ pub(super) fn may_be_json(line: &str) -> bool {
     line.starts_with(['{', '['])
 }
 
-/// The numbers within `line`, a line of JSON, each with its path such as `values.4` or `rows[0][3]`. Words that are no numbers are
+/// The numbers within `line`, a line of JSON, each with its path such as `values.4` or `rows[0][3]`. Words that are not numbers are
 /// given too; what is true or false is left out.
 ///
 /// # Errors
-/// It is no JSON.
+/// It is not JSON.
 pub(super) fn json(line: &str, each: &mut dyn FnMut(&str, Cell<'_>)) -> Result<(), serde_json::Error> {
     let value: Value = serde_json::from_str(line)?;
     let mut path = String::new();

@@ -28,7 +28,7 @@ pub(super) enum End {
 }
 
 impl End {
-    /// Whether `line`, which is no row, is one.
+    /// Whether `line`, which is not a row, is one.
     pub(super) fn is(&self, line: &str) -> bool {
         match self {
             Self::Blank => line.is_empty(),
@@ -76,7 +76,7 @@ pub(super) enum Use {
     /// The sensor at this place in a row.
     Sensor(usize),
     Time,
-    /// Numbers that are no sensor; why not.
+    /// Numbers that are not a sensor; why not.
     LeftOut(&'static str),
     /// A word.
     Word,
@@ -163,8 +163,8 @@ impl Form {
                 let guess = if self.is_time_guessed { ", as it seems" } else { "" };
                 let _ = write!(text, ", {} is time in {}{guess}", self.called(&time), unit.symbol());
             }
-            None if has_rate => text += ", time goes on as --rate says",
-            None => text += ", time is that of arrival",
+            None if has_rate => text += ", time advances by --rate",
+            None => text += ", time is the time of arrival",
         }
         for why in ["counts frames", "rises like a time of unknown unit", "is not a sensor"] {
             let which = self.which(|column| *column == Use::LeftOut(why));

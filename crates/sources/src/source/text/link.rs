@@ -129,7 +129,7 @@ impl Link {
                             stream.set_read_timeout(Some(READ_TIMEOUT)).map_err(|e| Error::failed(e.to_string()))?;
                             return Ok(Open::Tcp(stream));
                         }
-                        Err(e) => last = failed!("nobody answers there: {e}; does the board or program listen?"),
+                        Err(e) => last = failed!("nothing answers there: {e}; does the board or program listen?"),
                     }
                 }
                 Err(last)
@@ -171,7 +171,7 @@ impl Link {
     fn port(&self, name: &str) -> Result<Open> {
         if std::path::Path::new(name).is_file() {
             let what = format!(
-                "this is a file, and no port; read it with `cat {name} | somatic run --source text:-`, or as csv:{name}"
+                "this is a file, not a port; read it with `cat {name} | somatic run --source text:-`, or as csv:{name}"
             );
             return Err(Error::failed(what));
         }
@@ -195,7 +195,7 @@ impl Link {
             Open::Port(port) => port.read(&mut self.buffer),
             Open::Tcp(stream) => stream.read(&mut self.buffer),
             Open::Udp(socket) => match socket.recv(&mut self.buffer) {
-                // An empty datagram is no end.
+                // An empty datagram is not an end.
                 Ok(0) => return Came::Nothing,
                 other => other,
             },

@@ -40,7 +40,7 @@ const SILENT_PERIODS: f64 = 5.0;
 
 /// Frames of a board or program that sends lines of text.
 ///
-/// Times are those of its column of times, else those of arrival, in seconds since it was opened. A line that is no frame is
+/// Times are those of its column of times, else those of arrival, in seconds since it was opened. A line that is not a frame is
 /// skipped and counted; a connection that is gone is opened again. While nothing comes, one frame has all its values
 /// [`RawValue::STALE`].
 pub struct TextSource {
@@ -71,7 +71,7 @@ impl TextSource {
     /// `grid`, `pitch_m`, and of standard input `rate_hz`. `tell` is called with what people should know while that takes long.
     ///
     /// # Errors
-    /// It cannot be opened; what comes is no text, or not what the options say.
+    /// It cannot be opened; what comes is not text, or not what the options say.
     pub fn open(place: &TextPlace, options: &VendorOptions, tell: &mut dyn FnMut(&str)) -> Result<Self> {
         if options.rate_hz.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
             return Err(Error::usage("--rate is not a frame rate; give a positive number of Hz"));
@@ -85,7 +85,7 @@ impl TextSource {
     /// Reads `bytes` as lines of text that come all at once.
     ///
     /// # Errors
-    /// They are no text, or not what the options say.
+    /// They are not text, or not what the options say.
     pub fn from_bytes(bytes: impl Into<Vec<u8>>, options: &VendorOptions) -> Result<Self> {
         Self::listen(&TextPlace::Stdin, Link::given(bytes.into()), options, &mut |_| {})
     }

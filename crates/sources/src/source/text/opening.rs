@@ -58,7 +58,7 @@ struct Listening<'a> {
 /// people should know while nothing is understood yet.
 ///
 /// # Errors
-/// What comes is no text, holds no numbers, or is not what the flags say.
+/// What comes is not text, holds no numbers, or is not what the flags say.
 pub(super) fn listen(
     link: &mut Link,
     place: &TextPlace,
@@ -213,7 +213,7 @@ impl Listening<'_> {
         }
         Err(match was {
             Some(baud) => failed!(
-                "bytes come at {baud} baud, but they are no text; does the board send at another speed (text:PORT@9600), or speak \
+                "bytes come at {baud} baud, but they are not text; does the board send at another speed (text:PORT@9600), or speak \
                  the protocol of --source serial:?"
             ),
             None => Error::failed("the input is not text; send lines of numbers, such as `512,300,7`"),

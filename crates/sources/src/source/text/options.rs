@@ -92,7 +92,7 @@ impl FromStr for TextColumns {
         let columns: Option<Vec<Column>> = text.split(',').map(Column::parse).collect();
         columns.map(Self).ok_or_else(|| {
             Error::usage(format!(
-                "--columns {text} are no columns; write them as 2-17, as 1,3,8-10 or by name as A0,A1 or A*"
+                "--columns {text} is not a list of columns; write them as 2-17, as 1,3,8-10 or by name as A0,A1 or A*"
             ))
         })
     }
@@ -114,7 +114,9 @@ impl FromStr for TextIds {
         if text == "names" {
             return Ok(Self::Names);
         }
-        let bad = || Error::usage(format!("--ids {text} are no taxels; write them as 4-19, as 7,3,12-20, or names"));
+        let bad = || {
+            Error::usage(format!("--ids {text} is not a list of taxels; write them as 4-19, as 7,3,12-20, or names"))
+        };
         let mut ids = Vec::new();
         for part in text.split(',') {
             let (low, high) = part.split_once(['-', '–']).unwrap_or((part, part));
@@ -177,7 +179,7 @@ impl FromStr for TextTime {
     fn from_str(text: &str) -> Result<Self> {
         let bad = || {
             Error::usage(format!(
-                "--time {text} is no column; write its number or name, with s, ms, us or iso where that is known: 1:ms; or arrival"
+                "--time {text} is not a column; write its number or name, with s, ms, us or iso where that is known: 1:ms; or arrival"
             ))
         };
         if text == "arrival" {

@@ -43,7 +43,7 @@ impl FromStr for TextPlace {
                     let host = if host.is_empty() { "0.0.0.0" } else { host };
                     Ok(Self::Udp(format!("{host}:{port}")))
                 }
-                ("tcp" | "udp", _) => bad(format!("`{address}` is no address with a port")),
+                ("tcp" | "udp", _) => bad(format!("`{address}` is not an address with a port")),
                 _ => bad(format!("lines do not come by `{scheme}://`")),
             };
         }
@@ -91,9 +91,9 @@ mod tests {
             ("", "nothing follows"),
             ("a@fast", "baud"),
             ("@9600", "baud"),
-            ("tcp://:3", "no address"),
-            ("udp://9000", "no address"),
-            ("udp://:0", "no address"),
+            ("tcp://:3", "not an address"),
+            ("udp://9000", "not an address"),
+            ("udp://:0", "not an address"),
             ("http://a:1", "do not come by"),
         ] {
             let error = wrong.parse::<TextPlace>().unwrap_err();

@@ -25,11 +25,11 @@ const KINDS: [(Wrong, &str); 11] = [
     (Wrong::Few, "too few values"),
     (Wrong::Many, "too many values"),
     (Wrong::Word, "a word in the place of a number"),
-    (Wrong::Json, "no JSON"),
+    (Wrong::Json, "not JSON"),
     (Wrong::Time, "no time in the column of times"),
     (Wrong::Rows, "rows of a frame that is not whole"),
     (Wrong::Names, "names that the lines before did not have"),
-    (Wrong::Garbled, "bytes that are no text"),
+    (Wrong::Garbled, "bytes that are not text"),
     (Wrong::Long, "over 1 MiB without a line end"),
 ];
 
@@ -112,7 +112,7 @@ mod tests {
         assert_eq!(skipped.take_notices().len(), 2);
         assert_eq!(
             skipped.losses(),
-            ["3 lines skipped, too few values; the first one was `512,3`", "1 line skipped, bytes that are no text"]
+            ["3 lines skipped, too few values; the first one was `512,3`", "1 line skipped, bytes that are not text"]
         );
     }
 }

@@ -7,7 +7,7 @@ pub(super) const MAX_LIVE_LINE_BYTES: usize = 1 << 20;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Line<'a> {
     Text(&'a str),
-    /// It is no UTF-8.
+    /// It is not UTF-8.
     Garbled,
     /// It is too long, and its bytes are gone.
     Long,

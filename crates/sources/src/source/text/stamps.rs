@@ -37,7 +37,7 @@ impl Stamps {
         }
         if let Some(share_s) = share_s {
             let period_s = self.period_s.unwrap_or(share_s);
-            // A pause is no period.
+            // A pause is not a period.
             self.period_s = Some(period_s + 0.1 * (share_s.min(4.0 * period_s) - period_s));
         }
     }

@@ -115,7 +115,7 @@ impl Emed {
     fn page(&mut self, word: &str, to: &mut Frame) -> Result<bool> {
         let number = word.split_whitespace().next().and_then(|number| number.parse().ok());
         let Some(number) = number else {
-            // The largest and the mean of all, which are no frames.
+            // The largest and the mean of all, which are not frames.
             let complete = self.finish(to)?;
             self.place = Place::Summary;
             return Ok(complete);
@@ -160,7 +160,7 @@ impl Emed {
         }
         match (words.count(), self.has_forces) {
             (0, false) | (1, true) => Ok(()),
-            (more, _) => Err(at(failed!("{more} numbers stand after its {} cells", self.columns.len()))),
+            (more, _) => Err(at(failed!("{more} numbers follow its {} cells", self.columns.len()))),
         }
     }
 
@@ -206,7 +206,7 @@ impl Emed {
         let mut cells = self.cells.clone();
         cells.sort_unstable();
         match cells.windows(2).find(|pair| pair[0] == pair[1]) {
-            Some(pair) => Err(failed!("row {} and column {} stand in one picture twice", pair[0][0], pair[0][1])),
+            Some(pair) => Err(failed!("row {} and column {} are in one picture twice", pair[0][0], pair[0][1])),
             None => Ok(()),
         }
     }

@@ -118,7 +118,7 @@ impl Lines {
             }
             if searched as u64 > MAX_LINE_BYTES {
                 return Err(Error::failed(format!(
-                    "a line of over {} MiB: no table, or its lines have no end",
+                    "a line of over {} MiB: not a table, or without ends of lines",
                     MAX_LINE_BYTES >> 20
                 )));
             }

@@ -197,8 +197,8 @@ fn check_step(rows: &Rows<'_>, unit: Option<TimeUnit>) -> Result<()> {
         return Ok(());
     }
     Err(Error::usage(format!(
-        "column 1 is the time and rises by {step} a line, in no unit that is said; write `t [ms]`, or `t [s]`, in a line above the \
-         first one"
+        "column 1 is the time and rises by {step} a line, without a unit; write `t [ms]`, or `t [s]`, in a line above the first \
+         one"
     )))
 }
 
@@ -259,7 +259,7 @@ fn misfit(rows: &Rows<'_>, grid: Grid, time: Likely, label: Likely) -> Error {
     let known = if known.is_empty() { String::new() } else { format!(": {}", known.join(", and ")) };
     Error::usage(format!(
         "a line has {width} columns, and --grid {}x{} takes {cells} for sensors{known}; correct --grid, as to {fitting}, or remove the \
-         columns that are no sensors",
+         columns that are not sensors",
         grid.rows, grid.columns
     ))
 }
@@ -274,8 +274,8 @@ pub(super) fn way_out(separator: Separator, head: &[u8]) -> Error {
         let first = head.split(|&byte| byte == b'\n').find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
         let first = super::text::shortened(super::text::decoded(first).trim());
         return failed!(
-            "this is no recording that is known: no line is a row of numbers, such as `{first}`; say what it is with --format, or \
-             leave only the numbers, the time before them, and give the rows and columns of a frame with --grid; {table}"
+            "its format is unknown: no line is a row of numbers, such as `{first}`; name the format with --format, or leave \
+             only the numbers, the time before them, and give the rows and columns of a frame with --grid; {table}"
         );
     };
     let (height, blocks) = blocks(separator, head, is_narrow);
@@ -288,8 +288,8 @@ pub(super) fn way_out(separator: Separator, head: &[u8]) -> Error {
         grid_of((end.saturating_sub(first + rows.totals(first, end).len())).max(1))
     };
     Error::failed(format!(
-        "this is no recording that is known; say what it is with --format, or, if its numbers are those of the sensors, give the rows \
-         and columns of a frame, as --grid {grid}; {table}"
+        "its format is unknown; name it with --format, or, if its numbers are the sensors' values, give the rows and columns of a \
+         frame, as --grid {grid}; {table}"
     ))
 }
 

@@ -287,8 +287,8 @@ fn parser(
 fn places(path: &Path) -> Result<Option<Places>> {
     if !path.is_file() {
         return Err(Error::failed(
-            "pliance's places of sensors stand after the pressures, so that the file is read twice, which a pipe cannot be: \
-             save it first",
+            "pliance's places of sensors follow the pressures, so the file is read twice, and a pipe cannot be; save it \
+             first",
         ));
     }
     let (mut lines, mut places) = (Lines::open(path)?, Places::default());

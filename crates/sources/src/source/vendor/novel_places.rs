@@ -137,7 +137,7 @@ impl Places {
     /// Refuses places that are not those of `sensors`.
     pub(super) fn check(&self, sensors: &[u32]) -> Result<()> {
         if self.sensors != sensors {
-            return Err(Error::failed("the places at the end of the file are not those of the sensors in its table"));
+            return Err(Error::failed("the places at the end of the file and its table have different sensors"));
         }
         for (head, row) in HEADS.iter().zip(&self.rows) {
             if row.len() != sensors.len() {

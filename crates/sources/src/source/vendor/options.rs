@@ -53,9 +53,9 @@ impl VendorOptions {
         match lengths.as_deref() {
             Some(&[pitch]) => Ok([pitch; 2]),
             Some(&[rows, columns]) => Ok([rows, columns]),
-            _ => {
-                Err(Error::usage(format!("--pitch {text} is no length; write it with its unit, as 8.6mm or 8.6mm,5mm")))
-            }
+            _ => Err(Error::usage(format!(
+                "--pitch {text} is not a length; write it with its unit, as 8.6mm or 8.6mm,5mm"
+            ))),
         }
     }
 

@@ -60,7 +60,7 @@ impl Tekscan {
         let text = super::text::decoded(line);
         let (key, value) = text.split_once([' ', ',', ';', '\t']).unwrap_or((&text, ""));
         let value = value.trim_matches([' ', ',', ';', '\t', '"']);
-        let wrong = || failed!("`{key}` is `{}`, which is no size", super::text::shortened(value));
+        let wrong = || failed!("`{key}` is `{}`, which is not a size", super::text::shortened(value));
         let number = || leading_number(value).filter(|(number, _)| *number > 0.0).ok_or_else(wrong);
         let count = || value.parse().ok().filter(|count| *count > 0).ok_or_else(wrong);
         let length = || number().and_then(|(number, unit)| Ok(number * metres(unit).ok_or_else(wrong)?));

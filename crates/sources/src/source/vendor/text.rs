@@ -8,7 +8,7 @@ use encoding_rs::WINDOWS_1252;
 /// What stands between the cells of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Separator {
-    /// A comma, a semicolon or a tab. Where it is no comma, a comma in a number is its decimal point.
+    /// A comma, a semicolon or a tab. Where it is not a comma, a comma in a number is its decimal point.
     One(u8),
     /// Any number of spaces and tabs.
     #[default]

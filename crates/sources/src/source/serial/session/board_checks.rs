@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_board_fits_its_wiring_or_it_is_said_why() {
+    fn a_board_fits_its_wiring_or_the_reason_is_reported() {
         let (taxels, wipers) = (vec![Some(4), None, Some(9)], vec![None; 3]);
         let wired = WiredBoard { id: 1, bits: Some(10), port: None, baud: None, taxels, wipers };
         let hash = |taxels: &[Option<u32>]| layout_hash(taxels.iter().copied());

@@ -87,7 +87,7 @@ mod tests {
             // From inside, too.
             assert!((distance(-on_sphere, DVec3::Z, normal) - radius * turn).abs() < 1e-9, "{turn}");
         }
-        // A step of two parallel faces is no place beside each other.
+        // A step of two parallel faces is not a place beside each other.
         assert!((distance(DVec3::new(0.003, 0.0, -0.004), DVec3::Z, DVec3::Z) - 0.005).abs() < 1e-12);
     }
 

@@ -197,7 +197,7 @@ pub(super) fn by_options(columns: &mut Columns, known: Known<'_>) -> Result<()> 
                     (columns.uses[index], columns.time) = (Use::Sensor(0), None);
                     columns.is_time_guessed = false;
                 }
-                (Use::Word, true) => return Err(failed!("column {} holds words, and no sensor", index + 1)),
+                (Use::Word, true) => return Err(failed!("column {} holds words, not a sensor", index + 1)),
                 (_, true) => columns.uses[index] = Use::Sensor(0),
                 (Use::Sensor(_), false) => columns.uses[index] = Use::LeftOut("is not a sensor"),
                 (_, false) => {}
@@ -238,7 +238,8 @@ pub(super) fn ids(columns: &Columns, count: usize, known: Known<'_>) -> Result<O
     });
     match (&known.options.ids, ids) {
         (Some(TextIds::Names), None) => {
-            Err(failed!("--ids names needs columns that are called by whole numbers, each by another").into_usage())
+            Err(failed!("--ids names needs columns that are called by whole numbers, each by a different one")
+                .into_usage())
         }
         (_, ids) => Ok(ids),
     }

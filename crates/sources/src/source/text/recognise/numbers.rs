@@ -262,8 +262,8 @@ fn by_grid(frames: &mut Frames, sensors: usize, known: Known<'_>) -> Result<()> 
         };
         if frames.rows > 1 && frames.end.is_none() && known.is_joined {
             return Err(Error::failed(
-                "no line stands between two frames, so nobody knows which row is the first; print a blank line after each \
-                 frame, or all of it on one line",
+                "no line separates two frames, so the first row of a frame is unknown; print a blank line after each frame, \
+                 or all of it on one line",
             ));
         }
     }
