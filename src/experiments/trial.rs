@@ -64,7 +64,7 @@ fn calibration(signal: Signal, taxels: usize) -> Option<Calibration> {
 
 /// From about the noise of a frame to half of the sensors' pitch.
 fn filter() -> MotionFilter {
-    MotionFilter::default().low_m(0.5e-3).high_m(6e-3).by(FilterBy::Distance).time_constant_s(0.15)
+    MotionFilter::default().over_s(None).low_m(0.5e-3).high_m(6e-3).by(FilterBy::Distance).time_constant_s(0.15)
 }
 
 /// One frame: readings, forces, truth, and from each of [`Signal::ALL`] the field's percept and what is fitted to its touch.

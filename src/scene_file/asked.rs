@@ -133,9 +133,8 @@ impl SceneFile {
             .by(self.filter_by.unwrap_or(usual.by))
             .time_constant_s(self.filter_time_s.unwrap_or(usual.time_constant_s));
         let filter = self.filter_window.as_ref().map_or(Ok(filter), |window| filter.with_window(window))?;
-        // Who says by how much a centroid must move means steps, and not a time.
-        let is_by_window = filter.low_m.is_some() || by_window.iter().any(|(_, given)| *given);
-        Ok(filter.over_s(self.filter_over_s.or(usual.over_s.filter(|_| !is_by_window))))
+        let is_by_window = by_window.iter().any(|(_, given)| *given);
+        Ok(filter.over_s(self.filter_over_s.or(filter.over_s.filter(|_| !is_by_window))))
     }
 
     /// What is said of a pressure system's export beside what its file says.

@@ -23,7 +23,12 @@ fn at(t_s: f64, u: f64, v: f64) -> Frame {
 }
 
 fn filter(low_m: f64, high_m: f64, time_constant_s: f64) -> MotionFilter {
-    MotionFilter::default().low_m(low_m).high_m(high_m).by(FilterBy::Distance).time_constant_s(time_constant_s)
+    MotionFilter::default()
+        .over_s(None)
+        .low_m(low_m)
+        .high_m(high_m)
+        .by(FilterBy::Distance)
+        .time_constant_s(time_constant_s)
 }
 
 /// The percepts of the one field on every backend, all at once and frame by frame, with how each compared.

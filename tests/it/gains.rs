@@ -23,6 +23,11 @@ const NOISES: [u32; 2] = [1, 8];
 /// A finger that wanders over the grid for two minutes with 2 to 6 N, under a layer with a σ of 2.3 mm; gains differ by ±20 %, and raw
 /// values have `noise`.
 fn wandering(layer: &str, noise: u32, seconds: u32, seed: u32) -> String {
+    wandering_finger("", layer, noise, seconds, seed)
+}
+
+/// The same of a finger with the keys `finger`.
+fn wandering_finger(finger: &str, layer: &str, noise: u32, seconds: u32, seed: u32) -> String {
     let mut state = seed;
     let mut random = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -36,7 +41,7 @@ fn wandering(layer: &str, noise: u32, seconds: u32, seed: u32) -> String {
     }
     format!(
         "rate_hz = 25\nduration_s = {seconds}\nseed = {seed}\n[layer]\nthickness_m = {}\n{layer}[sensor]\nkind = \"linear\"\nbits = 10\n\
-         gain = 500\nnoise_sigma = {noise}\ngain_spread = 0.2\ngain_seed = 4\n[[touch]]\non = \"grid\"\nindenter = \"fingertip\"\n\
+         gain = 500\nnoise_sigma = {noise}\ngain_spread = 0.2\ngain_seed = 4\n[[touch]]\non = \"grid\"\nindenter = \"fingertip\"\n{finger}\
          path = [{path}]\ntimes_s = [{times}]\nforce_newton = [{forces}]\n",
         2.3e-3 * 3.0_f64.sqrt()
     )
@@ -143,6 +148,26 @@ fn gains_are_found_from_a_finger_that_wanders() {
         let most = if noise == 1 { none.0 / 3.0 } else { 1.3 * known.0 };
         assert!(own.0 < most && known.0 < own.0, "{layer:?}, {noise}: {none:?} {own:?} {known:?}");
         assert!(own.1 * 100 > known.1 * 95, "{layer:?}, {noise}: {own:?} {known:?}");
+    }
+}
+
+#[test]
+fn gains_are_found_from_a_finger_that_is_longer_than_wide() {
+    let body = grid();
+    for finger in ["aspect = 1.25\nangle_deg = 20\n", "aspect = 1.6\nangle_deg = 20\n"] {
+        for layer in LAYERS.into_iter().chain(["kernel = \"bonded\"\n"]) {
+            let text = wandering_finger(finger, layer, 1, 120, 1);
+            let mut source = SimulatedSource::on_body("finger", &text, body.clone()).unwrap();
+            let estimate = estimated(&body, &mut source, "hard");
+            let [before, after] = off(&estimate, source.gains());
+            println!(
+                "{finger:?} {layer:?}: gains off by {:.1} % before and {:.1} % after; left {:.3}",
+                100.0 * before,
+                100.0 * after,
+                estimate.left
+            );
+            assert!(before > 0.15 && after < 0.08, "{finger:?} {layer:?}: {before} {after}");
+        }
     }
 }
 

@@ -273,7 +273,7 @@ fn what_counts_as_still_grows_with_the_pressed_taxels_of_both_frames() {
     ];
     let frames: Vec<Frame> =
         (0..20).map(|turn| frame(0.1 * f64::from(turn), &round[turn as usize % round.len()])).collect();
-    let filter = MotionFilter::default().low_m(0.0).high_m(1.0).time_constant_s(0.0);
+    let filter = MotionFilter::default().over_s(None).low_m(0.0).high_m(1.0).time_constant_s(0.0);
     for (backend, knobs) in ways() {
         // That cadence filters motion in its own way.
         let filtered = knobs.cadence == Cadence::EveryFrame;

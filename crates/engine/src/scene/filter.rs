@@ -15,7 +15,7 @@ use crate::stage::layout::Still;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MotionFilter {
-    /// The window's low end, m; `None` is a sixteenth of the spacing of each field's taxels, about what noise feigns, and
+    /// The window's low end, m, where motion is measured by the window; `None` is a sixteenth of the spacing of each field's taxels, about what noise feigns, and
     /// at most a third of the high end.
     pub low_m: Option<f64>,
     /// The window's high end, m; `None` is three times that spacing, as far as a touch may leap and stay the same one, and
@@ -25,8 +25,8 @@ pub struct MotionFilter {
     pub by: FilterBy,
     /// The time constant τ of the filtered direction, s; with 0 each step that counts stands for itself.
     pub time_constant_s: f64,
-    /// Measure motion over this time, s, from the centroid that long ago, instead of by the window: steadier than frame by
-    /// frame, half of that time late. The window's high end still tells another touch.
+    /// Measure motion over this time, s, from the centroid that long ago: steadier than frame by frame, half of that time late. The
+    /// window's high end still tells another touch. `None` measures by the window instead. The default is 0.2 s.
     pub over_s: Option<f64>,
 }
 
@@ -54,7 +54,8 @@ setters!(MotionFilter {
 });
 
 impl MotionFilter {
-    /// The same with the window that `text` says: `0.5mm..20mm`, where either end may be left out.
+    /// The same with the window that `text` says: `0.5mm..20mm`, where either end may be left out. With a low end, motion is measured
+    /// by the window, and no longer over a time.
     ///
     /// Lengths are in `um`, `mm`, `cm` or `m`; the low end may go without a unit where the high end has one, the high end
     /// may be `inf`.
@@ -79,7 +80,8 @@ impl MotionFilter {
             },
             None => Ok(None),
         };
-        let filter = Self { low_m: metres(low_end, unit)?, high_m: metres(high_end, None)?, ..self };
+        let (low_m, high_m) = (metres(low_end, unit)?, metres(high_end, None)?);
+        let filter = Self { low_m, high_m, over_s: self.over_s.filter(|_| low_m.is_none()), ..self };
         filter.check()?;
         Ok(filter)
     }

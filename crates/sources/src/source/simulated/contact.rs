@@ -20,9 +20,10 @@ pub(super) enum Indenter {
     Ball {
         radius_m: f64,
     },
-    /// The pad of a human finger: a soft ball.
+    /// The pad of a human finger: a soft ball, whose contact is `aspect` times as long as it is wide, with the area of a round one.
     Fingertip {
         radius_m: f64,
+        aspect: f64,
     },
     /// The flat end of a cylinder: even pressure over a disc.
     Flat {
@@ -40,7 +41,12 @@ impl Indenter {
 
     /// Whether it has a direction.
     pub(super) fn is_long(&self) -> bool {
-        matches!(self, Self::Rod { .. } | Self::Edge { .. })
+        matches!(self, Self::Rod { .. } | Self::Edge { .. }) || self.aspect() > 1.0
+    }
+
+    /// How many times as long as wide its contact is, where it is an ellipse.
+    fn aspect(&self) -> f64 {
+        if let Self::Fingertip { aspect, .. } = self { *aspect } else { 1.0 }
     }
 }
 
@@ -125,7 +131,7 @@ impl Footprint {
                 ((4.0 * load * radius_m * compliance / PI).sqrt().min(radius_m), length_m / 2.0)
             }
             Indenter::Edge { length_m } => (0.0, length_m / 2.0),
-            Indenter::Ball { radius_m } | Indenter::Fingertip { radius_m } => {
+            Indenter::Ball { radius_m } | Indenter::Fingertip { radius_m, .. } => {
                 (libm::cbrt(0.75 * radius_m * (force_newton * compliance)).min(radius_m), 0.0)
             }
             Indenter::Flat { radius_m } => (radius_m, 0.0),
@@ -149,8 +155,8 @@ impl Footprint {
             Indenter::Rod { .. } => line(widened(patch_m * patch_m / 4.0), layer),
             Indenter::Edge { .. } => line(layer, layer),
             Indenter::Ball { .. } | Indenter::Fingertip { .. } => {
-                let sigma = widened(patch_m * patch_m / 5.0);
-                line(sigma, sigma)
+                let (variance, aspect) = (patch_m * patch_m / 5.0, indenter.aspect());
+                line(widened(variance / aspect), widened(variance * aspect))
             }
             Indenter::Flat { radius_m } => Self::disc(*radius_m, layer),
         }
@@ -196,8 +202,12 @@ impl Footprint {
             Indenter::Ball { .. } | Indenter::Fingertip { .. } => patch::dome(patch_m, scale_m),
             Indenter::Flat { .. } => patch::disc(patch_m, scale_m),
         };
-        let loads = if layer.kernel == Kernel::Gaussian { loads } else { patch::points(loads, scale_m) };
-        Self { loads, blur, half_across_m: patch_m, half_along_m: half_along_m.max(patch_m) }
+        let mut loads = if layer.kernel == Kernel::Gaussian { loads } else { patch::points(loads, scale_m) };
+        let stretch = indenter.aspect().sqrt();
+        for load in &mut loads {
+            (load.across_m, load.along_m) = (load.across_m / stretch, load.along_m * stretch);
+        }
+        Self { loads, blur, half_across_m: patch_m, half_along_m: half_along_m.max(patch_m * stretch) }
     }
 
     /// Maximum distance from the tangent plane at which a taxel is touched, m.
@@ -231,7 +241,7 @@ mod tests {
     const ALL: [Indenter; 5] = [
         Indenter::Rod { radius_m: 0.0127, length_m: 0.05 },
         Indenter::Ball { radius_m: 0.01 },
-        Indenter::Fingertip { radius_m: 0.008 },
+        Indenter::Fingertip { radius_m: 0.008, aspect: 1.4 },
         Indenter::Flat { radius_m: 0.02 },
         Indenter::Edge { length_m: 0.03 },
     ];
@@ -265,7 +275,7 @@ mod tests {
         let right = [
             (rod, 0.05 * 0.05 / 12.0),
             (ball, ball),
-            (finger, finger),
+            (finger / 1.4, finger * 1.4),
             (0.02 * 0.02 / 4.0, 0.02 * 0.02 / 4.0),
             (0.0, 0.03 * 0.03 / 12.0),
         ];

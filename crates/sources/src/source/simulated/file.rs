@@ -169,6 +169,7 @@ pub(super) struct TouchKeys {
     pub(super) width_m: Option<Spanned<f64>>,
     pub(super) radii_m: Option<Spanned<[f64; 3]>>,
     pub(super) apart_m: Option<Spanned<f64>>,
+    pub(super) aspect: Option<Spanned<f64>>,
     pub(super) angle_deg: Option<Spanned<AngleKeys>>,
     pub(super) path: Spanned<Vec<Spanned<WaypointKeys>>>,
     pub(super) times_s: Option<Spanned<Vec<f64>>>,

@@ -18,6 +18,9 @@ use crate::error::Result;
 use crate::field::{FieldSet, Lift};
 use crate::keys::Text;
 
+/// Of a fingertip's contact, length over width: beyond it is a rod.
+const MAX_ASPECT: f64 = 10.0;
+
 /// One touch: its path and force over time.
 pub(super) struct Touch {
     pub(super) name: String,
@@ -137,6 +140,9 @@ impl Setup<'_> {
         let refuse = |key: &str, value: &Option<Spanned<f64>>| text.refuse(key, value.as_ref(), "for this indenter");
         refuse("width_m", &keys.width_m)?;
         refuse("apart_m", &keys.apart_m)?;
+        if *indenter.get_ref() != IndenterName::Fingertip {
+            refuse("aspect", &keys.aspect)?;
+        }
         text.refuse("radii_m", keys.radii_m.as_ref(), "for this indenter")?;
         let radius = |default| size("radius_m", &keys.radius_m, default);
         let length = || size("length_m", &keys.length_m, None);
@@ -155,9 +161,23 @@ impl Setup<'_> {
                 Ok(match round {
                     IndenterName::Ball => Indenter::Ball { radius_m: radius(None)? },
                     IndenterName::Flat => Indenter::Flat { radius_m: radius(None)? },
-                    _ => Indenter::Fingertip { radius_m: radius(Some(Indenter::FINGERTIP_RADIUS_M))? },
+                    _ => Indenter::Fingertip {
+                        radius_m: radius(Some(Indenter::FINGERTIP_RADIUS_M))?,
+                        aspect: self.aspect(keys)?,
+                    },
                 })
             }
+        }
+    }
+
+    /// How many times as long as wide the contact of a fingertip is.
+    fn aspect(&self, keys: &TouchKeys) -> Result<f64> {
+        let Some(aspect) = &keys.aspect else { return Ok(1.0) };
+        match *aspect.get_ref() {
+            bad if !(1.0..=MAX_ASPECT).contains(&bad) => Err(self
+                .text
+                .wrong(aspect.span(), format!("`aspect` is {bad}; give length over width, from 1 to {MAX_ASPECT}"))),
+            aspect => Ok(aspect),
         }
     }
 

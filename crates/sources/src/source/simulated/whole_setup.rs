@@ -126,6 +126,7 @@ impl Setup<'_> {
             ("length_m", &keys.length_m),
             ("width_m", &keys.width_m),
             ("apart_m", &keys.apart_m),
+            ("aspect", &keys.aspect),
         ];
         let only = |wanted: &[&str]| {
             let beside = all.iter().filter(|(key, _)| !wanted.contains(key));
