@@ -1,5 +1,7 @@
 /** The connection: says hello, hands messages to the model, comes back after a loss. */
 
+import { withoutToken } from "./fragment.js";
+import { Hold } from "./hold.js";
 import { Tokens } from "./tokens.js";
 import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "./wire.js";
 
@@ -9,21 +11,15 @@ const RETRY_MAX_MS = 4000;
 /** After so long without a message while frames are due, the page no longer looks live. */
 const SILENT_MS = 2500;
 
-/**
- * Moves the token from the address to the session's storage, so that it is not seen, kept or shared with a link.
- * @returns {{token: string, moment: number | null}}
- */
-export function readAddress() {
-  const fragment = new URLSearchParams(location.hash.slice(1));
-  const token = fragment.get("token");
-  const t = fragment.get("t");
-  const moment = t !== null && Number.isFinite(Number(t)) ? Number(t) : null;
+/** Moves the token from the address to the session's storage, so that it is not seen, kept or shared with a link. */
+export function takeToken() {
+  const token = new URLSearchParams(location.hash.slice(1)).get("token");
   if (token) {
     sessionStorage.setItem(TOKEN, token);
-    const rest = moment === null ? "" : `#t=${t}`;
-    history.replaceState(null, "", location.pathname + location.search + rest);
+    const rest = withoutToken(location.hash);
+    history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
   }
-  return { token: sessionStorage.getItem(TOKEN) ?? "", moment };
+  return sessionStorage.getItem(TOKEN) ?? "";
 }
 
 export class Connection {
@@ -34,6 +30,7 @@ export class Connection {
   constructor(model, token) {
     this.model = model;
     this.token = token;
+    this.hold = new Hold(model);
     /** @type {WebSocket | null} */
     this.socket = null;
     this.wait = RETRY_MIN_MS;
@@ -124,7 +121,8 @@ export class Connection {
   text(message) {
     const { model } = this;
     if (message.type !== "welcome") {
-      model.receive(message);
+      // What a taxel says now is not what is shown.
+      if (message.type !== "taxel" || !this.hold.isOn) model.receive(message);
       return;
     }
     if (model.welcome && model.welcome.run !== message.run && this.saidAfter !== null) {
@@ -153,6 +151,7 @@ export class Connection {
         };
         model.setMesh(mesh);
         model.setConnection("open");
+        this.hold.forget();
         this.onScene();
         break;
       }
@@ -160,7 +159,9 @@ export class Connection {
         const frame = decodeFrame(buffer, this.scene);
         this.toDraw.push(frame.seq);
         if (model.connection.state === "silent") model.setConnection("open");
-        model.apply(frame);
+        this.hold.take(frame);
+        // Nothing is drawn meanwhile that could say that it was.
+        if (this.hold.isOn) requestAnimationFrame(this.takeToDraw());
         break;
       }
       case 3:
