@@ -30,9 +30,16 @@ export async function overlay(context) {
     const { origin, pathname } = new URL(route.request().url());
     const path = join(WEB, pathname === "/" ? "index.html" : pathname);
     if (!existsSync(path)) return route.continue();
-    const program = await route.fetch({ url: `${origin}/` });
-    const rules = program.headers()["content-security-policy"] ?? "";
-    return route.fulfill({ path, headers: { "content-security-policy": rules, "cache-control": "no-store" } });
+    if (pathname !== "/") {
+      // What another page asks for is the program's to refuse.
+      const isOwn = route.request().frame().url().startsWith(origin);
+      return isOwn ? route.fulfill({ path }) : route.continue();
+    }
+    const answer = await route.fetch();
+    const rules = answer.headers()["content-security-policy"];
+    return rules
+      ? route.fulfill({ path, headers: { "content-security-policy": rules } })
+      : route.fulfill({ response: answer });
   });
 }
 

@@ -110,9 +110,12 @@ export class Address {
     return state;
   }
 
-  /** Shows what the address says. */
-  show() {
-    const state = fromFragment(location.hash);
+  /**
+   * Shows what an address says.
+   * @param {string} fragment its end
+   */
+  show(fragment) {
+    const state = fromFragment(fragment);
     const { model, camera, choices, connection, fields, plots, span, timeline, onCamera } = this.parts;
     const { welcome } = model;
     if (!welcome) return;

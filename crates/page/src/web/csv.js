@@ -58,12 +58,13 @@ export function columnsOfBand(name, unit, { least, most }, times) {
 }
 
 /**
- * The head of a column. Numbers without a unit have none.
+ * The head of a column with its unit as people write it. Numbers without a unit have none.
  * @param {string} name
  * @param {string} unit
  */
 export function headOf(name, unit) {
-  return unit === "1" || unit === "" ? name : `${name} (${unit})`;
+  if (unit === "1" || unit === "") return name;
+  return `${name} (${unit === "count" ? "counts" : unit})`;
 }
 
 /**

@@ -41,7 +41,7 @@ const HINT_MS = 2600;
 const model = new Model();
 const choices = new Choices();
 const camera = new Camera();
-const connection = new Connection(model, takeToken());
+const connection = new Connection(model, takeToken(location.hash));
 const stage = byId("stage", HTMLElement);
 const view = new View(byId("scene", HTMLCanvasElement), model, camera, choices);
 const picker = new Picker(model, camera);
@@ -191,7 +191,7 @@ connection.onScene = () => {
       Array.from(mesh.taxelRadius, (r) => r * r),
     );
     lookAtAll();
-    address.show();
+    address.show(location.hash);
   } else if (welcome.time && resume) {
     connection.send(resume.playing ? say.play() : say.pause());
     connection.send(say.seek(resume.t));
@@ -222,6 +222,7 @@ const updatePlots = atMostEvery(80, () => {
   }
   timeline.draw();
 });
+span.on("span", updatePlots);
 
 model.on("frame", () => {
   if (model.frame?.pressure) view.taxelsChanged = true;
@@ -396,9 +397,11 @@ byId("token-form", HTMLFormElement).addEventListener("submit", (event) => {
 });
 tokenBox.addEventListener("input", () => tokenBox.setCustomValidity(""));
 
-window.addEventListener("hashchange", () => {
-  if (location.hash.includes("token=")) connection.take(takeToken());
-  address.show();
+window.addEventListener("hashchange", (event) => {
+  // The address itself may be another one by now: it follows what is shown.
+  const { hash } = new URL(event.newURL);
+  if (hash.includes("token=")) connection.take(takeToken(hash));
+  address.show(hash);
 });
 connection.open();
 
@@ -407,6 +410,7 @@ Object.defineProperty(window, "somatic", {
   value: Object.freeze({
     model,
     camera,
+    span,
     /** @param {number} taxel */
     pixelOfTaxel(taxel) {
       const at = picker.pixelOf(taxel);

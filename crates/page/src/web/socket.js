@@ -11,12 +11,15 @@ const RETRY_MAX_MS = 4000;
 /** After so long without a message while frames are due, the page no longer looks live. */
 const SILENT_MS = 2500;
 
-/** Moves the token from the address to the session's storage, so that it is not seen, kept or shared with a link. */
-export function takeToken() {
-  const token = new URLSearchParams(location.hash.slice(1)).get("token");
+/**
+ * Moves the token from the end of an address to the session's storage, so that it is not seen, kept or shared with a link.
+ * @param {string} fragment
+ */
+export function takeToken(fragment) {
+  const token = new URLSearchParams(fragment.slice(1)).get("token");
   if (token) {
     sessionStorage.setItem(TOKEN, token);
-    const rest = withoutToken(location.hash);
+    const rest = withoutToken(fragment);
     history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
   }
   return sessionStorage.getItem(TOKEN) ?? "";
