@@ -48,6 +48,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
         "wire.test.js",
         "messages.test.js",
         "parts.test.js",
+        "steps.test.js",
         "colours.test.js",
         "browser.test.js",
         "look.test.js",
@@ -55,6 +56,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
         "self_contacts.test.js",
         "hidden.test.js",
         "situations.test.js",
+        "tools.test.js",
     ])
     .current_dir(folder);
     node.env("SOMATIC", env!("CARGO_BIN_EXE_somatic")).env("CHROMIUM", browser);

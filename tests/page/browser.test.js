@@ -117,7 +117,7 @@ test("keys act without an error, and a percept is explained", async () => {
   await seek(page, 2.9);
   await page.waitForTimeout(1000);
   await picture(page, "view.png");
-  await page.keyboard.press("]");
+  await page.keyboard.press("j");
   await page.keyboard.press("e");
   await page.waitForFunction(() => window.somatic.model.explanation?.columns?.length > 3, null, {
     timeout: 60000,
@@ -132,7 +132,7 @@ test("keys act without an error, and a percept is explained", async () => {
   await page.waitForTimeout(500);
   await picture(page, "explain.png");
   const keys =
-    "1 2 3 4 5 6 0 ArrowLeft ArrowRight ArrowUp ArrowDown Shift+ArrowLeft Shift+ArrowUp + - f ] [ x x b b d d t n m a , . Home End".split(
+    "1 2 3 4 5 6 0 ArrowLeft ArrowRight ArrowUp ArrowDown Shift+ArrowLeft Shift+ArrowUp + - f j h x x b b d d t n m a , . Home End".split(
       " ",
     );
   for (const key of keys) {

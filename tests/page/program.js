@@ -1,24 +1,47 @@
 // The real program and a real Chromium for the tests: SOMATIC is the program, CHROMIUM the browser, PICTURES a folder for
-// screenshots. Run by `tests/cli/browser.rs`.
+// screenshots. With WEB, a folder, the page's own files come from there: what is changed in them is tried without a build.
+// Run by `tests/cli/browser.rs`.
 import { execFileSync, spawn } from "node:child_process";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before } from "node:test";
 import { chromium } from "playwright-core";
 
 export const SOMATIC = process.env.SOMATIC ?? "somatic";
-/** How the browser is started. */
+const { PICTURES, WEB } = process.env;
+/** How the browser is started. One whose page comes from a folder takes the program for another network's. */
 export const LAUNCH = {
   executablePath: process.env.CHROMIUM,
   headless: true,
-  args: ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"],
+  args: ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"].concat(
+    WEB ? ["--disable-features=LocalNetworkAccessChecks"] : [],
+  ),
 };
-const PICTURES = process.env.PICTURES;
 export const folder = mkdtempSync(join(tmpdir(), "somatic-browser-"));
 const started = new Set();
 /** @type {import("playwright-core").BrowserContext} */
 export let browser;
+
+/** Lets a browser take the page's files from the folder WEB, under the rules that the program sends with its own. */
+export async function overlay(context) {
+  if (!WEB) return;
+  await context.route(/^http:.*\/([\w]+\.(js|css))?$/, async (route) => {
+    const { origin, pathname } = new URL(route.request().url());
+    const path = join(WEB, pathname === "/" ? "index.html" : pathname);
+    if (!existsSync(path)) return route.continue();
+    if (pathname !== "/") {
+      // What another page asks for is the program's to refuse.
+      const isOwn = route.request().frame().url().startsWith(origin);
+      return isOwn ? route.fulfill({ path }) : route.continue();
+    }
+    const answer = await route.fetch();
+    const rules = answer.headers()["content-security-policy"];
+    return rules
+      ? route.fulfill({ path, headers: { "content-security-policy": rules } })
+      : route.fulfill({ response: answer });
+  });
+}
 
 before(async () => {
   browser = await chromium.launchPersistentContext(join(folder, "profile"), {
@@ -26,6 +49,7 @@ before(async () => {
     viewport: { width: 1280, height: 720 },
     colorScheme: "dark",
   });
+  await overlay(browser);
 });
 after(async () => {
   await browser?.close();

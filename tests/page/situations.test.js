@@ -10,6 +10,7 @@ import {
   folder,
   LAUNCH,
   open,
+  overlay,
   picture,
   seek,
   SOMATIC,
@@ -70,14 +71,17 @@ test("a link in a new tab opens by the token of a tab that is open, and elsewher
   await seek(page, 2.9);
   await page.keyboard.press("l");
   const link = await page.evaluate(() => location.href);
-  assert.match(link, /#t=2\.9$/);
-  assert.match(await page.locator("#link").innerText(), /without the token/);
+  assert.match(link, /#t=2\.9&camera=/);
+  assert.doesNotMatch(link, /token/);
+  assert.match(await page.locator("#hint").innerText(), /without the token/);
   const { page: other, problems } = await open(link);
   await other.waitForFunction(() => Math.abs(window.somatic.model.frame?.t - 2.9) < 1e-9);
   assert.equal(await banner(other), "");
   // In another browser no tab can give it.
   const stranger = await chromium.launch(LAUNCH);
-  const third = await stranger.newPage();
+  const context = await stranger.newContext();
+  await overlay(context);
+  const third = await context.newPage();
   await third.goto(link);
   await third.locator("#token-form").waitFor({ state: "visible" });
   assert.match(await banner(third), /has no token/);
@@ -110,6 +114,7 @@ test("on a phone nothing overlaps, two fingers zoom and pan, and a tap describes
     hasTouch: true,
     isMobile: true,
   });
+  await overlay(context);
   const page = await context.newPage();
   const problems = [];
   page.on("pageerror", (error) => problems.push(String(error)));

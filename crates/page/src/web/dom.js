@@ -98,6 +98,19 @@ export function fitCanvas(canvas) {
 }
 
 /**
+ * Hands a file over to the browser's downloads.
+ * @param {Blob} blob
+ * @param {string} name
+ */
+export function saveFile(blob, name) {
+  const link = make("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/**
  * A colour of the style sheet.
  * @param {string} name of the variable, without its dashes
  */

@@ -14,6 +14,7 @@ export class Inspector {
    * @param {{model: import("./model.js").Model, camera: import("./camera.js").Camera,
    *   choices: import("./choices.js").Choices, connection: import("./socket.js").Connection,
    *   picker: import("./pick.js").Picker, marks: import("./percepts.js").Marks,
+   *   measure: import("./measure.js").Measure,
    *   onMove: () => void, onPercept: (field: number) => void, lookAt: (field: number) => void}} parts
    */
   constructor(stage, parts) {
@@ -155,7 +156,11 @@ export class Inspector {
    * @param {number} y
    */
   click(x, y) {
-    const { marks, choices, picker, model, onPercept } = this.parts;
+    const { marks, measure, choices, picker, model, onPercept } = this.parts;
+    if (measure.isOn) {
+      measure.click(x, y, choices.xray);
+      return;
+    }
     const mark = marks.places.find((place) => Math.hypot(place.x - x, place.y - y) < 12);
     if (mark?.touch !== undefined) {
       choices.chooseTouch(mark.touch);

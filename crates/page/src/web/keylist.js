@@ -2,16 +2,40 @@
 
 import { byId } from "./dom.js";
 
+/** What the pointer and fingers do. @type {import("./keys.js").Gesture[]} */
+export const GESTURES = [
+  { where: "On the body", how: "drag", does: "orbit" },
+  { where: "On the body", how: "right drag, ⇧ drag", does: "pan" },
+  { where: "On the body", how: "wheel", does: "zoom" },
+  { where: "On the body", how: "pointer on a taxel", does: "describe it" },
+  { where: "On the body", how: "click on a taxel", does: "its smallest field, then larger ones" },
+  { where: "On the body", how: "click on a mark", does: "its touch" },
+  { where: "On the body", how: "double click", does: "look at the chosen field" },
+  { where: "On the timeline", how: "drag", does: "seek" },
+  { where: "On the timeline", how: "⇧ drag", does: "repeat this part" },
+  { where: "On the timeline", how: "⇧ click", does: "repeat nothing" },
+  { where: "On the timeline", how: "wheel, pinch", does: "zoom" },
+  { where: "On the timeline", how: "⇧ wheel", does: "earlier and later" },
+  { where: "On the timeline", how: "double click", does: "whole recording" },
+  { where: "On plots and lists", how: "wheel on a plot", does: "zoom in time" },
+  { where: "On plots and lists", how: "click on a plot", does: "go to this moment" },
+  { where: "On plots and lists", how: "click on a row", does: "choose it; once more: look at it" },
+  { where: "With fingers", how: "one", does: "orbit" },
+  { where: "With fingers", how: "two", does: "pan and zoom" },
+  { where: "With fingers", how: "tap", does: "describe a taxel" },
+];
+
 /**
  * @param {{camera: import("./camera.js").Camera, choices: import("./choices.js").Choices,
  *   fields: import("./fields.js").Fields, legend: import("./legend.js").Legend,
  *   timeline: import("./timeline.js").Timeline, look: (name: import("./camera.js").Preset) => void,
  *   lookAt: (field: number) => void, lookAtAll: () => void, release: () => void, moved: () => void, explain: () => void,
- *   photo: () => void, help: () => void}} page
+ *   photo: () => void, help: () => void, pause: () => void, link: () => void,
+ *   measure: import("./measure.js").Measure, plots: import("./plots.js").Plots, table: () => void}} page
  * @returns {import("./keys.js").Key[]}
  */
 export function keyList(page) {
-  const { camera, choices, fields, legend, timeline } = page;
+  const { camera, choices, fields, legend, timeline, measure, plots } = page;
   const move = (/** @type {() => void} */ change) => () => {
     change();
     page.moved();
@@ -44,8 +68,8 @@ export function keyList(page) {
       does: "look at the field",
       act: () => choices.field !== null && page.lookAt(choices.field),
     },
-    { group: "Fields", keys: ["]"], does: "next field", act: () => fields.step(1) },
-    { group: "Fields", keys: ["["], does: "previous field", act: () => fields.step(-1) },
+    { group: "Fields", keys: ["j"], does: "next field", act: () => fields.step(1) },
+    { group: "Fields", keys: ["h"], does: "previous field", act: () => fields.step(-1) },
     { group: "Fields", keys: ["/"], does: "search", act: () => fields.search.focus() },
     { group: "Fields", keys: ["e"], does: "explain the percept", act: page.explain },
     { group: "Fields", keys: ["Escape"], does: "follow the touch", act: page.release },
@@ -54,6 +78,8 @@ export function keyList(page) {
     { group: "Picture", keys: ["d"], does: "taxels on and off", act: () => choices.toggle("taxels") },
     { group: "Picture", keys: ["t"], does: "colour rims by field", act: () => choices.toggle("tint") },
     { group: "Picture", keys: ["s"], does: "save the view as a PNG", act: page.photo },
+    { group: "Picture", keys: ["y"], does: "distance of two clicks", act: () => measure.toggle() },
+    { group: "Picture", keys: ["l"], does: "copy a link to this view", act: page.link },
     { group: "Picture", keys: ["k"], does: "ids of taxels on and off", act: () => choices.toggle("ids") },
     { group: "Picture", keys: ["n"], does: "labels on and off", act: () => choices.toggle("labels") },
     {
@@ -63,23 +89,34 @@ export function keyList(page) {
       act: () => choices.nextMarks(),
     },
     { group: "Picture", keys: ["a"], does: "autoscale or fixed scale", act: () => legend.toggle() },
-    { group: "Recording", keys: [" "], does: "play and pause", act: () => timeline.togglePlay() },
-    { group: "Recording", keys: [","], does: "one frame back", act: () => timeline.step(-1) },
-    { group: "Recording", keys: ["."], does: "one frame on", act: () => timeline.step(1) },
-    { group: "Recording", keys: ["w"], does: "to the touch before", act: () => timeline.toTouch(-1) },
-    { group: "Recording", keys: ["r"], does: "to the next touch", act: () => timeline.toTouch(1) },
-    { group: "Recording", keys: ["PageUp"], does: "one second back", act: () => timeline.jump(-1) },
-    { group: "Recording", keys: ["PageDown"], does: "one second on", act: () => timeline.jump(1) },
-    { group: "Recording", keys: ["Home"], does: "to the start", act: () => timeline.seek(-Infinity) },
-    { group: "Recording", keys: ["End"], does: "to the end", act: () => timeline.seek(Infinity) },
-    { group: "Recording", keys: [">"], does: "faster", act: () => timeline.faster(1) },
-    { group: "Recording", keys: ["<"], does: "slower", act: () => timeline.faster(-1) },
-    { group: "Recording", keys: ["l"], does: "link to this moment", act: () => void timeline.copyLink() },
+    { group: "Time", keys: [" "], does: "pause and go on, also live", act: page.pause },
+    { group: "Time", keys: [","], does: "one frame back", act: () => timeline.step(-1) },
+    { group: "Time", keys: ["."], does: "one frame on", act: () => timeline.step(1) },
+    { group: "Time", keys: ["w"], does: "to the touch before", act: () => timeline.toTouch(-1) },
+    { group: "Time", keys: ["r"], does: "to the next touch", act: () => timeline.toTouch(1) },
+    { group: "Time", keys: ["PageUp"], does: "one second back", act: () => timeline.jump(-1) },
+    { group: "Time", keys: ["PageDown"], does: "one second on", act: () => timeline.jump(1) },
+    { group: "Time", keys: ["Home"], does: "to the start", act: () => timeline.seek(-Infinity) },
+    { group: "Time", keys: ["End"], does: "to the end", act: () => timeline.seek(Infinity) },
+    { group: "Time", keys: [">"], does: "faster", act: () => timeline.faster(1) },
+    { group: "Time", keys: ["<"], does: "slower", act: () => timeline.faster(-1) },
+    { group: "Time", keys: ["z"], does: "less time, larger", act: () => timeline.zoom(1) },
+    { group: "Time", keys: ["Z"], does: "more time", act: () => timeline.zoom(-1) },
+    { group: "Time", keys: ["["], does: "repeat from here", act: () => timeline.loopEnd("from") },
+    { group: "Time", keys: ["]"], does: "repeat up to here", act: () => timeline.loopEnd("to") },
+    {
+      group: "Time",
+      keys: ["\\"],
+      does: "repeat what is shown, or nothing",
+      act: () => timeline.toggleLoop(),
+    },
     { group: "Panels", keys: ["u"], does: "touches", act: fold("touches-panel") },
     { group: "Panels", keys: ["i"], does: "fields", act: fold("fields-panel") },
     { group: "Panels", keys: ["v"], does: "percept", act: fold("percept-panel") },
     { group: "Panels", keys: ["c"], does: "chart", act: fold("chart-panel") },
     { group: "Panels", keys: ["p"], does: "plots", act: fold("plots-panel") },
+    { group: "Panels", keys: ["U"], does: "touches in the plots", act: () => plots.toggleTouches() },
+    { group: "Panels", keys: ["q"], does: "save the plots as CSV", act: page.table },
     { group: "Panels", keys: ["g"], does: "events", act: fold("events-panel") },
     { group: "Panels", keys: ["o"], does: "boards", act: fold("boards-panel") },
     { group: "Panels", keys: ["?"], does: "this list", act: page.help },

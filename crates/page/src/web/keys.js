@@ -3,22 +3,29 @@
 import { byId, make } from "./dom.js";
 
 /** @typedef {{keys: string[], does: string, act: () => void, group: string}} Key */
+/** What the pointer and fingers do. @typedef {{where: string, how: string, does: string}} Gesture */
 
 export class Keys {
-  /** @param {Key[]} keys */
-  constructor(keys) {
+  /**
+   * @param {Key[]} keys
+   * @param {Gesture[]} gestures
+   */
+  constructor(keys, gestures) {
     this.keys = keys;
+    this.gestures = gestures;
     this.dialog = byId("help", HTMLDialogElement);
     /** @type {Map<string, Key>} */
     const byKey = new Map(keys.flatMap((key) => key.keys.map((name) => [name, key])));
     document.addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      // On some keyboards brackets need AltGr, which looks like Ctrl and Alt.
+      const isPlain = event.getModifierState("AltGraph") || !(event.ctrlKey || event.altKey);
+      if (event.metaKey || !isPlain) return;
       const { target } = event;
       if (target instanceof HTMLInputElement && target.type !== "checkbox") return;
       if (target instanceof HTMLSelectElement && event.key !== "Escape") return;
-      // Space and Enter press the button that has the focus.
-      if (target instanceof HTMLButtonElement && (event.key === " " || event.key === "Enter")) return;
-      if (target instanceof HTMLElement && target.tagName === "SUMMARY" && event.key === " ") return;
+      // Enter presses the button that has the focus. Space pauses wherever the focus was left by a click.
+      if (target instanceof HTMLButtonElement && event.key === "Enter") return;
+      if (target instanceof HTMLInputElement && event.key === " ") return;
       if (this.dialog.open && event.key !== "?") return;
       const shift = event.shiftKey && event.key.startsWith("Arrow") ? "Shift+" : "";
       const key = byKey.get(shift + event.key) ?? byKey.get(event.key.toLowerCase());
@@ -26,25 +33,46 @@ export class Keys {
       key.act();
       event.preventDefault();
     });
+    // Firefox presses a button when the space bar comes up.
+    document.addEventListener("keyup", (event) => {
+      const isPressed =
+        event.target instanceof HTMLButtonElement ||
+        (event.target instanceof HTMLElement && event.target.tagName === "SUMMARY");
+      if (event.key === " " && isPressed && !this.dialog.open) event.preventDefault();
+    });
     this.build();
   }
 
   build() {
-    const list = byId("help-keys", HTMLElement);
+    const row = (/** @type {string[]} */ names, /** @type {string} */ does) => {
+      const line = make("div", "key");
+      const keys = make("span", "key-names");
+      for (const name of names) keys.append(make("kbd", "", name));
+      line.append(keys, make("span", "", does));
+      return line;
+    };
+    const section = (/** @type {string} */ title, /** @type {HTMLElement[]} */ rows) => {
+      const box = make("section");
+      box.append(make("h3", "", title), ...rows);
+      return box;
+    };
     const groups = [...new Set(this.keys.map((key) => key.group))];
-    list.replaceChildren(
-      ...groups.map((group) => {
-        const box = make("section");
-        box.append(make("h3", "", group));
-        for (const key of this.keys.filter((one) => one.group === group)) {
-          const row = make("div", "key");
-          const names = make("span", "key-names");
-          for (const name of key.keys) names.append(make("kbd", "", label(name)));
-          row.append(names, make("span", "", key.does));
-          box.append(row);
-        }
-        return box;
-      }),
+    byId("help-keys", HTMLElement).replaceChildren(
+      ...groups.map((group) =>
+        section(
+          group,
+          this.keys.filter((key) => key.group === group).map((key) => row(key.keys.map(label), key.does)),
+        ),
+      ),
+    );
+    const places = [...new Set(this.gestures.map((gesture) => gesture.where))];
+    byId("help-gestures", HTMLElement).replaceChildren(
+      ...places.map((where) =>
+        section(
+          where,
+          this.gestures.filter((one) => one.where === where).map(({ how, does }) => row([how], does)),
+        ),
+      ),
     );
   }
 
@@ -64,7 +92,8 @@ function label(name) {
     ArrowDown: "↓",
     Escape: "Esc",
   });
-  const [plain, shifted] = [name.replace("Shift+", ""), name.startsWith("Shift+")];
+  const isCapital = name.length === 1 && name !== name.toLowerCase();
+  const [plain, shifted] = [name.replace("Shift+", ""), isCapital || name.startsWith("Shift+")];
   const sign = signs[plain] ?? (plain.length === 1 ? plain.toUpperCase() : plain);
   return shifted ? `⇧ ${sign}` : sign;
 }

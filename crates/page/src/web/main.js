@@ -1,5 +1,6 @@
 /** Starts the page and joins its parts. */
 
+import { Address } from "./address.js";
 import { Boards } from "./boards.js";
 import { Camera, chooseDirection } from "./camera.js";
 import { ChartPanel } from "./chart.js";
@@ -10,20 +11,23 @@ import { PerceptPanel } from "./explain.js";
 import { Fields } from "./fields.js";
 import { Inspector } from "./inspect.js";
 import { Keys } from "./keys.js";
-import { keyList } from "./keylist.js";
+import { GESTURES, keyList } from "./keylist.js";
 import { Legend } from "./legend.js";
 import { Log } from "./log.js";
 import { dot, toWorld } from "./math.js";
+import { Measure } from "./measure.js";
 import { Model } from "./model.js";
 import { Marks } from "./percepts.js";
 import { Photo } from "./photo.js";
 import { Picker } from "./pick.js";
 import { TaxelIds } from "./taxel_ids.js";
 import { taxelInWorld } from "./places.js";
+import { PlotFile } from "./plot_file.js";
 import { Plots } from "./plots.js";
-import { Connection, readAddress } from "./socket.js";
+import { Connection, takeToken } from "./socket.js";
 import { RestPanel } from "./rest.js";
 import { ScaleBar } from "./scale_bar.js";
+import { Span } from "./span.js";
 import { Status } from "./status.js";
 import { Timeline } from "./timeline.js";
 import { tokenIn } from "./tokens.js";
@@ -31,26 +35,31 @@ import { TouchPanel } from "./touch_panel.js";
 import { View } from "./view.js";
 import { say } from "./wire.js";
 
-const { token, moment } = readAddress();
+/** What was done is said for so long. */
+const HINT_MS = 2600;
+
 const model = new Model();
 const choices = new Choices();
 const camera = new Camera();
-const connection = new Connection(model, token);
+const connection = new Connection(model, takeToken(location.hash));
 const stage = byId("stage", HTMLElement);
 const view = new View(byId("scene", HTMLCanvasElement), model, camera, choices);
 const picker = new Picker(model, camera);
+const measure = new Measure(model, picker);
 const marks = new Marks(
   byId("marks", HTMLCanvasElement),
   model,
   camera,
   choices,
   new TaxelIds(model, picker),
+  measure,
 );
 const scaleBar = new ScaleBar(byId("scale-bar", HTMLCanvasElement), camera);
 const photo = new Photo(view, model, [marks.canvas, scaleBar.canvas]);
 const legend = new Legend(byId("legend", HTMLElement), model);
-const plots = new Plots(model, connection);
-const timeline = new Timeline(model, connection);
+const span = new Span();
+const plots = new Plots(model, connection, span);
+const timeline = new Timeline(model, connection, span);
 const percept = new PerceptPanel(model, choices, connection, plots);
 const fields = new Fields(model, choices, lookAt);
 const chart = new ChartPanel(
@@ -68,7 +77,7 @@ new Log(
   (field) => choices.choose(field),
   (t) => timeline.seek(t),
 );
-new Status(model, view);
+new Status(model, view, connection.hold);
 plots.onSeek = (t) => timeline.seek(t);
 
 /** @param {number} field */
@@ -119,6 +128,7 @@ function lookAtAll() {
 
 function moved() {
   view.request();
+  address.changed();
 }
 
 /** @type {import("./math.js").Vec3} */
@@ -181,10 +191,7 @@ connection.onScene = () => {
       Array.from(mesh.taxelRadius, (r) => r * r),
     );
     lookAtAll();
-    if (moment !== null && welcome.time) {
-      connection.send(say.pause());
-      connection.send(say.seek(moment));
-    }
+    address.show(location.hash);
   } else if (welcome.time && resume) {
     connection.send(resume.playing ? say.play() : say.pause());
     connection.send(say.seek(resume.t));
@@ -215,6 +222,7 @@ const updatePlots = atMostEvery(80, () => {
   }
   timeline.draw();
 });
+span.on("span", updatePlots);
 
 model.on("frame", () => {
   if (model.frame?.pressure) view.taxelsChanged = true;
@@ -265,6 +273,22 @@ new ResizeObserver(() => {
 }).observe(stage);
 camera.resize(stage.clientWidth, stage.clientHeight);
 
+const address = new Address({
+  model,
+  camera,
+  choices,
+  connection,
+  fields,
+  plots,
+  span,
+  timeline,
+  isTurned: () => turned,
+  onCamera: () => {
+    turned = true;
+    view.request();
+  },
+});
+
 new Inspector(byId("marks", HTMLCanvasElement), {
   model,
   camera,
@@ -272,6 +296,7 @@ new Inspector(byId("marks", HTMLCanvasElement), {
   connection,
   picker,
   marks,
+  measure,
   onMove: moved,
   onPercept: (field) => percept.ask(field),
   lookAt,
@@ -307,6 +332,24 @@ choices.on("offered", () =>
 );
 choices.on("look offered", () => (marksBox.selectedIndex = choices.offered.indexOf(choices.marks)));
 
+const hint = byId("hint", HTMLElement);
+let hintTimer = 0;
+/** Says something for a while, then again what the measure says. @param {string} text */
+function tell(text) {
+  clearTimeout(hintTimer);
+  setText(hint, text || measure.text);
+  hint.hidden = hint.textContent === "";
+  if (text) hintTimer = window.setTimeout(() => tell(""), HINT_MS);
+}
+const plotFile = new PlotFile(model, connection, plots, tell);
+measure.on("measure", () => {
+  tell("");
+  measureButton.setAttribute("aria-pressed", String(measure.isOn));
+  document.documentElement.classList.toggle("measuring", measure.isOn);
+  marks.drawn = true;
+  view.request();
+});
+const { hold } = connection;
 const keys = new Keys(
   keyList({
     camera,
@@ -314,19 +357,32 @@ const keys = new Keys(
     fields,
     legend,
     timeline,
+    measure,
+    plots,
     look,
     lookAt,
     lookAtAll,
     release: () => {
+      if (measure.isOn) return measure.end();
       choices.chooseTouch(null);
       choices.choose(null);
     },
     moved,
     explain: () => percept.ask(),
     photo: () => photo.take(),
+    link: () => void address.copy(tell),
+    table: () => plotFile.save(),
+    pause: () => (model.welcome?.time ? timeline.togglePlay() : hold.toggle()),
     help: () => keys.toggleHelp(),
   }),
+  GESTURES,
 );
+const measureButton = byId("measure", HTMLButtonElement);
+measureButton.addEventListener("click", () => measure.toggle());
+byId("hold", HTMLButtonElement).addEventListener("click", () => hold.toggle());
+byId("plots-file", HTMLButtonElement).addEventListener("click", () => plotFile.save());
+byId("touch-plot-button", HTMLButtonElement).addEventListener("click", () => plots.toggleTouches());
+byId("link", HTMLButtonElement).addEventListener("click", () => void address.copy(tell));
 byId("photo", HTMLButtonElement).addEventListener("click", () => photo.take());
 byId("help-button", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
 byId("help-close", HTMLButtonElement).addEventListener("click", () => keys.toggleHelp());
@@ -341,9 +397,11 @@ byId("token-form", HTMLFormElement).addEventListener("submit", (event) => {
 });
 tokenBox.addEventListener("input", () => tokenBox.setCustomValidity(""));
 
-window.addEventListener("hashchange", () => {
-  const { moment } = readAddress();
-  if (moment !== null) timeline.seek(moment);
+window.addEventListener("hashchange", (event) => {
+  // The address itself may be another one by now: it follows what is shown.
+  const { hash } = new URL(event.newURL);
+  if (hash.includes("token=")) connection.take(takeToken(hash));
+  address.show(hash);
 });
 connection.open();
 
@@ -352,6 +410,7 @@ Object.defineProperty(window, "somatic", {
   value: Object.freeze({
     model,
     camera,
+    span,
     /** @param {number} taxel */
     pixelOfTaxel(taxel) {
       const at = picker.pixelOf(taxel);

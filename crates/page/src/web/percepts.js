@@ -22,13 +22,15 @@ export class Marks {
    * @param {import("./camera.js").Camera} camera
    * @param {import("./choices.js").Choices} choices
    * @param {import("./taxel_ids.js").TaxelIds} ids
+   * @param {import("./measure.js").Measure} measure
    */
-  constructor(canvas, model, camera, choices, ids) {
+  constructor(canvas, model, camera, choices, ids, measure) {
     this.canvas = canvas;
     this.model = model;
     this.camera = camera;
     this.choices = choices;
     this.ids = ids;
+    this.measure = measure;
     /** Where marks are, to be clicked. @type {{x: number, y: number, field?: number, touch?: number}[]} */
     this.places = [];
     this.drawn = false;
@@ -40,7 +42,8 @@ export class Marks {
     const touches = choices.showsTouches(model) ? model.touches : [];
     const selfContacts = choices.marks === "none" ? [] : model.selfContacts.list;
     this.places = [];
-    const drawn = choices.ids || marked.length + touches.length + selfContacts.length > 0;
+    const { length: measured } = this.measure.places;
+    const drawn = choices.ids || marked.length + touches.length + selfContacts.length + measured > 0;
     if (!drawn && !this.drawn) return;
     this.drawn = drawn;
     const fitted = fitCanvas(this.canvas);
@@ -74,6 +77,7 @@ export class Marks {
     /** @type {Point[]} */
     const taken = [];
     for (const { at, text, colour } of labels) this.label(context, at, text, colour, taken);
+    this.measure.draw(context, this);
   }
 
   /**

@@ -1,6 +1,6 @@
 /** The view as a PNG: the body, the marks, the length and the axes, and the colours of pressure with their numbers. */
 
-import { cssColour } from "./dom.js";
+import { cssColour, saveFile } from "./dom.js";
 import { scaleFor, seconds, short } from "./format.js";
 
 export class Photo {
@@ -19,7 +19,7 @@ export class Photo {
   take() {
     this.view.keep((picture) => {
       const canvas = this.compose(picture);
-      canvas.toBlob((blob) => blob && this.save(blob), "image/png");
+      canvas.toBlob((blob) => blob && saveFile(blob, fileName(this.model, ".png")), "image/png");
     });
   }
 
@@ -70,24 +70,16 @@ export class Photo {
     const moment = model.welcome?.time && model.frame ? ` · ${seconds(model.frame.t)}` : "";
     context.fillText(`${model.welcome?.body ?? ""}${moment}`, left, top - 5);
   }
-
-  /** @param {Blob} blob */
-  save(blob) {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(blob);
-    link.download = fileName(this.model);
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-  }
 }
 
 /**
  * Such as `hand-2.90s.png`.
  * @param {import("./model.js").Model} model
+ * @param {string} end
  */
-export function fileName(model) {
+export function fileName(model, end) {
   const body = (model.welcome?.body ?? "body").split("/").pop() ?? "body";
   const stem = body.replace(/\.[a-z]+$/i, "").replace(/[^\w.-]+/g, "_") || "body";
   const moment = model.welcome?.time && model.frame ? `-${model.frame.t.toFixed(2)}s` : "";
-  return `${stem}${moment}.png`;
+  return `${stem}${moment}${end}`;
 }

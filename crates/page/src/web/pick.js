@@ -6,6 +6,9 @@ import { CONE } from "./taxels.js";
 
 /** @typedef {import("./math.js").Vec3} Vec3 */
 
+/** Where a line met a triangle last: its way along the line, and along the triangle's sides. One for all, as millions are tried. */
+const HIT = { s: 0, u: 0, v: 0 };
+
 export class Picker {
   /**
    * @param {import("./model.js").Model} model
@@ -43,25 +46,70 @@ export class Picker {
     const way = subtract(point, eye);
     const end = 1 - slack / Math.hypot(...way);
     const corners = this.model.mesh?.corners ?? new Uint32Array(0);
-    const at = this.vertices;
-    for (let t = 0; t < corners.length; t += 3) {
-      const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
-      const [ax, ay, az] = [at[a], at[a + 1], at[a + 2]];
-      const [ux, uy, uz] = [at[b] - ax, at[b + 1] - ay, at[b + 2] - az];
-      const [vx, vy, vz] = [at[c] - ax, at[c + 1] - ay, at[c + 2] - az];
-      const [px, py, pz] = [way[1] * vz - way[2] * vy, way[2] * vx - way[0] * vz, way[0] * vy - way[1] * vx];
-      const det = ux * px + uy * py + uz * pz;
-      if (Math.abs(det) < 1e-24) continue;
-      const [sx, sy, sz] = [eye[0] - ax, eye[1] - ay, eye[2] - az];
-      const u = (sx * px + sy * py + sz * pz) / det;
-      if (u < 0 || u > 1) continue;
-      const [qx, qy, qz] = [sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux];
-      const v = (way[0] * qx + way[1] * qy + way[2] * qz) / det;
-      if (v < 0 || u + v > 1) continue;
-      const s = (vx * qx + vy * qy + vz * qz) / det;
-      if (s > 0 && s < end) return true;
-    }
+    for (let t = 0; t < corners.length; t += 3)
+      if (this.meets(eye, way, corners, t) && HIT.s > 0 && HIT.s < end) return true;
     return false;
+  }
+
+  /**
+   * Whether a line goes through a triangle; where, is in `HIT` then.
+   * @param {Vec3} from
+   * @param {Vec3} way
+   * @param {Uint32Array} corners
+   * @param {number} t where the triangle is in these
+   */
+  meets(from, way, corners, t) {
+    const at = this.vertices;
+    const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
+    const [ax, ay, az] = [at[a], at[a + 1], at[a + 2]];
+    const [ux, uy, uz] = [at[b] - ax, at[b + 1] - ay, at[b + 2] - az];
+    const [vx, vy, vz] = [at[c] - ax, at[c + 1] - ay, at[c + 2] - az];
+    const [px, py, pz] = [way[1] * vz - way[2] * vy, way[2] * vx - way[0] * vz, way[0] * vy - way[1] * vx];
+    const det = ux * px + uy * py + uz * pz;
+    if (Math.abs(det) < 1e-24) return false;
+    const [sx, sy, sz] = [from[0] - ax, from[1] - ay, from[2] - az];
+    HIT.u = (sx * px + sy * py + sz * pz) / det;
+    if (HIT.u < 0 || HIT.u > 1) return false;
+    const [qx, qy, qz] = [sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux];
+    HIT.v = (way[0] * qx + way[1] * qy + way[2] * qz) / det;
+    if (HIT.v < 0 || HIT.u + HIT.v > 1) return false;
+    HIT.s = (vx * qx + vy * qy + vz * qz) / det;
+    return true;
+  }
+
+  /**
+   * The nearest point of the surface under a pixel, by the corners of its triangle and their weights; null where there is none.
+   * @param {number} x
+   * @param {number} y
+   * @returns {{corners: number[], weights: Vec3} | null}
+   */
+  surfaceAt(x, y) {
+    this.update();
+    const { eye } = this.camera;
+    const ray = this.camera.ray(x, y);
+    const corners = this.model.mesh?.corners ?? new Uint32Array(0);
+    let nearest = Infinity;
+    /** @type {{corners: number[], weights: Vec3} | null} */
+    let found = null;
+    for (let t = 0; t < corners.length; t += 3) {
+      if (!this.meets(eye, ray, corners, t) || !(HIT.s > 0 && HIT.s < nearest)) continue;
+      nearest = HIT.s;
+      found = { corners: [...corners.subarray(t, t + 3)], weights: [1 - HIT.u - HIT.v, HIT.u, HIT.v] };
+    }
+    return found;
+  }
+
+  /**
+   * Where a point of the surface is in the world now.
+   * @param {number[]} corners
+   * @param {Vec3} weights
+   */
+  pointAt(corners, weights) {
+    this.update();
+    const at = corners.map(
+      (corner) => /** @type {Vec3} */ ([...this.vertices.subarray(3 * corner, 3 * corner + 3)]),
+    );
+    return at.reduce((sum, point, k) => add(sum, scale(point, weights[k])), /** @type {Vec3} */ ([0, 0, 0]));
   }
 
   /**

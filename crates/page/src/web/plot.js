@@ -3,9 +3,13 @@
 import { cssColour, fitCanvas } from "./dom.js";
 import { scaleFor, short, tickText, ticks } from "./format.js";
 
-/** @typedef {{colour: string, dash?: number[], period?: number, ring?: import("./plots.js").Ring, band?: {least: Float32Array, most: Float32Array}}} Line */
+/** @typedef {{colour: string, dash?: number[], period?: number, ring?: import("./plots.js").Ring,
+ *   band?: {least: Float32Array, most: Float32Array}, points?: {t: number[], v: number[]}}} Line */
 /** @typedef {{from: number, to: number, now: number, unit: string, quantity: string, live: boolean, pointer: number | null,
  *   until: number, spacing: number, bandRange: {from: number, to: number}}} How */
+
+/** Dashes of lines of one colour in one plot. @type {number[][]} */
+export const DASHES = [[], [5, 3], [1.5, 3], [8, 3, 1.5, 3]];
 
 const EDGE = { left: 38, right: 6, top: 14, bottom: 17 };
 
@@ -26,7 +30,13 @@ export function byPixel(line, how, pixels) {
   const perSecond = pixels / (how.to - how.from);
   /** Pixels that one sample stands for. */
   let reach = 1;
-  if (how.live && line.ring) {
+  if (line.points) {
+    const { t, v } = line.points;
+    for (let k = 0; k < t.length; k++)
+      if (t[k] >= how.from && t[k] <= how.to)
+        put(Math.min(pixels - 1, Math.floor((t[k] - how.from) * perSecond)), v[k], v[k]);
+    reach = Math.max(1, 3 * perSecond * usualStep(t));
+  } else if (how.live && line.ring) {
     const { t, v, begin, size } = line.ring;
     const mask = t.length - 1;
     let first = NaN;
@@ -50,6 +60,19 @@ export function byPixel(line, how, pixels) {
     reach = 1.6 * Math.max(1, perSecond * how.spacing, perSecond * width);
   }
   return { least, most, reach };
+}
+
+/** Steps that are looked at to find the usual one. */
+const STEPS_MAX = 200;
+
+/**
+ * The median of the newest steps between times.
+ * @param {number[]} t ascending
+ */
+function usualStep(t) {
+  const steps = t.slice(-STEPS_MAX).map((time, i, all) => (i ? time - all[i - 1] : 0));
+  steps.shift();
+  return steps.sort((a, b) => a - b)[steps.length >> 1] ?? 0;
 }
 
 /**

@@ -2,7 +2,8 @@
 
 import { byId, make, paletteColour, setText } from "./dom.js";
 import { clock, seconds } from "./format.js";
-import { drawPlot } from "./plot.js";
+import { DASHES, drawPlot } from "./plot.js";
+import { swatchOf, TouchPlot } from "./touch_plot.js";
 import { say } from "./wire.js";
 
 /** @typedef {import("./wire.js").Series} Series */
@@ -17,8 +18,6 @@ const FOLLOWED_MAX = 5;
 const HARDER = 1.5;
 const WINDOWS_S = [2, 5, 10, 30, 60, 120, 300];
 
-/** Dashes of the lines of one field in one plot. @type {number[][]} */
-const DASHES = [[], [5, 3], [1.5, 3], [8, 3, 1.5, 3]];
 /** Angles that come back: an axis is the same after half a turn, a direction after a whole one. */
 const PERIODS = new Map([
   ["orientation", Math.PI],
@@ -33,9 +32,11 @@ export class Plots {
   /**
    * @param {import("./model.js").Model} model
    * @param {import("./socket.js").Connection} connection
+   * @param {import("./span.js").Span} span what is shown of a recording
    */
-  constructor(model, connection) {
+  constructor(model, connection, span) {
     this.model = model;
+    this.span = span;
     this.connection = connection;
     this.root = byId("plots", HTMLElement);
     this.note = byId("plots-note", HTMLElement);
@@ -50,9 +51,6 @@ export class Plots {
     /** @type {Map<string, Ring>} */
     this.rings = new Map();
     this.window = 10;
-    /** What is shown of a recording. */
-    this.from = 0;
-    this.to = 1;
     /** @type {Map<string, {least: Float32Array, most: Float32Array}>} */
     this.bands = new Map();
     this.bandRange = { from: 0, to: 1 };
@@ -70,6 +68,14 @@ export class Plots {
     this.pointer = null;
     /** Goes to a moment of a recording. @type {(t: number) => void} */
     this.onSeek = () => {};
+    /** Called when touches are plotted or not any more. */
+    this.onTouchPlot = () => {};
+    this.touches = new TouchPlot(model);
+    this.listen(this.touches.canvas);
+    span.on("span", () => {
+      this.askHistory();
+      this.draw();
+    });
     model.on("samples", () => this.take());
     model.on("history", () => this.takeHistory());
     model.on("timeline", () => this.askHistory());
@@ -93,7 +99,6 @@ export class Plots {
       this.series = [];
       this.follows = true;
       this.mostLoads.clear();
-      if (welcome.time) [this.from, this.to] = [welcome.time.start_s, welcome.time.end_s];
     }
     this.ask();
   }
@@ -152,6 +157,34 @@ export class Plots {
     this.ask();
   }
 
+  /** The outputs that are plotted, each once. */
+  chosen() {
+    return this.series.filter(({ component }) => component === 0);
+  }
+
+  /**
+   * Plots these outputs and no others.
+   * @param {{field: number, column: string}[]} outputs
+   */
+  plot(outputs) {
+    this.follows = false;
+    this.series = outputs
+      .flatMap(({ field, column }) => {
+        const components = this.model.welcome?.columns.find((c) => c.name === column)?.components ?? 1;
+        return Array.from({ length: components }, (_, component) => ({ field, column, component }));
+      })
+      .slice(0, SERIES_MAX);
+    this.ask();
+  }
+
+  /** Touches over time, on and off. */
+  toggleTouches() {
+    if (!this.model.welcome?.touches) return;
+    this.touches.show(!this.touches.isShown);
+    this.onTouchPlot();
+    this.draw();
+  }
+
   /**
    * @param {number} field
    * @param {string} column
@@ -182,7 +215,7 @@ export class Plots {
 
   askHistory() {
     const { welcome } = this.model;
-    if (!welcome?.time || !this.series.length || !(this.to > this.from)) return;
+    if (!welcome?.time || !this.series.length) return;
     if (this.pending.size) {
       // One at a time: the answer to this one asks for the next.
       this.stale = true;
@@ -190,9 +223,19 @@ export class Plots {
     }
     this.stale = false;
     const list = this.series.map(({ field, column, component }) => ({ field, column, component }));
-    const id = ++this.historyId;
+    const id = this.nextId();
     this.pending.set(id, list);
-    this.connection.send(say.history(id, this.from, this.to, this.bins, list));
+    this.connection.send(say.history(id, this.span.from, this.span.to, this.bins, list));
+  }
+
+  /** The number of the next request for the past. */
+  nextId() {
+    return ++this.historyId;
+  }
+
+  /** @param {Series} series */
+  ringOf(series) {
+    return this.rings.get(keyOf(series));
   }
 
   takeHistory() {
@@ -275,21 +318,29 @@ export class Plots {
     const swatch = make("i");
     swatch.style.background = swatchOf(paletteColour(this.model.fieldColour(s.field)), this.dashOf(s));
     const field = this.model.welcome?.fields[s.field];
-    const components = this.model.welcome?.columns.find((c) => c.name === s.column)?.components ?? 1;
-    const part =
-      components === 2 ? [" u", " v"][s.component] : components === 3 ? [" x", " y", " z"][s.component] : "";
-    const letter = field?.letter ? ` (${field.letter})` : "";
     const close = make("button", "", "×");
     close.title = "Take this line away";
     close.addEventListener("click", () => this.remove(s));
     chip.title = field?.name ?? "";
-    chip.append(swatch, make("span", "", `${field?.label ?? ""}${letter} ${s.column}${part}`), close);
+    chip.append(swatch, make("span", "", `${field?.label ?? ""}${this.labelOf(s)}`), close);
     return chip;
+  }
+
+  /**
+   * What a line shows of its field.
+   * @param {Series} s
+   */
+  labelOf(s) {
+    const letter = this.model.welcome?.fields[s.field]?.letter;
+    const components = this.model.welcome?.columns.find((c) => c.name === s.column)?.components ?? 1;
+    const part =
+      components === 2 ? [" u", " v"][s.component] : components === 3 ? [" x", " y", " z"][s.component] : "";
+    return `${letter ? ` (${letter})` : ""} ${s.column}${part}`;
   }
 
   /** @param {HTMLCanvasElement} canvas */
   listen(canvas) {
-    const t = (/** @type {number} */ x) => this.from + (x / canvas.clientWidth) * (this.to - this.from);
+    const t = (/** @type {number} */ x) => timeAt(this.span, x, canvas.clientWidth);
     canvas.addEventListener(
       "wheel",
       (event) => {
@@ -298,7 +349,9 @@ export class Plots {
       },
       { passive: false },
     );
-    canvas.addEventListener("dblclick", () => this.zoom(Infinity, 0));
+    canvas.addEventListener("dblclick", () =>
+      this.model.welcome?.time ? this.span.showAll() : this.zoom(2, 0),
+    );
     canvas.addEventListener("click", (event) => {
       if (this.model.welcome?.time) this.onSeek(t(event.offsetX));
     });
@@ -317,35 +370,35 @@ export class Plots {
    * @param {number} about this time stays where it is
    */
   zoom(factor, about) {
-    const time = this.model.welcome?.time;
-    if (!time) {
+    if (!this.model.welcome?.time) {
       const at = WINDOWS_S.indexOf(this.window) + (factor > 1 ? 1 : -1);
       this.window = WINDOWS_S[Math.max(0, Math.min(WINDOWS_S.length - 1, at))];
       this.draw();
       return;
     }
-    const span = (this.to - this.from) * factor;
-    if (!(span < time.end_s - time.start_s)) [this.from, this.to] = [time.start_s, time.end_s];
-    else {
-      const part = (about - this.from) / (this.to - this.from);
-      const from = Math.max(time.start_s, Math.min(time.end_s - span, about - part * span));
-      [this.from, this.to] = [from, from + span];
-    }
-    this.askHistory();
-    this.draw();
+    this.span.zoom(factor, about);
   }
 
   /** The time that is shown, and the moment of the frame. */
   range() {
     const now = this.model.frame?.t ?? 0;
-    if (this.model.welcome?.time) return { from: this.from, to: this.to, now };
+    if (this.model.welcome?.time) return { from: this.span.from, to: this.span.to, now };
     return { from: now - this.window, to: now, now };
   }
 
   draw() {
     const { welcome } = this.model;
     if (!welcome) return;
-    const range = this.range();
+    const how = {
+      ...this.range(),
+      quantity: this.model.quantity,
+      bandRange: this.bandRange,
+      live: welcome.mode === "live",
+      pointer: this.pointer,
+      spacing: welcome.time ? (welcome.time.end_s - welcome.time.start_s) / welcome.time.frames : 0,
+      until: welcome.time ? this.model.timeline.until : Infinity,
+    };
+    this.touches.draw(how);
     for (const [unit, { canvas }] of this.groups) {
       this.bins = Math.max(50, Math.min(4096, canvas.clientWidth));
       const lines = this.series
@@ -357,33 +410,20 @@ export class Plots {
           ring: this.rings.get(keyOf(s)),
           band: this.bands.get(keyOf(s)),
         }));
-      drawPlot(canvas, lines, {
-        ...range,
-        unit,
-        quantity: this.model.quantity,
-        bandRange: this.bandRange,
-        live: welcome.mode === "live",
-        pointer: this.pointer,
-        spacing: welcome.time ? (welcome.time.end_s - welcome.time.start_s) / welcome.time.frames : 0,
-        until: welcome.time ? this.model.timeline.until : Infinity,
-      });
+      drawPlot(canvas, lines, { ...how, unit });
     }
   }
 
   /** What the head of the panel says. */
   caption() {
-    if (this.model.welcome?.time) return `${seconds(this.from)} – ${seconds(this.to)}`;
+    if (this.model.welcome?.time) return `${seconds(this.span.from)} – ${seconds(this.span.to)}`;
     return `${this.window} s to ${clock(new Date())}`;
   }
 }
 
 /**
- * A swatch of a line, as a CSS background.
- * @param {string} colour
- * @param {number[]} dash
+ * @param {{from: number, length: number}} span
+ * @param {number} x pixels
+ * @param {number} width
  */
-function swatchOf(colour, dash) {
-  if (!dash.length) return colour;
-  const [on, off] = dash;
-  return `repeating-linear-gradient(90deg, ${colour} 0 ${on}px, transparent ${on}px ${on + off}px)`;
-}
+const timeAt = (span, x, width) => span.from + (x / width) * span.length;

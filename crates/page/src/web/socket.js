@@ -1,5 +1,7 @@
 /** The connection: says hello, hands messages to the model, comes back after a loss. */
 
+import { withoutToken } from "./fragment.js";
+import { Hold } from "./hold.js";
 import { Tokens } from "./tokens.js";
 import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "./wire.js";
 
@@ -10,20 +12,17 @@ const RETRY_MAX_MS = 4000;
 const SILENT_MS = 2500;
 
 /**
- * Moves the token from the address to the session's storage, so that it is not seen, kept or shared with a link.
- * @returns {{token: string, moment: number | null}}
+ * Moves the token from the end of an address to the session's storage, so that it is not seen, kept or shared with a link.
+ * @param {string} fragment
  */
-export function readAddress() {
-  const fragment = new URLSearchParams(location.hash.slice(1));
-  const token = fragment.get("token");
-  const t = fragment.get("t");
-  const moment = t !== null && Number.isFinite(Number(t)) ? Number(t) : null;
+export function takeToken(fragment) {
+  const token = new URLSearchParams(fragment.slice(1)).get("token");
   if (token) {
     sessionStorage.setItem(TOKEN, token);
-    const rest = moment === null ? "" : `#t=${t}`;
-    history.replaceState(null, "", location.pathname + location.search + rest);
+    const rest = withoutToken(fragment);
+    history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
   }
-  return { token: sessionStorage.getItem(TOKEN) ?? "", moment };
+  return sessionStorage.getItem(TOKEN) ?? "";
 }
 
 export class Connection {
@@ -34,6 +33,7 @@ export class Connection {
   constructor(model, token) {
     this.model = model;
     this.token = token;
+    this.hold = new Hold(model);
     /** @type {WebSocket | null} */
     this.socket = null;
     this.wait = RETRY_MIN_MS;
@@ -124,7 +124,8 @@ export class Connection {
   text(message) {
     const { model } = this;
     if (message.type !== "welcome") {
-      model.receive(message);
+      // What a taxel says now is not what is shown.
+      if (message.type !== "taxel" || !this.hold.isOn) model.receive(message);
       return;
     }
     if (model.welcome && model.welcome.run !== message.run && this.saidAfter !== null) {
@@ -153,6 +154,7 @@ export class Connection {
         };
         model.setMesh(mesh);
         model.setConnection("open");
+        this.hold.forget();
         this.onScene();
         break;
       }
@@ -160,7 +162,9 @@ export class Connection {
         const frame = decodeFrame(buffer, this.scene);
         this.toDraw.push(frame.seq);
         if (model.connection.state === "silent") model.setConnection("open");
-        model.apply(frame);
+        this.hold.take(frame);
+        // Nothing is drawn meanwhile that could say that it was.
+        if (this.hold.isOn) requestAnimationFrame(this.takeToDraw());
         break;
       }
       case 3:

@@ -7,9 +7,11 @@ export class Status {
   /**
    * @param {import("./model.js").Model} model
    * @param {import("./view.js").View} view
+   * @param {import("./hold.js").Hold} hold
    */
-  constructor(model, view) {
+  constructor(model, view, hold) {
     this.model = model;
+    this.hold = hold;
     this.view = view;
     this.banner = byId("banner", HTMLElement);
     this.last = { drawn: 0, frame: 0, at: performance.now() };
@@ -17,6 +19,7 @@ export class Status {
     model.on("connection context ended", () => this.connection());
     // Whether it is at rest is known with its first frame.
     model.on("frame", () => model.isAtRest && this.connection());
+    hold.on("hold", () => this.held());
     setInterval(() => this.update(), 500);
     if (!view.gl) byId("no-webgl", HTMLElement).hidden = false;
   }
@@ -44,6 +47,7 @@ export class Status {
     const span = (now - last.at) / 1000;
     const drawn = (view.framesDrawn - last.drawn) / span;
     this.last = { drawn: view.framesDrawn, frame: 0, at: now };
+    if (this.hold.isOn) this.held();
     const { frame } = model;
     const ms = (/** @type {number} */ x) => (Number.isFinite(x) ? x.toFixed(x < 10 ? 1 : 0) : ABSENT);
     setText(byId("engine-time", HTMLElement), frame ? `${ms(frame.engineMicroseconds)} µs a frame` : ABSENT);
@@ -57,6 +61,16 @@ export class Status {
     detail.hidden = view.part >= 1 || !view.gl;
     setText(detail, `drawn at ${Math.round(100 * view.part)} %`);
     byId("rate-chip", HTMLElement).title = `Drawings in the last second, by ${view.renderer.name}`;
+  }
+
+  /** Whether a live view is paused. */
+  held() {
+    const { isOn, since, frames } = this.hold;
+    const button = byId("hold", HTMLButtonElement);
+    document.documentElement.classList.toggle("held", isOn);
+    setText(button, isOn ? "▶ Go on" : "❚❚ Pause");
+    const text = since ? `paused since ${clock(since)}, ${frames} newer` : "live";
+    if (this.model.welcome?.mode === "live") setText(byId("mode", HTMLElement), text);
   }
 
   connection() {
