@@ -161,12 +161,15 @@ fn gains_are_found_from_a_finger_that_is_longer_than_wide() {
             let estimate = estimated(&body, &mut source, "hard");
             let [before, after] = off(&estimate, source.gains());
             println!(
-                "{finger:?} {layer:?}: gains off by {:.1} % before and {:.1} % after; left {:.3}",
+                "{finger:?} {layer:?}: gains off by {:.1} % before and {:.1} % after; left {:.3}, gain_spread {:.3}",
                 100.0 * before,
                 100.0 * after,
-                estimate.left
+                estimate.left,
+                estimate.gain_spread
             );
             assert!(before > 0.15 && after < 0.08, "{finger:?} {layer:?}: {before} {after}");
+            // What is written down as the spread of gains and model is no less than half of what gains are off by.
+            assert!(estimate.gain_spread > 0.5 * after && estimate.gain_spread < 0.15, "{}", estimate.gain_spread);
         }
     }
 }

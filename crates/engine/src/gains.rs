@@ -42,6 +42,8 @@ const MOST: usize = 6000;
 const LEAST_SHARE: f64 = 0.1;
 /// Touches that a taxel needs for its gain to be told.
 const LEAST_TOUCHES: u32 = 5;
+/// What gains and model are off by at least, as a share.
+const LEAST_SPREAD: f64 = 0.01;
 /// A point has four parameters; with one taxel more than that some agree by chance.
 const LEAST_PRESSED: usize = 6;
 /// Shapes of (the logarithm of) gains over taxels that face one way, across their normal, that other contacts explain as well.
@@ -82,6 +84,8 @@ pub struct GainsEstimate {
     pub sigma_m: f64,
     /// By what share taxels still differ from the contacts, root mean square.
     pub left: f64,
+    /// The part of that which noise does not explain: the `gain_spread` of fits, at least 0.01.
+    pub gain_spread: f64,
     /// How many touches it was found from.
     pub touches: usize,
 }
@@ -255,14 +259,14 @@ fn estimate(touches: &[Observed], spots: &[Spot], progress: &mut dyn FnMut(f64) 
     let mut spacings: Vec<f64> = touches.iter().map(|touch| touch.spacing_m).collect();
     spacings.sort_by(f64::total_cmp);
     let (mut gains, mut sigma_m) = (vec![0.0_f64; taxels], START * spacings[spacings.len() / 2]);
-    let (mut width_m, mut left, mut used) = (0.0, 0.0, 0);
+    let (mut width_m, mut left, mut unexplained, mut used) = (0.0, 0.0, 0.0, 0);
     let mut pressed = vec![0; taxels];
     let parts = connected(touches, taxels);
     for round in 0..ROUNDS {
         let fitted: Vec<Touch> = touches.iter().map(|touch| touch.under(&gains, sigma_m)).collect();
         let explained = fit_each(&fitted.iter().collect::<Vec<_>>(), |touch, fits| touch.explained(fits?));
         let (mut weights, mut sums) = (vec![0.0; taxels], vec![0.0; taxels]);
-        let (mut widths, mut squares) = (Vec::new(), (0.0, 0.0));
+        let (mut widths, mut squares, mut of_noise, mut counted) = (Vec::new(), 0.0, 0.0, 0.0);
         pressed.fill(0);
         used = 0;
         for (observed, explained) in touches.iter().zip(explained) {
@@ -279,14 +283,18 @@ fn estimate(touches: &[Observed], spots: &[Spot], progress: &mut dyn FnMut(f64) 
                 let weight = 1.0 / (noise * noise + MODEL * MODEL) * (2.0 * MODEL / off.abs()).min(1.0);
                 weights[index] += weight;
                 sums[index] += weight * off;
-                squares = (squares.0 + off * off, squares.1 + 1.0);
+                squares += off * off;
+                of_noise += noise * noise;
+                counted += 1.0;
                 pressed[index] += 1;
             }
         }
         if used < LEAST {
             return Err(failed!("{LEAST} touches must be explained as contacts, and {used} can be"));
         }
-        left = (squares.0 / f64::max(squares.1, 1.0)).sqrt();
+        let mean = |sum: f64| sum / f64::max(counted, 1.0);
+        left = mean(squares).sqrt();
+        unexplained = mean(squares - of_noise).max(0.0).sqrt();
         for ((gain, weight), sum) in gains.iter_mut().zip(&weights).zip(&sums) {
             *gain += sum / (weight + 1.0 / (SPREAD * SPREAD));
         }
@@ -305,7 +313,8 @@ fn estimate(touches: &[Observed], spots: &[Spot], progress: &mut dyn FnMut(f64) 
     }
     let told = |(gain, count): (&f64, &u32)| (*count >= LEAST_TOUCHES).then(|| gain.exp());
     let gains = gains.iter().zip(&pressed).map(told).collect();
-    Ok(GainsEstimate { gains, pressed, width_m, sigma_m, left, touches: used })
+    let gain_spread = unexplained.max(LEAST_SPREAD);
+    Ok(GainsEstimate { gains, pressed, width_m, sigma_m, left, gain_spread, touches: used })
 }
 
 /// Takes off the logarithms of `gains` of the taxels `known`, which are at `spots`, what touches cannot tell.

@@ -20,6 +20,8 @@ use crate::cli::words::{bullet, count};
 
 /// Frames that are taken at once.
 const BATCH: usize = 256;
+/// What is left of gains unexplained over which touches were not what contacts are taken for.
+const MOST_SPREAD: f64 = 0.08;
 
 /// Touches, and the calibration that they are to improve.
 pub(super) struct Touches<'a> {
@@ -146,6 +148,7 @@ fn with(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<String> {
     let layer = document.entry("layer").or_insert_with(|| Item::Table(Table::new()));
     let Some(layer) = layer.as_table_like_mut() else { return Err(Error::failed("`layer` is not a table")) };
     layer.insert("sigma_m", value(rounded(estimate.sigma_m)));
+    layer.insert("gain_spread", value(rounded(estimate.gain_spread)));
     Ok(document.to_string())
 }
 
@@ -175,10 +178,19 @@ fn table_of(ids: &[u32], estimate: &GainsEstimate, from: &Path) -> String {
         ["left", &format!("{} between taxels and contacts", percent(estimate.left))],
         ["width", &format!("{:.2} mm, of layer and contacts together", estimate.width_m * 1e3)],
         ["sigma_m", &format!("{:.2} mm", estimate.sigma_m * 1e3)],
+        ["gain_spread", &percent(estimate.gain_spread)],
     ] {
         table.add_row(row);
     }
     let mut text = format!("{}\n{}", from.display(), shown(&table));
+    if estimate.gain_spread > MOST_SPREAD {
+        let what = format!(
+            "{} of the gains are left unexplained, over {}: press with one round, soft thing, and away from rims",
+            percent(estimate.gain_spread),
+            percent(MOST_SPREAD)
+        );
+        text += &format!("{}\n", bullet(&what));
+    }
     let untold = untold(ids, estimate);
     if !untold.is_empty() {
         let listed = untold.iter().take(12).map(ToString::to_string).collect::<Vec<_>>().join(", ");
@@ -194,6 +206,7 @@ fn json_of(ids: &[u32], estimate: &GainsEstimate) -> String {
     let taxels = taxels.map(|((id, gain), touches)| json!({ "taxel": id, "gain": gain, "touches": touches }));
     let json = json!({
         "touches": estimate.touches, "width_m": estimate.width_m, "sigma_m": estimate.sigma_m, "left": estimate.left,
+        "gain_spread": estimate.gain_spread,
         "taxels": taxels.collect::<Vec<_>>(),
     });
     format!("{json:#}\n")
