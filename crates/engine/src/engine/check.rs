@@ -175,7 +175,9 @@ mod tests {
             let calibration = Some(
                 crate::signal::Calibration::parse("[all]\ngain = 0.7\nunit = \"mmHg\"\nnoise = 0.4\n", &ids).unwrap(),
             );
-            let scene = Scene { outputs: Outputs::all(), ..Scene::default() };
+            // Over so few frames motion over a time has no values.
+            let filter = crate::scene::MotionFilter::default().over_s(None);
+            let scene = Scene { outputs: Outputs::all(), filter, ..Scene::default() };
             let options = Options { backend, scene, calibration, batch: 64, ..Options::default() };
             let mut engine = match Engine::new(&body, options) {
                 Err(error) if error.kind() == crate::error::ErrorKind::NoAdapter => return None,

@@ -174,18 +174,20 @@ impl Candidate {
 pub(crate) struct Explained {
     /// By taxel, in the unit of P.
     pub(crate) felt: Vec<f64>,
-    /// The standard deviation of its pressure across, at the sensors.
+    /// The standard deviation of its pressure at the sensors, across; of one that was to be a blob in the geometric mean of both ways.
     pub(crate) width_m: f64,
 }
 
 impl Touch {
-    /// What the best of `fits` makes the taxels feel, however well it explains them: what they differ by may be their gains.
-    pub(crate) fn explained(&self, fits: &Fits<f64>) -> Option<Explained> {
-        let best = self.best(Some(fits))?;
+    /// What the best of `fits`, or its blob, makes the taxels feel, however well it explains them: what they differ by may be their gains.
+    pub(crate) fn explained(&self, fits: &Fits<f64>, as_blob: bool) -> Option<Explained> {
+        let blob = Candidate::each(fits).find(|candidate| as_blob && candidate.kind == ContactKind::Blob);
+        let best = blob.or_else(|| self.best(Some(fits)))?;
         if best.ahead > AT_REST || !self.reaches(DVec2::from_array(best.shape.place)) {
             return None;
         }
-        let width_m = libm::exp(best.shape.width) * self.unit_m;
+        let length = if as_blob && best.kind == ContactKind::Blob { best.shape.length } else { best.shape.width };
+        let width_m = libm::exp(0.5 * (best.shape.width + length)) * self.unit_m;
         Some(Explained { felt: best.felt(self).into_iter().map(|felt| felt * self.peak).collect(), width_m })
     }
 
