@@ -3,6 +3,8 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { PALETTE } from "../../crates/page/src/web/dom.js";
+import { DASHES } from "../../crates/page/src/web/plot.js";
+import { dashesOf, TouchPast } from "../../crates/page/src/web/touch_plot.js";
 
 const css = readFileSync(new URL("../../crates/page/src/web/style.css", import.meta.url), "utf8");
 
@@ -124,4 +126,34 @@ test("colours that are used together differ, whatever cones one has", () => {
   // The measure itself: red and green of one lightness are one colour without green cones.
   assert.ok(apart([200, 80, 60], [120, 125, 40], BLINDNESS.deuteranopia) < LEAST);
   assert.ok(apart([200, 80, 60], [120, 125, 40], BLINDNESS.none) > LEAST);
+});
+
+/** What lies over each other on the body, and on the timeline. A diamond and a mark differ by their form, too. */
+const MARKS = {
+  "on the body": ["measure", ...PALETTE.slice(0, TOGETHER).map((colour) => [...colour, 1])],
+  "diamond and distance": ["measure", "meeting"],
+  "on the timeline": ["contact", "accent", "warn", "text", "track"],
+};
+
+test("a measured distance, the playhead and what is repeated differ from what they lie on", () => {
+  for (const [name, scheme] of Object.entries(SCHEMES))
+    for (const [cones, matrix] of Object.entries(BLINDNESS))
+      for (const [where, marks] of Object.entries(MARKS)) {
+        const colours = marks.map((mark) => (typeof mark === "string" ? parts(scheme[mark]) : mark));
+        const from = where === "on the body" ? 1 : colours.length;
+        for (let i = 0; i < from; i++)
+          for (let k = i + 1; k < colours.length; k++) {
+            const distance = apart(colours[i], colours[k], matrix);
+            const what = `${name}, ${cones}, ${where}: ${marks[i]} and ${marks[k]}`;
+            assert.ok(distance >= LEAST, `${what} are ${distance.toFixed(3)} apart`);
+          }
+      }
+});
+
+test("lines of touches of one colour differ by their dashes", () => {
+  const touch = (id) => ({ id, total: 1, force: NaN });
+  const past = new TouchPast();
+  for (let id = 0; id < 6; id++) past.take(id, [touch(id)], () => 2);
+  const dashes = dashesOf(past.within(0, 10)).slice(0, DASHES.length);
+  assert.equal(new Set(dashes.map(String)).size, DASHES.length);
 });

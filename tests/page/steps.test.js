@@ -1,7 +1,7 @@
 // Parts of the page that need no document: what is shown of a recording, addresses of views, tables, a pause, touches over time.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { columnsOfBand, csvOf, headOf, singleText, timesOf } from "../../crates/page/src/web/csv.js";
+import { columnsOfBand, csvOf, headOf, singleText, rowsOf } from "../../crates/page/src/web/csv.js";
 import { fromFragment, toFragment, withoutToken } from "../../crates/page/src/web/fragment.js";
 import { Hold, merged } from "../../crates/page/src/web/hold.js";
 import { distanceText } from "../../crates/page/src/web/measure.js";
@@ -137,15 +137,36 @@ test("a table has a row for each time, empty cells, and no digits too many", () 
 test("a recording's line is one column, or its least and most where parts of the time have several frames", () => {
   const one = { least: new Float32Array([1, NaN, 3]), most: new Float32Array([1, NaN, 3]) };
   const several = { least: new Float32Array([1, 2]), most: new Float32Array([1, 5]) };
-  const names = (band) => columnsOfBand("total", "N", band, [0, 1, 2]).map(({ name }) => name);
+  const names = (band) =>
+    columnsOfBand(
+      "total",
+      "N",
+      band,
+      [0, 1, 2].map((bin) => ({ t: bin, bin })).slice(0, band.least.length),
+    ).map(({ name }) => name);
   assert.deepEqual(names(one), ["total (N)"]);
   assert.deepEqual(names(several), ["total least (N)", "total most (N)"]);
-  // Parts that are shorter than the time between frames have the frames' own times.
-  const times = timesOf({ from: 0, to: 1, bins: 100 }, { start_s: 0, end_s: 1, frames: 11 });
-  near(times[0], 0);
-  near(times[20], 0.2);
-  near(times[5], 0.055, 1e-12);
-  assert.deepEqual(timesOf({ from: 0, to: 1, bins: 2 }, { start_s: 0, end_s: 1, frames: 11 }), [0.25, 0.75]);
+  // Frames that are shown in several parts have the rows: each value is taken halfway to the next frame.
+  const time = { start_s: 0, end_s: 1, frames: 11 };
+  const rows = rowsOf({ from: 0, to: 1, bins: 100 }, time);
+  assert.deepEqual(
+    rows.map(({ bin }) => bin),
+    [5, 15, 25, 35, 45, 55, 65, 75, 85, 95, 99],
+  );
+  near(rows[3].t, 0.3);
+  const some = rowsOf({ from: 0.25, to: 0.5, bins: 100 }, time);
+  assert.deepEqual(
+    some.map(({ t, bin }) => [Number(t.toFixed(9)), bin]),
+    [
+      [0.3, 40],
+      [0.4, 80],
+      [0.5, 99],
+    ],
+  );
+  assert.deepEqual(rowsOf({ from: 0, to: 1, bins: 2 }, time), [
+    { t: 0.25, bin: 0 },
+    { t: 0.75, bin: 1 },
+  ]);
 });
 
 const frame = (seq, more = {}) => ({

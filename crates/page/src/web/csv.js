@@ -41,19 +41,21 @@ export function csvOf(columns) {
 }
 
 /**
- * The columns of a line of a recording: one where each part of the time has one value, else its least and its most.
+ * The columns of a line of a recording: one where each row has one value, else the least and the most.
  * @param {string} name
  * @param {string} unit
  * @param {{least: Float32Array, most: Float32Array}} band
- * @param {number[]} times of its parts
+ * @param {{t: number, bin: number}[]} rows
  * @returns {Column[]}
  */
-export function columnsOfBand(name, unit, { least, most }, times) {
+export function columnsOfBand(name, unit, band, rows) {
+  const t = rows.map((row) => row.t);
+  const [least, most] = [band.least, band.most].map((values) => rows.map(({ bin }) => values[bin]));
   const isOne = least.every((low, i) => low === most[i] || low !== low);
-  if (isOne) return [{ name: headOf(name, unit), t: times, v: least }];
+  if (isOne) return [{ name: headOf(name, unit), t, v: least }];
   return [
-    { name: headOf(`${name} least`, unit), t: times, v: least },
-    { name: headOf(`${name} most`, unit), t: times, v: most },
+    { name: headOf(`${name} least`, unit), t, v: least },
+    { name: headOf(`${name} most`, unit), t, v: most },
   ];
 }
 
@@ -68,17 +70,22 @@ export function headOf(name, unit) {
 }
 
 /**
- * Times of equal parts: the moment of a frame where frames are evenly spaced and one lies in the part, else its middle.
+ * The rows of a table of a recording: a frame each, as if they were evenly spaced, where each is shown in two parts of the time
+ * or more; else a part each, at its middle.
  * @param {{from: number, to: number, bins: number}} parts
  * @param {{start_s: number, end_s: number, frames: number}} time of the recording
  */
-export function timesOf({ from, to, bins }, time) {
+export function rowsOf({ from, to, bins }, time) {
   const width = (to - from) / bins;
   const spacing = time.frames > 1 ? (time.end_s - time.start_s) / (time.frames - 1) : 0;
-  return Array.from({ length: bins }, (_, i) => {
-    const middle = from + (i + 0.5) * width;
-    if (!(spacing > width)) return middle;
-    const frame = time.start_s + Math.round((middle - time.start_s) / spacing) * spacing;
-    return Math.abs(frame - middle) <= 0.5001 * width ? frame : middle;
+  if (spacing < 2 * width)
+    return Array.from({ length: bins }, (_, bin) => ({ t: from + (bin + 0.5) * width, bin }));
+  const slack = 1e-6 * spacing;
+  const first = Math.ceil((from - slack - time.start_s) / spacing);
+  const last = Math.floor((to + slack - time.start_s) / spacing);
+  return Array.from({ length: last - first + 1 }, (_, i) => {
+    const t = time.start_s + (first + i) * spacing;
+    // A frame is shown up to the next one: halfway, rounding cannot make it the one before.
+    return { t, bin: Math.min(bins - 1, Math.floor((t + spacing / 2 - from) / width)) };
   });
 }

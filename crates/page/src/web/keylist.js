@@ -2,24 +2,24 @@
 
 import { byId } from "./dom.js";
 
-/** What the pointer and fingers do. @type {import("./keys.js").Gesture[]} */
+/** What the pointer and fingers do; a bar stands between two ways. @type {import("./keys.js").Gesture[]} */
 export const GESTURES = [
   { where: "On the body", how: "drag", does: "orbit" },
-  { where: "On the body", how: "right drag, ⇧ drag", does: "pan" },
+  { where: "On the body", how: "right drag|⇧ drag", does: "pan" },
   { where: "On the body", how: "wheel", does: "zoom" },
-  { where: "On the body", how: "pointer on a taxel", does: "describe it" },
-  { where: "On the body", how: "click on a taxel", does: "its smallest field, then larger ones" },
-  { where: "On the body", how: "click on a mark", does: "its touch" },
+  { where: "On the body", how: "rest on a taxel", does: "describe it" },
+  { where: "On the body", how: "click a taxel", does: "its smallest field, then larger ones" },
+  { where: "On the body", how: "click a mark", does: "its touch" },
   { where: "On the body", how: "double click", does: "look at the chosen field" },
   { where: "On the timeline", how: "drag", does: "seek" },
   { where: "On the timeline", how: "⇧ drag", does: "repeat this part" },
   { where: "On the timeline", how: "⇧ click", does: "repeat nothing" },
-  { where: "On the timeline", how: "wheel, pinch", does: "zoom" },
+  { where: "On the timeline", how: "wheel|pinch", does: "zoom" },
   { where: "On the timeline", how: "⇧ wheel", does: "earlier and later" },
   { where: "On the timeline", how: "double click", does: "whole recording" },
-  { where: "On plots and lists", how: "wheel on a plot", does: "zoom in time" },
-  { where: "On plots and lists", how: "click on a plot", does: "go to this moment" },
-  { where: "On plots and lists", how: "click on a row", does: "choose it; once more: look at it" },
+  { where: "On plots and lists", how: "wheel", does: "zoom a plot in time" },
+  { where: "On plots and lists", how: "click a plot", does: "go to this moment" },
+  { where: "On plots and lists", how: "click a row", does: "choose it; once more: look at it" },
   { where: "With fingers", how: "one", does: "orbit" },
   { where: "With fingers", how: "two", does: "pan and zoom" },
   { where: "With fingers", how: "tap", does: "describe a taxel" },

@@ -70,7 +70,9 @@ export class Keys {
       ...places.map((where) =>
         section(
           where,
-          this.gestures.filter((one) => one.where === where).map(({ how, does }) => row([how], does)),
+          this.gestures
+            .filter((one) => one.where === where)
+            .map(({ how, does }) => row(how.split("|"), does)),
         ),
       ),
     );

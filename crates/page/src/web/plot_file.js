@@ -1,6 +1,6 @@
 /** Saves what the plots show as a table. */
 
-import { columnsOfBand, csvOf, headOf, timesOf } from "./csv.js";
+import { columnsOfBand, csvOf, headOf, rowsOf } from "./csv.js";
 import { saveFile } from "./dom.js";
 import { short } from "./format.js";
 import { fileName } from "./photo.js";
@@ -45,10 +45,10 @@ export class PlotFile {
     const { asked } = this;
     if (!history || !asked || history.id !== asked.id || !welcome?.time) return;
     this.asked = null;
-    const times = timesOf(history, welcome.time);
+    const rows = rowsOf(history, welcome.time);
     const columns = asked.series.flatMap((one, i) => {
       const band = { least: history.least[i], most: history.most[i] };
-      return columnsOfBand(this.nameOf(one), this.unitOf(one), band, times);
+      return columnsOfBand(this.nameOf(one), this.unitOf(one), band, rows);
     });
     const isParted = columns.length > asked.series.length;
     const part = `${short((1e3 * (history.to - history.from)) / history.bins)} ms`;

@@ -1,6 +1,6 @@
 /** How hard each touch pressed over time, as far as the page has seen it: the server has the past of fields alone. */
 
-import { byId, make, paletteColour } from "./dom.js";
+import { byId, make, PALETTE, paletteColour } from "./dom.js";
 import { DASHES, drawPlot } from "./plot.js";
 
 /** @typedef {{t: number[], v: {total: number[], force: number[]}, colour: number}} Past */
@@ -127,11 +127,12 @@ export class TouchPlot {
   draw(how) {
     if (this.root.hidden) return;
     const touches = this.past.within(how.from, how.to);
-    const lines = touches.map(({ t, v, colour }, i) => {
-      // Touches that do not meet may have one colour.
-      const alike = touches.slice(0, i).filter((other) => other.colour === colour).length;
-      return { colour: paletteColour(colour), dash: DASHES[alike % DASHES.length], points: { t, v } };
-    });
+    const dashes = dashesOf(touches);
+    const lines = touches.map(({ t, v, colour }, i) => ({
+      colour: paletteColour(colour),
+      dash: dashes[i],
+      points: { t, v },
+    }));
     drawPlot(this.canvas, lines, { ...how, unit: this.unit });
     this.name(touches.map(({ id }, i) => ({ id, ...lines[i] })));
   }
@@ -154,6 +155,19 @@ export class TouchPlot {
     if (!lines.length) chips.push(make("span", "note", "No touch has been seen in this time yet."));
     this.chips.replaceChildren(...chips);
   }
+}
+
+/**
+ * How lines are dashed: touches that do not meet may have one colour, and so differ by this.
+ * @param {{colour: number}[]} lines
+ */
+export function dashesOf(lines) {
+  return lines.map(({ colour }, i) => {
+    const before = lines
+      .slice(0, i)
+      .filter((other) => other.colour % PALETTE.length === colour % PALETTE.length);
+    return DASHES[before.length % DASHES.length];
+  });
 }
 
 /**
