@@ -18,7 +18,8 @@ _KEYWORDS = {
 _TEXTS = {"format", "grid", "pitch", "unit", "layout", "spacing", "clear", "backend"}
 _SWITCHES = {"force", "all-fields", "header", "wide"}
 
-_FLAG = re.compile(r"--([a-z][a-z-]*)(?: (HZ\b|FILE\b|-?[0-9][^\s;)`]*[^\s;)`,:?.]|-?[0-9]))?")
+# A flag with its value, if it has one: a number, what begins like one, a place for one, or what is wrong.
+_FLAG = re.compile(r"--([a-z][a-z-]*)(?: (HZ\b|FILE\b|[^\s;)`]+(?= (?:is|are) (?:no|not)\b)|-?[0-9][^\s;)`]*[^\s;)`,:?.]|-?[0-9]))?")
 # A command is shown as it is typed: in quotes, or up to the end of its sentence.
 _COMMAND = re.compile(r"`(?:somatic|cargo) [^`]*`|\b(?:somatic|cargo) [a-z]+ [^`;]*?--[^`;)]*")
 _OF_THE_COMMAND = re.compile(r" \(--strict stops instead\)")

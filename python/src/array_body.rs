@@ -162,7 +162,7 @@ fn mesh(any: &Bound<'_, PyAny>) -> PyResult<MeshData> {
         let normal = (b - a).cross(c - a);
         triangle.iter().for_each(|&vertex| normals[vertex as usize] += normal);
     }
-    let unit = |normal: &DVec3| normal.try_normalize().map_or(Vec3::Z, |normal| normal.as_vec3()).to_array();
+    let unit = |normal: &DVec3| normal.try_normalize().map_or(Vec3::Z, DVec3::as_vec3).to_array();
     Ok(MeshData {
         positions: vertices.iter().map(|vertex| vertex.as_vec3().to_array()).collect(),
         normals: normals.iter().map(unit).collect(),

@@ -384,7 +384,7 @@ impl PyEngine {
     /// >>> found = touch.engine(backend="cpu").verify(touch.t, touch.values)
     /// >>> found["agrees"], found["percepts"]
     /// (True, 3640)
-    #[pyo3(signature = (t, values, mask = None, pose = None))]
+    #[pyo3(signature = (t, values, mask = None, pose = None, *, joints = None))]
     fn verify<'py>(
         &self,
         py: Python<'py>,
@@ -392,6 +392,7 @@ impl PyEngine {
         values: &Bound<'py, PyAny>,
         mask: Option<&Bound<'py, PyAny>>,
         pose: Option<&Bound<'py, PyAny>>,
+        joints: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         if self.backend() == "reference" {
             return Err(usage(py, "this would compare the reference with itself; take backend cpu or gpu"));
@@ -399,7 +400,7 @@ impl PyEngine {
         let t = times(t)?;
         let t_s = t.as_slice()?;
         let held = self.held(values, mask, t_s.len())?;
-        let moved = pose.map(|pose| poses(pose, t_s.len())).transpose()?.unwrap_or_default();
+        let moved = self.placed(t_s.len(), pose, joints)?;
         let mut sum = Agreement::default();
         let before = self.without_python(py, |inner| inner.engine.state()).or_raise(py)?;
         for first in (0..t_s.len()).step_by(256) {

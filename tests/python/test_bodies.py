@@ -183,6 +183,8 @@ def test_joints_give_the_percepts_of_the_command(arm: st.Body, somatic, tmp_path
     by_pose = st.Engine(arm, {"outputs": outputs.split(",")}, backend="cpu").process(t, values, pose=poses)
     assert np.allclose(by_pose["position"], p["position"], atol=1e-12, equal_nan=True) and np.array_equal(by_pose.flags, p.flags)
     engine = st.Engine(arm, {"outputs": ["position"]}, backend="cpu")
+    assert engine.verify(t, values, joints=joints)["agrees"]
+    engine = st.Engine(arm, {"outputs": ["position"]}, backend="cpu")
     one = engine.step(t[7], values[7], joints={name: positions[7] for name, positions in joints.items()})
     assert np.array_equal(one["position"][0], p["position"][7], equal_nan=True)
 

@@ -326,6 +326,8 @@ def test_commands_in_messages_stay_as_they_are_typed() -> None:
         ("--grid and --pitch are for plain matrices", "grid= and pitch= are for plain matrices"),
         ("as with --grid 31x11", "as with grid='31x11'"),
         ("--rate 0 is not a frame rate", "rate_hz=0 is not a frame rate"),
+        ("--grid wide is not rows and columns", "grid='wide' is not rows and columns"),
+        ("--rate is not a frame rate; give Hz", "rate_hz= is not a frame rate; give Hz"),
         ("values are left out (--strict stops instead)", "values are left out"),
         ("--force, or `somatic run --force`; --force", "force=True, or `somatic run --force`; force=True"),
     ]:

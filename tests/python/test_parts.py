@@ -12,6 +12,7 @@ import pytest
 from conftest import ROOT
 
 import somatic_touch as st
+import somatic_touch.batch
 
 TOUCH = ROOT / "bodies" / "touch.csv"
 
@@ -122,6 +123,8 @@ def test_a_bar_grows_where_tqdm_is_installed(touch: st.Recording, tmp_path: path
     assert [bar.about["total"] for bar in bars] == [280, None, 1, None]
     touch.engine(backend="cpu").process(touch.t, touch.values, progress=False)
     assert len(bars) == 4
+    somatic_touch.batch.percepts([TOUCH], {"outputs": ["total"]}, tmp_path, body=touch.body, workers=1, progress=True)
+    assert (bars[4].n, bars[4].about["total"], bars[4].is_closed) == (1, 1, True)
 
 
 def test_without_tqdm_a_bar_is_refused_and_says_what_to_do(touch: st.Recording, monkeypatch) -> None:
