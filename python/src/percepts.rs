@@ -49,21 +49,22 @@ pub(crate) struct PyPercepts {
     frames: Range<usize>,
     /// The fields that it has; all where there is none.
     fields: Option<Arc<[usize]>>,
-    /// Arrays of all frames and fields, which parts share.
-    whole: Arc<Mutex<HashMap<String, Py<PyAny>>>>,
+    /// All that a call has given, whose arrays parts share; none where it is that.
+    whole: Option<Py<Self>>,
     made: Mutex<HashMap<String, Py<PyAny>>>,
 }
 
 impl PyPercepts {
     pub(crate) fn new(inner: Arc<Percepts>, run: Arc<Run>) -> Self {
-        Self { frames: 0..inner.frames(), fields: None, inner, run, whole: Arc::default(), made: Mutex::default() }
+        Self { frames: 0..inner.frames(), fields: None, inner, run, whole: None, made: Mutex::default() }
     }
 
-    /// The part of it with these frames and fields, which are numbered as in the whole batch.
-    fn part(&self, frames: Range<usize>, fields: Option<Arc<[usize]>>) -> Self {
-        let whole = Arc::clone(&self.whole);
-        let (inner, run) = (Arc::clone(&self.inner), Arc::clone(&self.run));
-        Self { inner, run, frames, fields, whole, made: Mutex::default() }
+    /// The part of `of` with these frames and fields, which are numbered as in the whole batch.
+    fn part(of: &Bound<'_, Self>, frames: Range<usize>, fields: Option<Arc<[usize]>>) -> Self {
+        let Self { inner, run, whole, .. } = of.get();
+        let whole = whole.as_ref().map_or_else(|| of.clone().unbind(), |whole| whole.clone_ref(of.py()));
+        let (inner, run) = (Arc::clone(inner), Arc::clone(run));
+        Self { inner, run, frames, fields, whole: Some(whole), made: Mutex::default() }
     }
 
     /// Whether it is all that a call has given.
@@ -115,15 +116,10 @@ impl PyPercepts {
         if let Some(array) = made(self) {
             return Ok(array);
         }
-        let kept = self.whole.lock().unwrap_or_else(PoisonError::into_inner).get(name).map(|it| it.clone_ref(py));
-        let whole = match kept {
-            Some(whole) => whole,
-            None => {
-                // Made without the lock, which a thread that waits for Python must not hold.
-                let whole = make()?;
-                self.whole.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), whole.clone_ref(py));
-                whole
-            }
+        // Made without the lock, which a thread that waits for Python must not hold.
+        let whole = match &self.whole {
+            Some(whole) => whole.get().once(py, name, make)?,
+            None => make()?,
         };
         let array = self.cut(py, whole)?;
         self.made.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), array.clone_ref(py));
@@ -220,16 +216,17 @@ impl PyPercepts {
     /// >>> p.between(0.1, 0.3).t.tolist()
     /// [0.1, 0.2]
     #[pyo3(signature = (t0 = None, t1 = None))]
-    fn between(&self, py: Python<'_>, t0: Option<&Bound<'_, PyAny>>, t1: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+    fn between(slf: &Bound<'_, Self>, t0: Option<&Bound<'_, PyAny>>, t1: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let (py, of) = (slf.py(), slf.get());
         let from_s = t0.map(|t| time_s(t, "t0")).transpose()?.unwrap_or(f64::NEG_INFINITY);
         let to_s = t1.map(|t| time_s(t, "t1")).transpose()?.unwrap_or(f64::INFINITY);
         if from_s.is_nan() || to_s.is_nan() {
             return Err(usage(py, "t0 and t1 should be times in seconds; one is NaN"));
         }
-        let times = &self.inner.times_s()[self.frames.clone()];
+        let times = &of.inner.times_s()[of.frames.clone()];
         let is_in = |t: &f64| (from_s..to_s).contains(t);
         let Some(first) = times.iter().position(is_in) else {
-            return Ok(self.part(self.frames.start..self.frames.start, self.fields.clone()));
+            return Ok(Self::part(slf, of.frames.start..of.frames.start, of.fields.clone()));
         };
         let end = times.iter().rposition(is_in).map_or(first, |last| last + 1);
         if let Some(other) = times[first..end].iter().position(|t| !is_in(t)) {
@@ -239,7 +236,7 @@ impl PyPercepts {
             );
             return Err(usage(py, what));
         }
-        Ok(self.part(self.frames.start + first..self.frames.start + end, self.fields.clone()))
+        Ok(Self::part(slf, of.frames.start + first..of.frames.start + end, of.fields.clone()))
     }
 
     /// The part of it with the fields whose names match `fields`: a glob, or several, as in a scene. `*` does not go over a `/`.
@@ -265,11 +262,12 @@ impl PyPercepts {
     /// >>> p = st.Engine(st.Body.bundled("hand"), {"outputs": ["total"]}, backend="cpu").step(0.0, [0] * 40)
     /// >>> p.select("hand/b*").fields, p.select("hand/b*")["total"].shape
     /// (['hand/back'], (1, 1))
-    fn select(&self, py: Python<'_>, fields: Globs) -> PyResult<Self> {
-        let indices = self.indices();
-        let names = |&field: &usize| [self.run.labels[field].as_str(), self.run.names[field].field.as_str()];
+    fn select(slf: &Bound<'_, Self>, fields: Globs) -> PyResult<Self> {
+        let (py, of) = (slf.py(), slf.get());
+        let indices = of.indices();
+        let names = |&field: &usize| [of.run.labels[field].as_str(), of.run.names[field].field.as_str()];
         let chosen = fields.chosen(py, &indices.iter().map(names).collect::<Vec<_>>())?;
-        Ok(self.part(self.frames.clone(), Some(chosen.into_iter().map(|at| indices[at]).collect())))
+        Ok(Self::part(slf, of.frames.clone(), Some(chosen.into_iter().map(|at| indices[at]).collect())))
     }
 
     /// Draws a column over time, a line a field, and gives matplotlib's axes.
