@@ -16,7 +16,7 @@ rows, columns = np.divmod(np.arange(256), 16)
 def sensor(t: float) -> np.ndarray:
     """What your driver reads: here a finger that circles, with noise."""
     distance = np.hypot(rows - 8 - 4 * np.sin(3 * t), columns - 8 - 4 * np.cos(3 * t))
-    return (100 + 400 * np.exp(-((distance / 1.5) ** 2)) + random.normal(0, 1, 256)).astype(np.float32)
+    return np.asarray(100 + 400 * np.exp(-((distance / 1.5) ** 2)) + random.normal(0, 1, 256), np.float32)
 
 
 took = []

@@ -11,7 +11,7 @@
 np.float32(360.0)
 """
 
-from ._errors import InputError, SomaticError, UsageError
+from ._errors import InputError, SomaticError, UnknownNameError, UsageError
 from ._flags import Flags, TouchFlags
 from ._native import (
     Body,
@@ -19,6 +19,7 @@ from ._native import (
     Engine,
     EngineState,
     Field,
+    Parts,
     Percepts,
     Picture,
     Recording,
@@ -30,6 +31,7 @@ from ._native import (
     __version__,
     author,
     metadata,
+    open,
     read,
     render,
     run,
@@ -45,6 +47,7 @@ __all__ = [
     "Field",
     "Flags",
     "InputError",
+    "Parts",
     "Percepts",
     "Picture",
     "Recording",
@@ -54,11 +57,13 @@ __all__ = [
     "SomaticError",
     "TouchFlags",
     "Touches",
+    "UnknownNameError",
     "UsageError",
     "View",
     "__version__",
     "author",
     "metadata",
+    "open",
     "read",
     "render",
     "run",

@@ -40,6 +40,22 @@ class UsageError(SomaticError, ValueError):
     """
 
 
+class UnknownNameError(UsageError, KeyError):
+    """There is nothing of this name: no output, no quantity, no field. It says which name is nearest, or what there is.
+
+    >>> import somatic_touch as st
+    >>> p = st.Engine(st.Body.bundled("hand"), {"outputs": ["centroid"]}, backend="cpu").step(0.0, [0] * 40)
+    >>> p["centriod"]
+    Traceback (most recent call last):
+        ...
+    somatic_touch.UnknownNameError: there is no output `centriod`; did you mean `centroid`?
+    """
+
+    def __str__(self) -> str:
+        # A KeyError's text is in quotes.
+        return str(self.args[0])
+
+
 class InputError(SomaticError):
     """Something that was read cannot be used; ``file`` and ``place`` say where it stands.
 
@@ -51,5 +67,5 @@ class InputError(SomaticError):
     """
 
 
-for _error in (SomaticError, UsageError, InputError):
+for _error in (SomaticError, UsageError, UnknownNameError, InputError):
     _error.__module__ = "somatic_touch"

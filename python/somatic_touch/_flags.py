@@ -12,6 +12,9 @@ class _Flags(enum.IntFlag):
         # NumPy's integers are none of Python's.
         return super()._missing_(operator.index(value))  # type: ignore[arg-type]
 
+    def __str__(self) -> str:
+        return self.name or (str(int(self)) if self else "none")
+
 
 class Flags(_Flags):
     """Why a quantity is absent or in doubt, and what was wrong with the input.
@@ -19,6 +22,8 @@ class Flags(_Flags):
     >>> import somatic_touch as st
     >>> st.Flags.STILL | st.Flags.TIE
     <Flags.TIE|STILL: 36>
+    >>> print(st.Flags(4), st.Flags(0))
+    TIE none
     """
 
     NO_CONTACT = 1 << 0

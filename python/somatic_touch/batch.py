@@ -13,6 +13,7 @@ from typing import Any
 
 from . import Body, Calibration, Scene, SomaticError
 from ._jobs import Job, Report, outputs
+from ._progress import Bar
 
 __all__ = ["Report", "percepts"]
 
@@ -56,14 +57,14 @@ def percepts(
     backend: str | None = "cpu",
     all_fields: bool = False,
     workers: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: bool | Callable[[int, int], object] | None = None,
 ) -> Report:
     """Makes a table in Parquet of each recording, below the folder `out`, in `workers` processes (by default one a core).
 
     A recording is one piece of work and never cut, as touches and filters have a state. A table appears when it is whole. One that is
     there already, made of the same file by the same body, scene, calibration, backend and version, is left as it is, so that a job that
     was ended goes on where it stopped. A damaged recording is a row of `Report.errors`. `progress` is called with how many recordings are
-    done, and of how many. Ctrl-C gives up what is under way and leaves no half table. A script guards its own start with ``if __name__ == "__main__":``, as all that start processes do.
+    done, and of how many; True shows a bar of tqdm. Ctrl-C gives up what is under way and leaves no half table. A script guards its own start with ``if __name__ == "__main__":``, as all that start processes do.
 
     >>> import pathlib, tempfile
     >>> import somatic_touch as st, somatic_touch.batch
@@ -84,8 +85,12 @@ def percepts(
     todo = [pair for pair in pairs if pair not in skipped]
     rows: list[dict[str, Any]] = []
 
+    bar = Bar(len(pairs), "recordings") if progress is True else None
+
     def tell() -> None:
-        if progress is not None:
+        if bar is not None:
+            bar(len(skipped) + len(rows))
+        elif callable(progress):
             progress(len(skipped) + len(rows), len(pairs))
 
     tell()
@@ -114,6 +119,8 @@ def percepts(
             raise
         finally:
             pool.shutdown(cancel_futures=True)
+    if bar is not None:
+        bar.close()
     order = {str(recording): index for index, (recording, _) in enumerate(pairs)}
     rows.sort(key=lambda row: order[row["recording"]])
     return Report(rows, [str(recording) for recording, _ in skipped])

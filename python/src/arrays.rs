@@ -1,15 +1,19 @@
 //! Arrays in and out: what Python gives, as slices, and what the library has, as NumPy's arrays.
 
+use std::collections::HashMap;
+
 use glam::{DQuat, DVec3};
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyDictMethods, PyList};
+use pyo3::types::{PyDict, PyDictMethods, PyList, PyTuple};
 use somatic::RawValue;
 use somatic::signal::Pose;
 
-use crate::error::usage;
+use crate::error::{unknown_name, usage};
+use crate::stream::in_python;
 
 static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
@@ -43,17 +47,61 @@ impl Values<'_> {
 }
 
 /// As Python writes a shape.
-fn shown(shape: &[usize]) -> String {
+pub(crate) fn shown(shape: &[usize]) -> String {
     let parts: Vec<String> = shape.iter().map(ToString::to_string).collect();
     format!("[{}]", parts.join(", "))
 }
 
-/// The values in `any`, which should have `shape`, called `names`; `mask` says which are missing.
+/// The frames in `any` if they are dicts of the taxels that have a value: one, or as many as `shape` says.
+fn by_id<'py>(any: &Bound<'py, PyAny>, shape: &[usize]) -> Option<Vec<Bound<'py, PyDict>>> {
+    if shape.len() == 1 {
+        return any.cast::<PyDict>().ok().map(|frame| vec![frame.clone()]);
+    }
+    let frames: Vec<Bound<'py, PyDict>> = if let Ok(list) = any.cast::<PyList>() {
+        list.iter().map(|frame| frame.cast_into().ok()).collect::<Option<_>>()?
+    } else {
+        any.cast::<PyTuple>().ok()?.iter().map(|frame| frame.cast_into().ok()).collect::<Option<_>>()?
+    };
+    (frames.len() == shape[0] && !frames.is_empty()).then_some(frames)
+}
+
+/// The values of `frames`, which are by taxel; `ids` are the taxels of a frame. What a frame does not have, or None, is missing.
+fn of_dicts(py: Python<'_>, frames: &[Bound<'_, PyDict>], ids: &[u32]) -> PyResult<Vec<RawValue>> {
+    let index_of: HashMap<u32, usize> = ids.iter().enumerate().map(|(index, id)| (*id, index)).collect();
+    let mut values = vec![RawValue::MISSING; frames.len() * ids.len()];
+    for (number, frame) in frames.iter().enumerate() {
+        for (id, value) in frame.iter() {
+            let place = id.extract::<u32>().ok().and_then(|id| index_of.get(&id));
+            let Some(place) = place else {
+                let some: Vec<String> = ids.iter().take(5).map(ToString::to_string).collect();
+                let (some, more) = (some.join(", "), if ids.len() > 5 { ", …" } else { "" });
+                let what = format!("frame {number} has a value of taxel {}; the engine's are {some}{more}", id.repr()?);
+                return Err(unknown_name(py, what));
+            };
+            if !value.is_none() {
+                let value: f64 = value.extract().map_err(|_| {
+                    usage(
+                        py,
+                        format!(
+                            "frame {number}: taxel {id} should have a number, or None if it is missing; this is {}",
+                            shown_type(&value)
+                        ),
+                    )
+                })?;
+                values[number * ids.len() + place] = RawValue::new(value);
+            }
+        }
+    }
+    Ok(values)
+}
+
+/// The values in `any`, which should have `shape`, called `names`, of the taxels `ids`; `mask` says which are missing.
 pub(crate) fn values<'py>(
     any: &Bound<'py, PyAny>,
     mask: Option<&Bound<'py, PyAny>>,
     shape: &[usize],
     names: &str,
+    ids: &[u32],
 ) -> PyResult<Values<'py>> {
     let py = any.py();
     if mask.is_none()
@@ -63,6 +111,12 @@ pub(crate) fn values<'py>(
         && array.is_aligned()
     {
         return Ok(Values::Borrowed(array.try_readonly()?));
+    }
+    if let Some(frames) = by_id(any, shape) {
+        if mask.is_some() {
+            return Err(usage(py, "frames that are dicts leave out what is missing; give no mask"));
+        }
+        return of_dicts(py, &frames, ids).map(Values::Owned);
     }
     let expected = || format!("values should be float32 of shape {names} = {}", shown(shape));
     let array =
@@ -114,11 +168,43 @@ fn one_line(error: &PyErr) -> String {
     error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// `array` in seconds, where it has dates.
+fn seconds<'py>(array: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !["M", "m", "O"].contains(&kind.as_str()) {
+        return Ok(array);
+    }
+    let made = in_python(array.py(), "_times", "seconds", (&array,))?;
+    Ok(if made.is_none() { array } else { made })
+}
+
+/// The time `any`, called `name`, s: a number, or a date.
+pub(crate) fn time_s(any: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    if let Ok(t_s) = any.extract::<f64>() {
+        return Ok(t_s);
+    }
+    let array = as_array(any).and_then(seconds);
+    let found = match array {
+        // What is wrong with a date has been said.
+        Err(why) if why.is_instance_of::<PyValueError>(any.py()) => return Err(why),
+        found => found.and_then(|array| array.call_method0("item")?.extract::<f64>()),
+    };
+    found.map_err(|_| {
+        usage(any.py(), format!("{name} should be a time in seconds, or a datetime; this is {}", shown_type(any)))
+    })
+}
+
+fn shown_type(any: &Bound<'_, PyAny>) -> String {
+    any.get_type().name().map_or_else(|_| "something else".to_owned(), |name| format!("of type {name}"))
+}
+
 /// The times in `any`, s.
 pub(crate) fn times<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     let py = any.py();
-    let wrong = |got: &str| usage(py, format!("t should be float64 of shape [frames], in seconds; {got}"));
+    let wrong =
+        |got: &str| usage(py, format!("t should be float64 of shape [frames], in seconds, or datetimes; {got}"));
     let array = as_array(any).map_err(|why| wrong(&format!("this is not an array: {}", one_line(&why))))?;
+    let array = seconds(array)?;
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if shape.len() != 1 || !["f", "i", "u"].contains(&kind.as_str()) {
@@ -126,6 +212,18 @@ pub(crate) fn times<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn
     }
     let array = contiguous(&array, "float64")?;
     array.cast::<PyArrayDyn<f64>>().map_err(|_| wrong("this is not"))?.try_readonly().map_err(Into::into)
+}
+
+/// How many frames the poses in `any` are of, if any is of several.
+pub(crate) fn pose_frames(any: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+    let Ok(dict) = any.cast::<PyDict>() else { return Ok(None) };
+    for pose in dict.values() {
+        let shape: Vec<usize> = as_array(&pose)?.getattr("shape")?.extract()?;
+        if let [frames, _] = shape[..] {
+            return Ok(Some(frames));
+        }
+    }
+    Ok(None)
 }
 
 /// The poses in `any`: by link `[x, y, z, qx, qy, qz, qw]`, one for all frames or one for each.
@@ -171,6 +269,31 @@ pub(crate) fn poses(any: &Bound<'_, PyAny>, frames: usize) -> PyResult<Vec<(Stri
     Ok(poses)
 }
 
+/// The float64 numbers in `any`, called `name`, with their shape.
+pub(crate) fn doubles(any: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let py = any.py();
+    let wrong = |got: String| usage(py, format!("{name} should be numbers; {got}"));
+    let array = as_array(any).map_err(|why| wrong(format!("this is no array: {}", one_line(&why))))?;
+    let shape: Vec<usize> = array.getattr("shape")?.extract()?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !["f", "i", "u"].contains(&kind.as_str()) {
+        return Err(wrong(format!("this is {} of shape {}", array.getattr("dtype")?.str()?, shown(&shape))));
+    }
+    let array = contiguous(&array, "float64")?;
+    let array = array.cast::<PyArrayDyn<f64>>().map_err(|_| wrong("this is not".to_owned()))?.try_readonly()?;
+    Ok((array.as_slice()?.to_vec(), shape))
+}
+
+/// Vectors of three in `any`, called `name`, which should be [rows, 3].
+pub(crate) fn vectors(any: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<DVec3>> {
+    let (numbers, shape) = doubles(any, name)?;
+    if shape.len() != 2 || shape[1] != 3 {
+        return Err(usage(any.py(), format!("{name} should have shape [rows, 3]; this has {}", shown(&shape))));
+    }
+    let (rows, _) = numbers.as_chunks::<3>();
+    Ok(rows.iter().map(|row| DVec3::from_array(*row)).collect())
+}
+
 /// `values` as a read-only array of `shape`, which owns them.
 pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>, shape: &[usize]) -> PyResult<Py<PyAny>> {
     let array = ArrayD::from_shape_vec(IxDyn(shape), values)
@@ -180,24 +303,15 @@ pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>, shape: &[usize])
     Ok(array.into_any().unbind())
 }
 
-/// An array of structures, whose fields are given by name with their types and values.
+/// An array of structures, whose fields are given by name with their types and values; a vector is a column for each component.
 pub(crate) fn structured<'py>(
     py: Python<'py>,
     length: usize,
     fields: &[(&str, &str, usize, Py<PyAny>)],
 ) -> PyResult<Bound<'py, PyAny>> {
-    let numpy = py.import("numpy")?;
-    let dtype = PyList::empty(py);
-    for (name, kind, width, _) in fields {
-        match width {
-            1 => dtype.append((name, kind))?,
-            _ => dtype.append((name, kind, (*width,)))?,
-        }
+    let list = PyList::empty(py);
+    for field in fields {
+        list.append((field.0, field.1, field.2, field.3.bind(py)))?;
     }
-    let made = numpy.call_method1("empty", (length, numpy.call_method1("dtype", (dtype,))?))?;
-    for (name, _, _, values) in fields {
-        made.set_item(name, values)?;
-    }
-    made.call_method1("setflags", (false,))?;
-    Ok(made)
+    in_python(py, "_rows", "rows", (length, list))
 }

@@ -11,6 +11,7 @@ use somatic::{Body, Error, bundled};
 
 use crate::body::PyBody;
 use crate::error::{OrRaise, interrupted};
+use crate::progress::Progress;
 use crate::threads::free;
 
 /// Puts a skin on a mesh, as `somatic author` does, and gives the body.
@@ -19,7 +20,7 @@ use crate::threads::free;
 /// docs/reference/recipe.md describes; or `taxels`, how many, `spacing`, such as '8 mm', or both, on the nodes, meshes or links whose names match
 /// one of the globs `regions`. `unit` says what the file's numbers are: 'um', 'mm', 'cm' or 'm'. `even=False` leaves taxels where they
 /// were scattered, `hidden='keep'` places some where nothing can touch them, and `clear`, such as '5 mm', is their least distance from
-/// where a link, a mesh or the surface ends; without them the recipe's hold. `progress` is called with the share that is done, 0 to 1.
+/// where a link, a mesh or the surface ends; without them the recipe's hold. `progress` is called with the share that is done, 0 to 1; True shows a bar of tqdm.
 ///
 /// >>> import somatic_touch as st
 /// >>> body = st.author("hand", taxels=60, seed=1)
@@ -70,13 +71,14 @@ pub(crate) fn author(
     if let Some(clear) = clear {
         made = made.with_clear(clear).map_err(|e| e.at("clear")).or_raise(py)?;
     }
+    let progress = Progress::new(py, progress, Some(1.0), "")?;
     let mut raised = None;
     let done = free(py, || {
         let file = open(&shape, &mut made)?;
         let shown = |share: f64| {
             let heard = Python::attach(|py| {
                 py.check_signals()?;
-                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (share,)).map(drop))
+                progress.as_ref().map_or(Ok(()), |progress| progress.tell(py, (share,)))
             });
             raised = heard.err();
             raised.is_none()
@@ -91,7 +93,11 @@ pub(crate) fn author(
     });
     match raised {
         Some(error) => Err(interrupted(Some(error))),
-        None => done.or_raise_of(py, &shape),
+        None => {
+            let made = done.or_raise_of(py, &shape)?;
+            progress.as_ref().map_or(Ok(()), |progress| progress.fill(py, (1.0,)))?;
+            Ok(made)
+        }
     }
 }
 

@@ -1,23 +1,29 @@
 //! `Body` and its fields.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use somatic::author::{GridOrder, SheetGrid, author_sheets};
-use somatic::body::Original;
+use somatic::body::{LinkMotion, Original, WORLD_FROM_BODY};
 use somatic::error::suggestion;
 use somatic::field::FieldSet;
+use somatic::signal::Pose;
 use somatic::{Body, OutputPath, bundled};
 
-use crate::arrays::{array, structured};
-use crate::error::{OrRaise, usage};
+use crate::array_body::{ArrayBody, LinkNames};
+use crate::arrays::{array, pose_frames, poses, structured};
+use crate::error::{OrRaise, unknown_name, usage};
+use crate::kinematics::{Positions, joints};
+use crate::same::{hash_of, same};
+use crate::stream::in_python;
 use crate::threads::free;
 
 /// A robot's shape, its sensors and its fields.
 ///
-/// Threads may share one.
+/// Threads may share one. Two of the same name and the same file are equal (`==`).
 ///
 /// >>> import somatic_touch as st
 /// >>> body = st.Body.bundled("hand")
@@ -244,6 +250,9 @@ impl PyBody {
     /// Its sensors, an array of structures [taxels] by ascending id: `id`; `link`, an index into `links`; `position` and `normal`
     /// [3] in the link's frame, in metres; `place`, the position in the world with the body at rest; `area`, in m², 0 where unknown; `modality`.
     ///
+    /// It is a table as it is: `pandas.DataFrame(body.taxels)` and `polars.DataFrame(body.taxels)` have vectors as columns
+    /// `position_x`, `position_y`, `position_z`, and so on.
+    ///
     /// >>> import somatic_touch as st
     /// >>> taxels = st.Body.bundled("hand").taxels
     /// >>> taxels["id"][:3].tolist(), taxels["area"].dtype
@@ -308,10 +317,220 @@ impl PyBody {
         array(py, corners.collect::<Vec<f64>>(), &[triangles.len(), 3, 3])
     }
 
+    /// Its surface in the world with the body at rest: vertices, float64 [vertices, 3], in metres, and faces, uint32 [faces, 3], indices
+    /// of vertices, counter-clockwise seen from outside. Without a surface both are empty.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> vertices, faces = st.Body.bundled("hand").surface
+    /// >>> vertices.shape[1], faces.shape[1], int(faces.max()) < len(vertices)
+    /// (3, 3, True)
+    #[getter]
+    fn surface(&self, py: Python<'_>) -> PyResult<(Py<PyAny>, Py<PyAny>)> {
+        let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+        let mut index_of = HashMap::new();
+        for (_, corners) in self.inner.triangles_at_rest() {
+            faces.extend(corners.map(|corner| {
+                let corner = WORLD_FROM_BODY.transform_point3(corner).to_array();
+                *index_of.entry(corner.map(f64::to_bits)).or_insert_with(|| {
+                    vertices.extend(corner);
+                    (vertices.len() / 3 - 1) as u32
+                })
+            }));
+        }
+        let shapes = [[vertices.len() / 3, 3], [faces.len() / 3, 3]];
+        Ok((array(py, vertices, &shapes[0])?, array(py, faces, &shapes[1])?))
+    }
+
+    /// A body of arrays, in metres, in the world's axes: z up, x forward, y left.
+    ///
+    /// Parameters
+    /// ----------
+    /// positions, normals : array_like, [taxels, 3]
+    ///     Of each taxel where it is and which way it points, outwards, in the frame of its link. Normals need not have length 1.
+    /// link : str or sequence of str
+    ///     The link of all taxels, or of each. Links move each by itself, and at rest all are at the origin.
+    /// ids : array_like of int, [taxels], optional
+    ///     By default 0, 1, 2, …
+    /// areas : float or array_like, [taxels], optional
+    ///     In m²; unknown by default, and with that what needs one, such as `force` of pressures.
+    /// surface : (vertices, faces) or dict of link to (vertices, faces), optional
+    ///     Triangles, float [vertices, 3] and int [faces, 3], counter-clockwise seen from outside; without a link that of the first one.
+    /// name : str
+    ///     Of the body, and of its link unless that has a name.
+    ///
+    /// Returns
+    /// -------
+    /// Body
+    ///     With a field for each link, or those that `author` would make. A file has numbers in single precision, so this one has them too.
+    ///
+    /// Raises
+    /// ------
+    /// UsageError
+    ///     Where shapes do not fit, a number is not finite, a normal is zero, an id is there twice, or a face has no vertex.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> import somatic_touch as st
+    /// >>> x, y = np.meshgrid(np.arange(4) * 0.01, np.arange(3) * 0.01)
+    /// >>> positions = np.stack([x.ravel(), y.ravel(), np.zeros(12)], axis=1)
+    /// >>> st.Body.from_arrays(positions, np.tile([0, 0, 1], (12, 1)), areas=1e-4, name="pad")
+    /// <Body pad: 12 taxels in 1 field on 1 link>
+    #[staticmethod]
+    #[pyo3(signature = (positions, normals, *, link = None, ids = None, areas = None, surface = None, name = "skin"))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords")]
+    fn from_arrays(
+        py: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        normals: &Bound<'_, PyAny>,
+        link: Option<LinkNames>,
+        ids: Option<Vec<u32>>,
+        areas: Option<&Bound<'_, PyAny>>,
+        surface: Option<&Bound<'_, PyAny>>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let parts = ArrayBody::new(py, [positions, normals], link, ids, areas, surface, name)?;
+        free(py, || Self::of_bytes(name, parts.to_glb(name)?)).or_raise(py)
+    }
+
+    /// The joints that move on their own, by name: `link`, which each moves; `kind`, 'revolute', 'continuous' or 'prismatic'; `unit` of
+    /// its positions, 'rad' or 'm'; and `limits`, the least and the greatest position, or None. A body that was made from a URDF has them.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> st.Body.bundled("hand").joints
+    /// {}
+    #[getter]
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let made = PyDict::new(py);
+        for (name, link) in joints(&self.inner) {
+            let link = &self.inner.links[link];
+            let Some(joint) = &link.joint else { continue };
+            let (kind, unit) = match joint.motion {
+                LinkMotion::Revolute(_) => ("revolute", "rad"),
+                LinkMotion::Continuous(_) => ("continuous", "rad"),
+                LinkMotion::Prismatic(_) => ("prismatic", "m"),
+            };
+            let about = PyDict::new(py);
+            about.set_item("link", &link.name)?;
+            about.set_item("kind", kind)?;
+            about.set_item("unit", unit)?;
+            about.set_item("limits", joint.limits.map(|[low, high]| (low, high)))?;
+            made.set_item(name, about)?;
+        }
+        Ok(made)
+    }
+
+    /// Where links are, from the positions of joints: what `Engine.process` takes as `pose`.
+    ///
+    /// Parameters
+    /// ----------
+    /// joints : dict of str to float or array_like, [frames]
+    ///     By joint its position in rad or m, of all frames or of each. At 0 a link is where the body has it at rest. Joints that follow
+    ///     others are left out.
+    /// pose : dict of str to array_like, [7] or [frames, 7], optional
+    ///     Poses of links that are known otherwise, such as a floating base: what hangs on these goes from there. Without it roots
+    ///     are where the body has them at rest.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to numpy.ndarray
+    ///     By link float64 [7], or [frames, 7] where any position or pose has frames: x, y, z in the world, in metres, and a quaternion
+    ///     qx, qy, qz, qw. Links that hang on a joint without a position are not in it.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import somatic_touch as st
+    /// >>> poses = st.Body.bundled("hand").forward({}, {"hand": [1, 2, 3, 0, 0, 0, 1]})
+    /// >>> poses["hand"].tolist()
+    /// [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]
+    #[pyo3(signature = (joints, pose = None))]
+    fn forward<'py>(
+        &self,
+        py: Python<'py>,
+        joints: &Bound<'py, PyAny>,
+        pose: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let known = pose.map(pose_frames).transpose()?.flatten();
+        let (positions, frames) = Positions::new(joints, &self.inner, known)?;
+        let count = frames.unwrap_or(1);
+        let given = pose.map(|pose| poses(pose, count)).transpose()?.unwrap_or_default();
+        for (link, _) in &given {
+            if self.inner.link_index(link).is_none() {
+                let near = suggestion(link, self.inner.links.iter().map(|link| link.name.as_str()));
+                return Err(unknown_name(py, format!("pose: there is no link `{link}`; {near}")));
+            }
+        }
+        let made = PyDict::new(py);
+        for (link, poses) in positions.poses(&self.inner, count, &given) {
+            let numbers = poses.iter().flat_map(|Pose { translation, rotation }| {
+                translation.to_array().into_iter().chain(rotation.to_array())
+            });
+            let shape = [count, 7];
+            made.set_item(link, array(py, numbers.collect(), if frames.is_some() { &shape } else { &shape[1..] })?)?;
+        }
+        Ok(made)
+    }
+
+    /// Draws its taxels at rest, in the world, with its surface, and gives matplotlib's axes.
+    ///
+    /// Parameters
+    /// ----------
+    /// values : array_like, [taxels], optional
+    ///     A number for each taxel by ascending id, which is its colour; hollow where it is NaN. Without it colours are of links.
+    /// ax : mpl_toolkits.mplot3d.Axes3D, optional
+    ///     Where to draw; by default in a new figure.
+    /// surface : bool
+    ///     Whether to draw triangles: at most 20,000, of more every second or third, and so on.
+    /// unit : str, optional
+    ///     What the values are, beside the scale of colours.
+    ///
+    /// Returns
+    /// -------
+    /// mpl_toolkits.mplot3d.Axes3D
+    ///
+    /// Examples
+    /// --------
+    /// >>> import matplotlib
+    /// >>> matplotlib.use("Agg")
+    /// >>> import somatic_touch as st
+    /// >>> st.Body.bundled("hand").plot().get_zlabel()
+    /// 'z, up [m]'
+    #[pyo3(signature = (values = None, *, ax = None, surface = true, unit = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        values: Option<Bound<'py, PyAny>>,
+        ax: Option<Bound<'py, PyAny>>,
+        surface: bool,
+        unit: Option<&str>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_plots", "body", (slf, values, ax, surface, unit))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_html", "body", (slf,))
+    }
+
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        same(py, other, |other: &Self| self.inner.name == other.inner.name && self.bytes == other.bytes)
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash_of(&(&self.inner.name, &*self.bytes))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyDict>) -> Py<Self> {
+        slf
+    }
+
     fn __repr__(&self) -> String {
         let Body { name, taxels, fields, links, .. } = &*self.inner;
-        let s = if links.len() == 1 { "" } else { "s" };
-        format!("<Body {name}: {} taxels in {} fields on {} link{s}>", taxels.len(), fields.len(), links.len())
+        let s = |count: usize| if count == 1 { "" } else { "s" };
+        let (fields, links) = (fields.len(), links.len());
+        format!("<Body {name}: {} taxels in {fields} field{} on {links} link{}>", taxels.len(), s(fields), s(links))
     }
 
     #[expect(clippy::type_complexity, reason = "pickle's own form: a function and its arguments")]

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use somatic::Calibration;
 
 use crate::body::PyBody;
 use crate::error::OrRaise;
+use crate::same::{hash_of, same};
 
 /// How one robot's sensors answer: baselines, gains, units, and which values to reject.
 ///
@@ -16,19 +18,31 @@ use crate::error::OrRaise;
 /// >>> body = st.Body.bundled("hand")
 /// >>> st.Calibration("[all]\ngain = 2\nunit = 'kPa'", body).quantity
 /// 'Pa'
-#[pyclass(module = "somatic_touch", name = "Calibration", frozen)]
+///
+/// Two of the same text for the same taxels are equal (`==`).
+#[pyclass(module = "somatic_touch", name = "Calibration", frozen, skip_from_py_object)]
+#[derive(Clone)]
 pub(crate) struct PyCalibration {
     pub(crate) inner: Calibration,
     /// As tables keep it.
     pub(crate) text: String,
-    taxels: usize,
+    /// The name and the taxels of the body that it is for.
+    of: (String, Vec<u32>),
 }
 
 impl PyCalibration {
     pub(crate) fn of_text(text: &str, body: &PyBody) -> somatic::Result<Self> {
-        let inner = Calibration::parse(text, &body.ids())?;
-        inner.check_body(&body.inner.name)?;
-        Ok(Self { taxels: inner.taxels.len(), inner, text: text.to_owned() })
+        Self::of_parts(text, body.inner.name.clone(), body.ids())
+    }
+
+    fn of_parts(text: &str, body: String, ids: Vec<u32>) -> somatic::Result<Self> {
+        let inner = Calibration::parse(text, &ids)?;
+        inner.check_body(&body)?;
+        Ok(Self { inner, text: text.to_owned(), of: (body, ids) })
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        (&self.text, &self.of) == (&other.text, &other.of)
     }
 
     /// This one laid over `own`, which comes with the file `of`, as the command does it: keys that it has replace the file's own,
@@ -81,6 +95,34 @@ impl PyCalibration {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Calibration of {} taxels in {}>", self.taxels, self.quantity())
+        format!("<Calibration of {} taxels in {}>", self.inner.taxels.len(), self.quantity())
+    }
+
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        same(py, other, |other: &Self| self.is_same(other))
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash_of(&(&self.text, &self.of))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyDict>) -> Py<Self> {
+        slf
+    }
+
+    #[expect(clippy::type_complexity, reason = "pickle's own form: a function and its arguments")]
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, String, Vec<u32>))> {
+        let Self { text, of: (body, ids), .. } = slf.get();
+        Ok((slf.get_type().getattr("_of_parts")?, (text.clone(), body.clone(), ids.clone())))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_of_parts")]
+    fn unpickled(py: Python<'_>, text: &str, body: String, ids: Vec<u32>) -> PyResult<Self> {
+        Self::of_parts(text, body, ids).or_raise(py)
     }
 }

@@ -58,7 +58,8 @@ impl Read {
     fn of(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
         let t_s = crate::arrays::times(recording.t.bind(py))?.as_slice()?.to_vec();
         let shape = [t_s.len(), recording.taxels.len()];
-        let values = values(recording.values.bind(py), None, &shape, "[frames, taxels]")?.slice().to_vec();
+        let values =
+            values(recording.values.bind(py), None, &shape, "[frames, taxels]", &recording.taxels)?.slice().to_vec();
         Ok(Self { name: recording.name.clone(), taxels: recording.taxels.clone(), t_s, values })
     }
 

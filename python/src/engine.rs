@@ -5,17 +5,19 @@ use std::time::Instant;
 
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use somatic::page::Listen;
-use somatic::signal::FrameBlock;
+use somatic::signal::{FrameBlock, Pose};
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts};
 
 use crate::agreement::told;
-use crate::arrays::{Values, poses, times, values};
+use crate::arrays::{Values, poses, time_s, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
-use crate::error::{OrRaise, interrupted, usage, warn};
+use crate::error::{OrRaise, interrupted, stays_here, usage, warn};
+use crate::kinematics::Positions;
 use crate::percepts::PyPercepts;
+use crate::progress::Progress;
 use crate::scene::PyScene;
 use crate::session::Run;
 use crate::state::PyState;
@@ -34,6 +36,7 @@ const LENT: usize = 4;
 /// `scene` is a `Scene`, a dict of its keys, or the text of a scene file. `backend` is 'auto', 'cpu', 'gpu' or 'reference'.
 /// `taxels` are the ids of the values of a frame, in their order; without them it is all of the body's, by ascending id.
 /// An engine goes on from call to call: motion, touches and filters know the frames before. Threads may share one, and take turns.
+/// `copy.copy` makes another in the same state. One that has processed no frame can be pickled; a state cannot.
 ///
 /// >>> import numpy as np
 /// >>> import somatic_touch as st
@@ -52,6 +55,40 @@ pub(crate) struct PyEngine {
     channels: Vec<u32>,
     /// The values of a frame.
     width: usize,
+    wish: Wish,
+}
+
+/// What an engine was made of.
+#[derive(Clone)]
+struct Wish {
+    body: PyBody,
+    scene: String,
+    calibration: Option<PyCalibration>,
+    backend: Option<String>,
+    taxels: Option<Vec<u32>>,
+    batch: usize,
+}
+
+impl Wish {
+    fn make(self, py: Python<'_>) -> PyResult<PyEngine> {
+        let scene = PyScene::of_text(py, &self.scene)?;
+        let Self { body, calibration, backend, taxels, batch, .. } = &self;
+        let backend = backend.as_deref().map(str::parse::<BackendKind>).transpose().or_raise(py)?;
+        let made = free(py, || {
+            let options = scene.options(calibration.as_ref().map(|calibration| &calibration.inner), backend, *batch)?;
+            let mut engine = Engine::new(&body.inner, options)?;
+            if let Some(taxels) = taxels {
+                engine.set_channels(taxels).map_err(|e| e.at("taxels"))?;
+            }
+            Ok::<_, Error>(engine)
+        });
+        let engine = made.or_raise(py)?;
+        let text = calibration.as_ref().map(|calibration| calibration.text.as_str());
+        let run = Arc::new(Run::new(&engine, &body.inner, &body.bytes, &self.scene, text));
+        let channels = taxels.clone().unwrap_or_else(|| body.ids());
+        let inner = Mutex::new(Inner { engine, lent: Vec::new(), page: None });
+        Ok(PyEngine { inner, run, width: channels.len(), channels, wish: self })
+    }
 }
 
 struct Inner {
@@ -108,7 +145,27 @@ impl PyEngine {
         mask: Option<&Bound<'py, PyAny>>,
         frames: usize,
     ) -> PyResult<Values<'py>> {
-        self::values(values, mask, &[frames, self.width], "[frames, taxels]")
+        self::values(values, mask, &[frames, self.width], "[frames, taxels]", &self.channels)
+    }
+
+    /// Where links are in `frames` frames: by their poses, and by the positions of joints.
+    fn placed(
+        &self,
+        frames: usize,
+        pose: Option<&Bound<'_, PyAny>>,
+        joints: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<(String, Vec<Pose>)>> {
+        let given = pose.map(|pose| poses(pose, frames)).transpose()?.unwrap_or_default();
+        let Some(joints) = joints else { return Ok(given) };
+        let body = &self.run.body;
+        let (positions, _) = Positions::new(joints, body, Some(frames))?;
+        let known = |(name, _): &&(String, Vec<Pose>)| body.link_index(name).is_none();
+        // What the body does not have the engine refuses by name.
+        let strange: Vec<_> = given.iter().filter(known).cloned().collect();
+        let mut placed = positions.poses(body, frames, &given);
+        positions.check(joints.py(), body, &placed)?;
+        placed.extend(strange);
+        Ok(placed)
     }
 
     /// Refuses a call whose percepts have no room, which would end the process.
@@ -140,23 +197,49 @@ impl PyEngine {
         taxels: Option<Vec<u32>>,
         batch: usize,
     ) -> PyResult<Self> {
-        let scene = PyScene::of_any(scene, py)?;
-        let scene = scene.get();
-        let backend = backend.map(str::parse::<BackendKind>).transpose().or_raise(py)?;
-        let made = free(py, || {
-            let options = scene.options(calibration.map(|calibration| &calibration.inner), backend, batch)?;
-            let mut engine = Engine::new(&body.inner, options)?;
-            if let Some(taxels) = &taxels {
-                engine.set_channels(taxels).map_err(|e| e.at("taxels"))?;
-            }
-            Ok::<_, Error>(engine)
-        });
-        let engine = made.or_raise(py)?;
-        let text = calibration.map(|calibration| calibration.text.as_str());
-        let run = Arc::new(Run::new(&engine, &body.inner, &body.bytes, &scene.text, text));
-        let channels = taxels.unwrap_or_else(|| body.ids());
-        let inner = Mutex::new(Inner { engine, lent: Vec::new(), page: None });
-        Ok(Self { inner, run, width: channels.len(), channels })
+        let scene = PyScene::of_any(scene, py)?.get().text.clone();
+        let (body, calibration, backend) = (body.clone(), calibration.cloned(), backend.map(str::to_owned));
+        Wish { body, scene, calibration, backend, taxels, batch }.make(py)
+    }
+
+    /// Another engine in the same state, which goes on by itself.
+    fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
+        let state = self.without_python(py, |inner| inner.engine.state()).or_raise(py)?;
+        let copy = Wish { backend: Some(self.backend().to_owned()), ..self.wish.clone() }.make(py)?;
+        copy.without_python(py, |inner| inner.engine.restore(&state)).or_raise(py)?;
+        Ok(copy)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyDict>) -> PyResult<Self> {
+        self.__copy__(py)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, of) = (slf.py(), slf.get());
+        let frames = of.without_python(py, |inner| inner.engine.state()).or_raise(py)?.frames();
+        if frames > 0 {
+            return Err(stays_here(&format!(
+                "this engine has processed {frames} frames, and its state cannot be pickled; pickle it before its first frame, or \
+                 send the recording and process it there"
+            )));
+        }
+        let Wish { body, scene, calibration, backend, taxels, batch } = of.wish.clone();
+        let parts = (body, scene, calibration, backend, taxels, batch).into_pyobject(py)?;
+        Ok((slf.get_type().getattr("_of_parts")?, parts))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_of_parts")]
+    fn unpickled(
+        py: Python<'_>,
+        body: &PyBody,
+        scene: String,
+        calibration: Option<&PyCalibration>,
+        backend: Option<String>,
+        taxels: Option<Vec<u32>>,
+        batch: usize,
+    ) -> PyResult<Self> {
+        Wish { body: body.clone(), scene, calibration: calibration.cloned(), backend, taxels, batch }.make(py)
     }
 
     /// Turns frames into percepts, in order.
@@ -166,8 +249,12 @@ impl PyEngine {
     /// [taxels], True where a value is missing; it makes a copy. `pose`: by link `[x, y, z, qx, qy, qz, qw]`, [7] or [frames, 7], in
     /// metres, where links move. However a recording is cut into calls, its percepts are the same bits.
     ///
+    /// `t` may have dates too: NumPy's, pandas', or a list of `datetime`; they become seconds since 1970, and those without a time zone are
+    /// in UTC. `values` may be a list of dicts, by taxel its value: what a dict does not have is missing. `joints` are positions of the body's
+    /// joints by name, in rad or m, [] or [frames], which say where links are, as `Body.forward` does; poses of links come before them.
+    ///
     /// Python's lock is free while it computes. Ctrl-C ends a long call, and leaves the engine as it was before. `progress` is
-    /// called with the number of frames done, about ten times a second.
+    /// called with the number of frames done, about ten times a second; True shows a bar of tqdm.
     ///
     /// >>> import numpy as np
     /// >>> import somatic_touch as st
@@ -176,7 +263,10 @@ impl PyEngine {
     /// Traceback (most recent call last):
     ///     ...
     /// somatic_touch.UsageError: values should be float32 of shape [frames, taxels] = [2, 40]; this has shape [2, 39]
-    #[pyo3(signature = (t, values, mask = None, pose = None, *, progress = None))]
+    /// >>> engine.process([0.0, 0.1], [{4: 512}, {4: 500, 7: 3}])
+    /// <Percepts: 2 frames of 13 fields>
+    #[pyo3(signature = (t, values, mask = None, pose = None, *, joints = None, progress = None))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords")]
     fn process(
         &self,
         py: Python<'_>,
@@ -184,13 +274,15 @@ impl PyEngine {
         values: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
         pose: Option<&Bound<'_, PyAny>>,
+        joints: Option<&Bound<'_, PyAny>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<PyPercepts> {
         let t = times(t)?;
         let t_s = t.as_slice()?;
         let held = self.held(values, mask, t_s.len())?;
-        let moved = pose.map(|pose| poses(pose, t_s.len())).transpose()?.unwrap_or_default();
+        let moved = self.placed(t_s.len(), pose, joints)?;
         self.check_room(t_s.len())?;
+        let progress = Progress::new(py, progress, Some(t_s.len() as f64), "frames")?;
         let block = FrameBlock { t_s, values: held.slice(), poses: &moved };
         if block.values.len() < LONG && progress.is_none() {
             let done = self.without_python(py, |inner| {
@@ -206,7 +298,7 @@ impl PyEngine {
             let go_on = |frames: usize| {
                 Python::attach(|py| {
                     py.check_signals()?;
-                    progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (frames,)).map(drop))
+                    progress.as_ref().map_or(Ok(()), |progress| progress.tell(py, (frames,)))
                 })
                 .map_err(|error| raised = Some(error))
                 .is_ok()
@@ -224,7 +316,7 @@ impl PyEngine {
         }
     }
 
-    /// The same for one frame, as in a control loop: `t` in seconds, `values` [taxels]. Its percepts have one frame.
+    /// The same for one frame, as in a control loop: `t` in seconds, or a date; `values` [taxels], or a dict. Its percepts have one frame.
     ///
     /// >>> import numpy as np
     /// >>> import somatic_touch as st
@@ -234,17 +326,19 @@ impl PyEngine {
     /// >>> p = engine.step(0.02, frame)
     /// >>> p["total"][0, p.index("hand/palm")]
     /// np.float32(512.0)
-    #[pyo3(signature = (t, values, mask = None, pose = None))]
+    #[pyo3(signature = (t, values, mask = None, pose = None, *, joints = None))]
     fn step(
         &self,
         py: Python<'_>,
-        t: f64,
+        t: &Bound<'_, PyAny>,
         values: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
         pose: Option<&Bound<'_, PyAny>>,
+        joints: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyPercepts> {
-        let held: Values<'_> = self::values(values, mask, &[self.width], "[taxels]")?;
-        let moved = pose.map(|pose| poses(pose, 1)).transpose()?.unwrap_or_default();
+        let t = time_s(t, "t")?;
+        let held: Values<'_> = self::values(values, mask, &[self.width], "[taxels]", &self.channels)?;
+        let moved = self.placed(1, pose, joints)?;
         let block = FrameBlock { t_s: &[t], values: held.slice(), poses: &moved };
         let done = self.without_python(py, |inner| {
             let began = Instant::now();
@@ -290,7 +384,7 @@ impl PyEngine {
     /// >>> found = touch.engine(backend="cpu").verify(touch.t, touch.values)
     /// >>> found["agrees"], found["percepts"]
     /// (True, 3640)
-    #[pyo3(signature = (t, values, mask = None, pose = None))]
+    #[pyo3(signature = (t, values, mask = None, pose = None, *, joints = None))]
     fn verify<'py>(
         &self,
         py: Python<'py>,
@@ -298,6 +392,7 @@ impl PyEngine {
         values: &Bound<'py, PyAny>,
         mask: Option<&Bound<'py, PyAny>>,
         pose: Option<&Bound<'py, PyAny>>,
+        joints: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         if self.backend() == "reference" {
             return Err(usage(py, "this would compare the reference with itself; use backend cpu or gpu"));
@@ -305,7 +400,7 @@ impl PyEngine {
         let t = times(t)?;
         let t_s = t.as_slice()?;
         let held = self.held(values, mask, t_s.len())?;
-        let moved = pose.map(|pose| poses(pose, t_s.len())).transpose()?.unwrap_or_default();
+        let moved = self.placed(t_s.len(), pose, joints)?;
         let mut sum = Agreement::default();
         let before = self.without_python(py, |inner| inner.engine.state()).or_raise(py)?;
         for first in (0..t_s.len()).step_by(256) {

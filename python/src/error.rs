@@ -3,7 +3,7 @@
 use std::ffi::CString;
 use std::path::Path;
 
-use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
@@ -21,6 +21,7 @@ impl Class {
     }
 
     fn error(&self, py: Python<'_>, message: String, file: Option<String>, place: Option<String>) -> PyErr {
+        let message = in_keywords(py, message);
         match self.imported.import(py, "somatic_touch._errors", self.name) {
             Ok(class) => match class.call1((message, file, place)) {
                 Ok(error) => PyErr::from_value(error),
@@ -31,13 +32,34 @@ impl Class {
     }
 }
 
+/// `text` with keyword arguments in the place of the command's flags.
+fn in_keywords(py: Python<'_>, text: String) -> String {
+    static WORDS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    if !text.contains("--") {
+        return text;
+    }
+    let words = WORDS.import(py, "somatic_touch._words", "in_keywords");
+    words.and_then(|words| words.call1((&text,))?.extract()).unwrap_or(text)
+}
+
 static USAGE: Class = Class::new("UsageError");
+static UNKNOWN: Class = Class::new("UnknownNameError");
 static INPUT: Class = Class::new("InputError");
 static FAILED: Class = Class::new("SomaticError");
 
 /// The exception for a request that makes no sense.
 pub(crate) fn usage(py: Python<'_>, message: impl Into<String>) -> PyErr {
     USAGE.error(py, message.into(), None, None)
+}
+
+/// The exception for a name of which there is nothing.
+pub(crate) fn unknown_name(py: Python<'_>, message: impl Into<String>) -> PyErr {
+    UNKNOWN.error(py, message.into(), None, None)
+}
+
+/// The exception of `pickle` for what stays in its process; `what` says what to send instead.
+pub(crate) fn stays_here(what: &str) -> PyErr {
+    PyTypeError::new_err(what.to_owned())
 }
 
 /// The exception for what this wheel or this machine cannot do.
@@ -87,7 +109,7 @@ impl<T> OrRaise<T> for somatic::Result<T> {
 /// Gives each of `lines` as a Python warning.
 pub(crate) fn warn(py: Python<'_>, lines: impl IntoIterator<Item = String>) -> PyResult<()> {
     for line in lines {
-        let line = CString::new(line).map_err(|e| PyErr::from(std::io::Error::other(e)))?;
+        let line = CString::new(in_keywords(py, line)).map_err(|e| PyErr::from(std::io::Error::other(e)))?;
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)?;
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! The module `somatic_touch._native`: what the Python package has in Rust.
 
 mod agreement;
+mod array_body;
 mod arrays;
 mod author;
 mod body;
@@ -9,10 +10,15 @@ mod calibration;
 mod drawing;
 mod engine;
 mod error;
+mod globs;
+mod kinematics;
+mod parts;
 mod percepts;
 mod picture;
+mod progress;
 mod recording;
 mod runner;
+mod same;
 mod scene;
 mod self_contacts;
 mod session;
@@ -39,6 +45,8 @@ mod native {
     use calibration::PyCalibration;
     #[pymodule_export]
     use engine::PyEngine;
+    #[pymodule_export]
+    use parts::{PyParts, open};
     #[pymodule_export]
     use percepts::PyPercepts;
     #[pymodule_export]

@@ -1,11 +1,12 @@
 //! `Percepts`: columns of a batch by name.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
-use pyo3::types::PyCapsule;
+use pyo3::types::{PyCapsule, PyDict, PySlice};
 use somatic::error::{suggestion, unknown};
 use somatic::percept::ColumnValues;
 use somatic::renamed::new_name;
@@ -13,11 +14,12 @@ use somatic::scene::AskedOutputs;
 use somatic::sink::TableKind;
 use somatic::{COLUMNS, Column, Flags, Outputs, Percepts};
 
-use crate::arrays::array;
-use crate::error::usage;
+use crate::arrays::{array, time_s};
+use crate::error::{stays_here, unknown_name, usage};
+use crate::globs::Globs;
 use crate::self_contacts::PySelfContacts;
 use crate::session::Run;
-use crate::stream::stream;
+use crate::stream::{Part, in_python, stream, to_arrow, to_pandas, to_polars};
 use crate::threads::free;
 use crate::touches::PyTouches;
 
@@ -36,16 +38,51 @@ use crate::touches::PyTouches;
 /// ((2, 1, 2), [[4.0], [0.0]])
 /// >>> p.present("centroid").tolist()
 /// [[True], [False]]
-#[pyclass(module = "somatic_touch", name = "Percepts", frozen)]
+///
+/// It is used as a dict of its columns: `"centroid" in p`, `p.get(name)`, `p.keys()`, `p.items()`. `p.between(t0, t1)` and
+/// `p.select("hand/palm*")` are parts of it. Two are equal (`==`) if they say the same of the same frames.
+#[pyclass(module = "somatic_touch", name = "Percepts", frozen, mapping)]
 pub(crate) struct PyPercepts {
     pub(crate) inner: Arc<Percepts>,
     pub(crate) run: Arc<Run>,
+    /// The frames that it has.
+    frames: Range<usize>,
+    /// The fields that it has; all where there is none.
+    fields: Option<Arc<[usize]>>,
+    /// All that a call has given, whose arrays parts share; none where it is that.
+    whole: Option<Py<Self>>,
     made: Mutex<HashMap<String, Py<PyAny>>>,
 }
 
 impl PyPercepts {
     pub(crate) fn new(inner: Arc<Percepts>, run: Arc<Run>) -> Self {
-        Self { inner, run, made: Mutex::default() }
+        Self { frames: 0..inner.frames(), fields: None, inner, run, whole: None, made: Mutex::default() }
+    }
+
+    /// The part of `of` with these frames and fields, which are numbered as in the whole batch.
+    fn part(of: &Bound<'_, Self>, frames: Range<usize>, fields: Option<Arc<[usize]>>) -> Self {
+        let Self { inner, run, whole, .. } = of.get();
+        let whole = whole.as_ref().map_or_else(|| of.clone().unbind(), |whole| whole.clone_ref(of.py()));
+        let (inner, run) = (Arc::clone(inner), Arc::clone(run));
+        Self { inner, run, frames, fields, whole: Some(whole), made: Mutex::default() }
+    }
+
+    /// Whether it is all that a call has given.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.frames == (0..self.inner.frames()) && self.fields.is_none()
+    }
+
+    fn of_table(&self) -> Part {
+        Part { percepts: Arc::clone(&self.inner), frames: self.frames.clone(), fields: self.fields.clone() }
+    }
+
+    /// The fields that it has, numbered as in the whole batch.
+    fn indices(&self) -> Vec<usize> {
+        self.fields.as_ref().map_or_else(|| (0..self.inner.fields()).collect(), |fields| fields.to_vec())
+    }
+
+    fn labels(&self) -> Vec<&str> {
+        self.indices().iter().map(|&field| self.run.labels[field].as_str()).collect()
     }
 
     fn column(&self, py: Python<'_>, name: &str) -> PyResult<&'static Column> {
@@ -53,7 +90,7 @@ impl PyPercepts {
         if let Some(column) = outputs.columns().find(|column| column.name == name) {
             return Ok(column);
         }
-        Err(usage(
+        Err(unknown_name(
             py,
             match name {
                 "touches" | "self_contacts" => format!("{name} are not a column; see `.{name}`"),
@@ -80,11 +117,32 @@ impl PyPercepts {
             return Ok(array);
         }
         // Made without the lock, which a thread that waits for Python must not hold.
-        let array = make()?;
+        let whole = match &self.whole {
+            Some(whole) => whole.get().once(py, name, make)?,
+            None => make()?,
+        };
+        let array = self.cut(py, whole)?;
         self.made.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), array.clone_ref(py));
         Ok(array)
     }
 
+    /// The part of `array`, of all frames and fields, that it has.
+    fn cut(&self, py: Python<'_>, array: Py<PyAny>) -> PyResult<Py<PyAny>> {
+        if self.is_whole() {
+            return Ok(array);
+        }
+        let mut part = array.into_bound(py);
+        part = part.get_item(PySlice::new(py, self.frames.start as isize, self.frames.end as isize, 1))?;
+        if let Some(fields) =
+            self.fields.as_ref().filter(|_| part.getattr("ndim").is_ok_and(|ndim| ndim.gt(1).unwrap_or(false)))
+        {
+            part = part.call_method1("take", (fields.to_vec(), 1))?;
+            part.call_method1("setflags", (false,))?;
+        }
+        Ok(part.unbind())
+    }
+
+    /// The frames and the fields of the whole batch.
     fn shape(&self) -> [usize; 2] {
         [self.inner.frames(), self.inner.fields()]
     }
@@ -102,13 +160,175 @@ impl PyPercepts {
                 Some(ColumnValues::F32(values)) => array(py, values, shape),
                 Some(ColumnValues::F64(values)) => array(py, values, shape),
                 Some(ColumnValues::U32(values)) => array(py, values, shape),
-                None => Err(usage(py, format!("`{name}` was not asked for; add it to the scene's outputs"))),
+                None => Err(unknown_name(py, format!("`{name}` was not asked for; add it to the scene's outputs"))),
             }
         })
     }
 
     fn __contains__(&self, name: &str) -> bool {
         self.inner.outputs().columns().any(|column| column.name == name)
+    }
+
+    /// The column called `name`; `default` where there is none.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> p = st.Engine(st.Body.bundled("hand"), {"outputs": ["total"]}, backend="cpu").step(0.0, [0] * 40)
+    /// >>> p.get("total").shape, p.get("centroid")
+    /// ((1, 13), None)
+    #[pyo3(signature = (name, default = None))]
+    fn get(&self, py: Python<'_>, name: &str, default: Option<Py<PyAny>>) -> PyResult<Option<Py<PyAny>>> {
+        if self.__contains__(name) { self.__getitem__(py, name).map(Some) } else { Ok(default) }
+    }
+
+    /// Its columns, in the order of `keys`.
+    fn values(&self, py: Python<'_>) -> PyResult<Vec<Py<PyAny>>> {
+        self.keys().iter().map(|name| self.__getitem__(py, name)).collect()
+    }
+
+    /// The names of its columns, each with the column.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> p = st.Engine(st.Body.bundled("hand"), {"outputs": ["total", "centroid"]}, backend="cpu").step(0.0, [0] * 40)
+    /// >>> {name: column.shape for name, column in p.items()}
+    /// {'total': (1, 13), 'centroid': (1, 13, 2)}
+    fn items(&self, py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>)>> {
+        self.keys().into_iter().map(|name| Ok((name, self.__getitem__(py, name)?))).collect()
+    }
+
+    /// The part of it from time `t0` on and before `t1`: seconds, or dates. What is not given has no end.
+    ///
+    /// Parameters
+    /// ----------
+    /// t0, t1 : float or datetime, optional
+    ///     In the clock of `t`, in seconds; dates as for `Engine.process`.
+    ///
+    /// Returns
+    /// -------
+    /// Percepts
+    ///     Of these frames. Arrays are views; `touches.frame` counts from the part's first frame.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> import somatic_touch as st
+    /// >>> engine = st.Engine(st.Body.bundled("hand"), {"outputs": ["total"]}, backend="cpu")
+    /// >>> p = engine.process([0.0, 0.1, 0.2, 0.3], np.zeros((4, 40), np.float32))
+    /// >>> p.between(0.1, 0.3).t.tolist()
+    /// [0.1, 0.2]
+    #[pyo3(signature = (t0 = None, t1 = None))]
+    fn between(slf: &Bound<'_, Self>, t0: Option<&Bound<'_, PyAny>>, t1: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let (py, of) = (slf.py(), slf.get());
+        let from_s = t0.map(|t| time_s(t, "t0")).transpose()?.unwrap_or(f64::NEG_INFINITY);
+        let to_s = t1.map(|t| time_s(t, "t1")).transpose()?.unwrap_or(f64::INFINITY);
+        if from_s.is_nan() || to_s.is_nan() {
+            return Err(usage(py, "t0 and t1 should be times in seconds; one is NaN"));
+        }
+        let times = &of.inner.times_s()[of.frames.clone()];
+        let is_in = |t: &f64| (from_s..to_s).contains(t);
+        let Some(first) = times.iter().position(is_in) else {
+            return Ok(Self::part(slf, of.frames.start..of.frames.start, of.fields.clone()));
+        };
+        let end = times.iter().rposition(is_in).map_or(first, |last| last + 1);
+        if let Some(other) = times[first..end].iter().position(|t| !is_in(t)) {
+            let (frame, t) = (first + other, times[first + other]);
+            let what = format!(
+                "times are not in order: frame {frame} at {t} s is between frames of this part; choose rows of its arrays by `t`"
+            );
+            return Err(usage(py, what));
+        }
+        Ok(Self::part(slf, of.frames.start + first..of.frames.start + end, of.fields.clone()))
+    }
+
+    /// The part of it with the fields whose names match `fields`: a glob, or several, as in a scene. `*` does not go over a `/`.
+    ///
+    /// Parameters
+    /// ----------
+    /// fields : str or iterable of str
+    ///     Such as `"hand/palm*"`, `"left_*"` or `["hand/back", "hand/palm"]`.
+    ///
+    /// Returns
+    /// -------
+    /// Percepts
+    ///     Of these fields, in their order. Touches are of the whole body, and stay.
+    ///
+    /// Raises
+    /// ------
+    /// UnknownNameError
+    ///     Where a glob matches nothing.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import somatic_touch as st
+    /// >>> p = st.Engine(st.Body.bundled("hand"), {"outputs": ["total"]}, backend="cpu").step(0.0, [0] * 40)
+    /// >>> p.select("hand/b*").fields, p.select("hand/b*")["total"].shape
+    /// (['hand/back'], (1, 1))
+    fn select(slf: &Bound<'_, Self>, fields: Globs) -> PyResult<Self> {
+        let (py, of) = (slf.py(), slf.get());
+        let indices = of.indices();
+        let names = |&field: &usize| [of.run.labels[field].as_str(), of.run.names[field].field.as_str()];
+        let chosen = fields.chosen(py, &indices.iter().map(names).collect::<Vec<_>>())?;
+        Ok(Self::part(slf, of.frames.clone(), Some(chosen.into_iter().map(|at| indices[at]).collect())))
+    }
+
+    /// Draws a column over time, a line a field, and gives matplotlib's axes.
+    ///
+    /// Parameters
+    /// ----------
+    /// output : str, optional
+    ///     A column; by default `force`, `total` or the first that there is.
+    /// fields : str or iterable of str, optional
+    ///     Globs, as for `select`. At most ten fields that are touched are drawn, those that are touched longest.
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; by default in a new figure.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///     Lines have gaps where the column is absent.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import matplotlib
+    /// >>> matplotlib.use("Agg")
+    /// >>> import somatic_touch as st
+    /// >>> touch = st.read("hand")
+    /// >>> p = touch.engine({"outputs": ["total"]}, backend="cpu").process(touch.t, touch.values)
+    /// >>> p.plot("total", fields="hand/*").get_ylabel()
+    /// 'total [count]'
+    #[pyo3(signature = (output = None, *, fields = None, ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        output: Option<&str>,
+        fields: Option<Bound<'py, PyAny>>,
+        ax: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_plots", "percepts", (slf, output, fields, ax))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_html", "percepts", (slf,))
+    }
+
+    fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        let py = slf.py();
+        if !other.is_instance_of::<Self>() {
+            return Ok(py.NotImplemented());
+        }
+        in_python(py, "_tables", "are_same_percepts", (slf, other)).map(Bound::unbind)
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyDict>) -> Py<Self> {
+        slf
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(stays_here(
+            "percepts cannot be pickled; send their arrays, such as `p[\"total\"]`, or the table `p.to_arrow()`, or write a file by `st.write`",
+        ))
     }
 
     /// The names of its columns.
@@ -176,13 +396,13 @@ impl PyPercepts {
     /// The number of its first frame since the engine started.
     #[getter]
     fn first_frame(&self) -> u64 {
-        self.inner.frame_number(0)
+        self.inner.frame_number(self.frames.start)
     }
 
     /// The names of its fields, in the order of the second axis; with `letters`, each with its letter.
     #[getter]
     fn fields(&self) -> Vec<&str> {
-        self.run.labels.iter().map(String::as_str).collect()
+        self.labels()
     }
 
     /// Where the field called `name` is on the second axis.
@@ -192,9 +412,11 @@ impl PyPercepts {
     /// >>> p.fields[p.index("hand/back")]
     /// 'hand/back'
     fn index(&self, py: Python<'_>, name: &str) -> PyResult<usize> {
-        let labels = || self.run.labels.iter().map(String::as_str);
-        let found = labels().position(|label| label == name);
-        found.ok_or_else(|| usage(py, format!("there is no field `{name}`; {}", suggestion(name, labels()))))
+        let labels = self.labels();
+        let found = labels.iter().position(|label| *label == name);
+        found.ok_or_else(|| {
+            unknown_name(py, format!("there is no field `{name}`; {}", suggestion(name, labels.iter().copied())))
+        })
     }
 
     /// Whether positions and normals are in the world (z up, x forward, y left), bool [frames, fields]: where frames carry poses.
@@ -213,7 +435,7 @@ impl PyPercepts {
         if self.run.plan.touch_outputs().is_none() {
             return Err(usage(py, "`touches` were not asked for; add them to the scene's outputs"));
         }
-        Ok(PyTouches { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
+        Ok(PyTouches { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run), frames: self.frames.clone() })
     }
 
     fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
@@ -229,7 +451,11 @@ impl PyPercepts {
         if !self.inner.outputs().contains(Outputs::SELF_CONTACTS) {
             return Err(usage(py, "`self_contacts` were not asked for; add them to the scene's outputs"));
         }
-        Ok(PySelfContacts { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run) })
+        Ok(PySelfContacts {
+            percepts: Arc::clone(&self.inner),
+            run: Arc::clone(&self.run),
+            frames: self.frames.clone(),
+        })
     }
 
     /// Arrow's C stream of the table that docs/how-to/tables.md describes: a row per frame and field in contact.
@@ -241,44 +467,44 @@ impl PyPercepts {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         // The interface lets a producer keep to its own schema.
         let _ = requested_schema;
-        stream(py, &self.inner, &self.run, TableKind::Touched)
+        stream(py, &self.of_table(), &self.run, TableKind::Touched)
     }
 
     /// The table as a `pyarrow.Table`; with `all_fields` it has fields without contact too. Needs pyarrow.
     #[pyo3(signature = (*, all_fields = false))]
     fn to_arrow<'py>(&self, py: Python<'py>, all_fields: bool) -> PyResult<Bound<'py, PyAny>> {
-        py.import("pyarrow")?.call_method1("table", (self.table(py, all_fields)?,))
+        to_arrow(&self.table(py, all_fields)?)
     }
 
     /// The table as a `pandas.DataFrame`. Needs pandas and pyarrow.
     #[pyo3(signature = (*, all_fields = false))]
     fn to_pandas<'py>(&self, py: Python<'py>, all_fields: bool) -> PyResult<Bound<'py, PyAny>> {
-        self.to_arrow(py, all_fields)?.call_method0("to_pandas")
+        to_pandas(&self.table(py, all_fields)?)
     }
 
     /// The table as a `polars.DataFrame`. Needs polars.
     #[pyo3(signature = (*, all_fields = false))]
     fn to_polars<'py>(&self, py: Python<'py>, all_fields: bool) -> PyResult<Bound<'py, PyAny>> {
-        py.import("polars")?.call_method1("DataFrame", (self.table(py, all_fields)?,))
+        to_polars(&self.table(py, all_fields)?)
     }
 
     fn __repr__(&self) -> String {
-        let [frames, fields] = self.shape();
+        let (frames, fields) = (self.frames.len(), self.indices().len());
         let s = |count: usize| if count == 1 { "" } else { "s" };
         format!("<Percepts: {frames} frame{} of {fields} field{}>", s(frames), s(fields))
     }
 }
 
 impl PyPercepts {
-    fn table<'py>(&self, py: Python<'py>, all_fields: bool) -> PyResult<Bound<'py, Table>> {
-        Bound::new(py, Table { percepts: Arc::clone(&self.inner), run: Arc::clone(&self.run), all_fields })
+    fn table<'py>(&self, py: Python<'py>, all_fields: bool) -> PyResult<Bound<'py, PyAny>> {
+        Ok(Bound::new(py, Table { part: self.of_table(), run: Arc::clone(&self.run), all_fields })?.into_any())
     }
 }
 
 /// A table that others take through its stream.
 #[pyclass(frozen)]
 struct Table {
-    percepts: Arc<Percepts>,
+    part: Part,
     run: Arc<Run>,
     all_fields: bool,
 }
@@ -293,6 +519,6 @@ impl Table {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         let _ = requested_schema;
         let kind = if self.all_fields { TableKind::AllFields } else { TableKind::Touched };
-        stream(py, &self.percepts, &self.run, kind)
+        stream(py, &self.part, &self.run, kind)
     }
 }

@@ -4,16 +4,17 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use somatic::recording::{BODY, CALIBRATION, Reader};
 use somatic::signal::{Pose, UnitOfP};
 use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec, VendorFormat, VendorOptions, VendorSource};
 use somatic::{Calibration, Error, Frame, RawValue, bundled};
 
-use crate::arrays::array;
+use crate::arrays::{array, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, usage, warn};
+use crate::stream::in_python;
 use crate::threads::free;
 
 /// Frames that are read until Ctrl-C is heard.
@@ -28,6 +29,8 @@ const FRAMES_BETWEEN: usize = 1 << 10;
 /// >>> engine = touch.engine({"outputs": ["total"]}, backend="cpu")
 /// >>> engine.process(touch.t, touch.values)["total"].shape
 /// (280, 13)
+///
+/// It can be pickled, with its body and calibration. Two are equal (`==`) if all that they have is the same to the bit.
 #[pyclass(module = "somatic_touch", name = "Recording", frozen)]
 pub(crate) struct PyRecording {
     pub(crate) name: String,
@@ -98,7 +101,7 @@ impl PyRecording {
     /// An engine for its body and its taxels, under its calibration. `calibration` is laid over that: keys that it has replace the
     /// recording's own, others stay, and a warning names those. A simulation's calibration is replaced.
     #[pyo3(signature = (scene = None, calibration = None, backend = None, *, batch = 256))]
-    fn engine<'py>(
+    pub(crate) fn engine<'py>(
         &self,
         py: Python<'py>,
         scene: Option<&Bound<'py, PyAny>>,
@@ -117,6 +120,59 @@ impl PyRecording {
         class.call((body, scene, calibration, backend), Some(&keys))
     }
 
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_html", "recording", (slf,))
+    }
+
+    fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        let py = slf.py();
+        if !other.is_instance_of::<Self>() {
+            return Ok(py.NotImplemented());
+        }
+        in_python(py, "_tables", "are_same_recordings", (slf, other)).map(Bound::unbind)
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyDict>) -> Py<Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, of) = (slf.py(), slf.get());
+        let (name, taxels, losses) = (of.name.clone(), of.taxels.clone(), of.losses.clone());
+        let (body, calibration) = (of.body(py), of.calibration(py));
+        let parts = (name, taxels, of.t(py), of.values(py), of.pose(py), body, calibration, of.is_simulated, losses);
+        Ok((slf.get_type().getattr("_of_parts")?, parts.into_pyobject(py)?))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_of_parts")]
+    #[expect(clippy::too_many_arguments, reason = "pickle's own form: a function and its arguments")]
+    fn unpickled(
+        py: Python<'_>,
+        name: String,
+        taxels: Vec<u32>,
+        t: Bound<'_, PyAny>,
+        values: Bound<'_, PyAny>,
+        pose: Bound<'_, PyDict>,
+        body: Option<Py<PyBody>>,
+        calibration: Option<Py<PyCalibration>>,
+        is_simulated: bool,
+        losses: Vec<String>,
+    ) -> PyResult<Self> {
+        let t_s = times(&t)?.as_slice()?.to_vec();
+        let shape = [t_s.len(), taxels.len()];
+        let values = self::values(&values, None, &shape, "[frames, taxels]", &taxels)?;
+        for poses in pose.values() {
+            poses.call_method1("setflags", (false,))?;
+        }
+        let about = About { name, taxels, body, calibration, is_simulated, losses };
+        Self::new(py, t_s, values.slice(), pose.unbind(), about)
+    }
+
     fn __len__(&self) -> usize {
         self.frames
     }
@@ -132,8 +188,36 @@ impl PyRecording {
     }
 }
 
-/// What a source delivered.
 impl PyRecording {
+    fn new(py: Python<'_>, t_s: Vec<f64>, values: &[RawValue], pose: Py<PyDict>, about: About) -> PyResult<Self> {
+        let About { name, taxels, body, calibration, is_simulated, losses } = about;
+        let shape = [t_s.len(), taxels.len()];
+        let mask = values.iter().map(|value| value.is_missing()).collect();
+        let length_s = t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
+        Ok(Self {
+            name,
+            frames: t_s.len(),
+            t: array(py, t_s, &shape[..1])?,
+            values: array(py, bytemuck::cast_slice::<_, f32>(values).to_vec(), &shape)?,
+            mask: array(py, mask, &shape)?,
+            taxels,
+            pose,
+            body,
+            calibration,
+            is_simulated,
+            losses,
+            length_s,
+        })
+    }
+
+    /// The same with the losses from number `told` on, which is then how many there are.
+    pub(crate) fn with_losses_from(mut self, told: &mut usize) -> Self {
+        let all = self.losses.len();
+        self.losses = self.losses.split_off((*told).min(all));
+        *told = all;
+        self
+    }
+
     /// The calibration that holds for it on `body`: its own, with `given` laid over it.
     pub(crate) fn calibrated(
         &self,
@@ -153,6 +237,7 @@ impl PyRecording {
     }
 }
 
+/// What a source delivered.
 #[derive(Default)]
 pub(crate) struct Frames {
     t_s: Vec<f64>,
@@ -182,30 +267,30 @@ impl Frames {
         calibration: Option<Py<PyCalibration>>,
         is_simulated: bool,
     ) -> PyResult<PyRecording> {
-        let (frames, taxels) = (self.t_s.len(), source.taxels().to_vec());
+        let frames = self.t_s.len();
         let pose = PyDict::new(py);
         for (link, mut poses) in self.poses {
             poses.resize(7 * frames, f64::NAN);
             pose.set_item(link, array(py, poses, &[frames, 7])?)?;
         }
-        let mask = self.values.iter().map(|value| value.is_missing()).collect();
-        let values: Vec<f32> = bytemuck::cast_slice(&self.values).to_vec();
-        let length_s = self.t_s.last().zip(self.t_s.first()).map_or(0.0, |(last, first)| last - first);
-        Ok(PyRecording {
-            name,
-            frames,
-            t: array(py, self.t_s, &[frames])?,
-            values: array(py, values, &[frames, taxels.len()])?,
-            mask: array(py, mask, &[frames, taxels.len()])?,
-            taxels,
-            pose: pose.unbind(),
-            body,
-            calibration,
-            is_simulated,
-            losses: source.losses(),
-            length_s,
-        })
+        let (taxels, losses) = (source.taxels().to_vec(), source.losses());
+        let about = About { name, taxels, body, calibration, is_simulated, losses };
+        PyRecording::new(py, self.t_s, &self.values, pose.unbind(), about)
     }
+
+    pub(crate) fn len(&self) -> usize {
+        self.t_s.len()
+    }
+}
+
+/// What a recording has beside its frames.
+struct About {
+    name: String,
+    taxels: Vec<u32>,
+    body: Option<Py<PyBody>>,
+    calibration: Option<Py<PyCalibration>>,
+    is_simulated: bool,
+    losses: Vec<String>,
 }
 
 /// All frames of `source`; Ctrl-C ends it.
@@ -279,6 +364,98 @@ pub(crate) fn open(
     Ok((source, own, calibration))
 }
 
+/// The keywords of `read` and `open`.
+pub(crate) struct Keys<'a, 'py> {
+    pub(crate) body: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) from_s: Option<f64>,
+    pub(crate) to_s: Option<f64>,
+    pub(crate) rate_hz: Option<f64>,
+    pub(crate) format: Option<&'a str>,
+    pub(crate) grid: Option<&'a str>,
+    pub(crate) pitch: Option<&'a str>,
+    pub(crate) unit: Option<&'a str>,
+    pub(crate) layout: Option<PathBuf>,
+}
+
+/// A file that is open, with what comes with it.
+pub(crate) struct Opening {
+    pub(crate) name: String,
+    pub(crate) file: PathBuf,
+    pub(crate) source: Box<dyn Source + Send>,
+    pub(crate) body: Option<Py<PyBody>>,
+    pub(crate) calibration: Option<Py<PyCalibration>>,
+}
+
+impl Opening {
+    /// These frames of it.
+    pub(crate) fn recording(&self, py: Python<'_>, frames: Frames) -> PyResult<PyRecording> {
+        let body = self.body.as_ref().map(|body| body.clone_ref(py));
+        let calibration = self.calibration.as_ref().map(|calibration| calibration.clone_ref(py));
+        frames.finish(py, self.name.clone(), &*self.source, body, calibration, false)
+    }
+
+    pub(crate) fn new(py: Python<'_>, source: &Bound<'_, PyAny>, keys: Keys<'_, '_>) -> PyResult<Self> {
+        let Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout } = keys;
+        let text = match source.extract::<String>() {
+            Ok(text) => text,
+            Err(_) => source.extract::<PathBuf>()?.display().to_string(),
+        };
+        let body = match body {
+            None => None,
+            Some(body) => Some(match body.extract::<String>() {
+                Ok(name) => Py::new(py, PyBody::bundled_or_file(&name).or_raise_of(py, Path::new(&name))?)?,
+                Err(_) => body
+                    .cast::<PyBody>()
+                    .map_err(|_| usage(py, "body should be a Body, or its file's name"))?
+                    .clone()
+                    .unbind(),
+            }),
+        };
+        let cut = Cut { from_s: from_s.unwrap_or(Cut::WHOLE.from_s), to_s: to_s.unwrap_or(Cut::WHOLE.to_s), times: 1 };
+        let made = || -> somatic::Result<(VendorOptions, SourceSpec)> {
+            let options = VendorOptions {
+                format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
+                rate_hz,
+                grid: grid.map(VendorOptions::grid_of).transpose().map_err(|e| e.at("grid"))?,
+                pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
+                unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
+                layout,
+                ..VendorOptions::default()
+            };
+            let spec = text.parse::<SourceSpec>()?.with_content(&options);
+            Ok((options, spec))
+        };
+        if text == "hand" && body.is_none() {
+            let touch = || -> somatic::Result<Box<dyn Source + Send>> {
+                Ok(Box::new(CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None)?))
+            };
+            let source =
+                if cut == Cut::WHOLE { touch() } else { Replay::new(touch, cut).map(|cut| Box::new(cut) as _) };
+            let source = source.or_raise(py)?;
+            let body = Some(Py::new(py, PyBody::bundled_or_file("hand").or_raise(py)?)?);
+            let (name, file) = ("bundled touch".to_owned(), PathBuf::new());
+            return Ok(Self { name, file, source, body, calibration: None });
+        }
+        let (options, spec) = made().or_raise(py)?;
+        let given = body.as_ref().map(Py::get);
+        let file = spec.file().unwrap_or(Path::new("")).to_owned();
+        let (source, own, calibration) = open(&spec, given, &options, cut).or_raise_of(py, &file)?;
+        let body = match (body, own) {
+            (Some(body), _) => Some(body),
+            (None, own) => own.map(|own| Py::new(py, own)).transpose()?,
+        };
+        let calibration = match (&body, calibration) {
+            (Some(body), Some(text)) => {
+                let made = PyCalibration::of_text(&text, body.get())
+                    .map_err(|e| e.at("its own calibration").at(file.display()));
+                Some(Py::new(py, made.or_raise_of(py, &file)?)?)
+            }
+            _ => None,
+        };
+        Ok(Self { name: file.display().to_string(), file, source, body, calibration })
+    }
+}
+
 /// Reads a recording from a file: CSV, MCAP, or a pressure system's export, as `somatic run --source` does.
 ///
 /// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' is the bundled touch. `body` is the robot, for
@@ -306,57 +483,8 @@ pub(crate) fn read(
     unit: Option<&str>,
     layout: Option<PathBuf>,
 ) -> PyResult<PyRecording> {
-    let text = match source.extract::<String>() {
-        Ok(text) => text,
-        Err(_) => source.extract::<PathBuf>()?.display().to_string(),
-    };
-    let body = match body {
-        None => None,
-        Some(body) => Some(match body.extract::<String>() {
-            Ok(name) => Py::new(py, PyBody::bundled_or_file(&name).or_raise_of(py, Path::new(&name))?)?,
-            Err(_) => body
-                .cast::<PyBody>()
-                .map_err(|_| usage(py, "body should be a Body, or its file's name"))?
-                .clone()
-                .unbind(),
-        }),
-    };
-    let cut = Cut { from_s: from_s.unwrap_or(Cut::WHOLE.from_s), to_s: to_s.unwrap_or(Cut::WHOLE.to_s), times: 1 };
-    let made = || -> somatic::Result<(VendorOptions, SourceSpec)> {
-        let options = VendorOptions {
-            format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
-            rate_hz,
-            grid: grid.map(VendorOptions::grid_of).transpose().map_err(|e| e.at("grid"))?,
-            pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
-            unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
-            layout,
-            ..VendorOptions::default()
-        };
-        let spec = text.parse::<SourceSpec>()?.with_content(&options);
-        Ok((options, spec))
-    };
-    if text == "hand" && body.is_none() {
-        let mut touch = CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None).or_raise(py)?;
-        let frames = gather(py, &mut touch, Path::new(""))?;
-        let body = Py::new(py, PyBody::bundled_or_file("hand").or_raise(py)?)?;
-        return frames.finish(py, "bundled touch".to_owned(), &touch, Some(body), None, false);
-    }
-    let (options, spec) = made().or_raise(py)?;
-    let given = body.as_ref().map(Py::get);
-    let file = spec.file().unwrap_or(Path::new("")).to_owned();
-    let (mut source, own, calibration) = open(&spec, given, &options, cut).or_raise_of(py, &file)?;
-    let frames = gather(py, &mut *source, &file)?;
-    let body = match (body, own) {
-        (Some(body), _) => Some(body),
-        (None, own) => own.map(|own| Py::new(py, own)).transpose()?,
-    };
-    let calibration = match (&body, calibration) {
-        (Some(body), Some(text)) => {
-            let made =
-                PyCalibration::of_text(&text, body.get()).map_err(|e| e.at("its own calibration").at(file.display()));
-            Some(Py::new(py, made.or_raise_of(py, &file)?)?)
-        }
-        _ => None,
-    };
-    frames.finish(py, file.display().to_string(), &*source, body, calibration, false)
+    let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout };
+    let mut opened = Opening::new(py, source, keys)?;
+    let frames = gather(py, &mut *opened.source, &opened.file)?;
+    opened.recording(py, frames)
 }

@@ -16,6 +16,7 @@ use somatic::{BackendKind, Engine, Error, Frame};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, interrupted, usage, warn};
+use crate::progress::Progress;
 use crate::recording::open;
 use crate::scene::PyScene;
 use crate::session::Run;
@@ -28,7 +29,7 @@ const BATCH: usize = 256;
 ///
 /// `source` and `sink` are paths or texts such as `mcap:FILE` and `parquet:FILE`; `body`, `scene`, `calibration` and `backend` as in
 /// `read` and `Engine`; what comes with the recording is used where nothing is given. `label` stands in the file's metadata as its
-/// source. `progress` is called with the number of frames done.
+/// source. `progress` is called with the number of frames done; True shows a bar of tqdm.
 ///
 /// Gives the number of frames, and what of the source was lost, a line each.
 ///
@@ -65,6 +66,7 @@ pub(crate) fn run<'py>(
     }
     let file = spec.file().unwrap_or(Path::new("")).to_owned();
     let (given, calibration) = (body.as_ref().map(Bound::get), calibration.as_ref().map(Bound::get));
+    let progress = Progress::new(py, progress, None, "frames")?;
     let mut raised = None;
     let done = free(py, || {
         let (source, own, text) = open(&spec, given, &options, Cut::WHOLE)?;
@@ -97,7 +99,7 @@ pub(crate) fn run<'py>(
         let feed = Feed::start(source, ReadMode { most: BATCH, gather: true, speed: None });
         let mut run = Running::new(engine, feed, vec![sink], RunOptions::default());
         let stop = AtomicBool::new(false);
-        let mut caller = Caller { progress, frames: 0, stop: &stop, raised: None };
+        let mut caller = Caller { progress: progress.as_ref(), frames: 0, stop: &stop, raised: None };
         let ending = run.run(&mut caller, || stop.load(Ordering::Relaxed))?;
         raised = caller.raised;
         if raised.is_some() {
@@ -119,7 +121,7 @@ pub(crate) fn run<'py>(
 
 /// Who has called `run`, and is told how it goes.
 struct Caller<'a> {
-    progress: Option<Py<PyAny>>,
+    progress: Option<&'a Progress>,
     frames: usize,
     /// Ends the run.
     stop: &'a AtomicBool,
@@ -151,7 +153,7 @@ impl Observer for Caller<'_> {
     fn written(&mut self, _: &[Instant]) {
         let told = Python::attach(|py| {
             let frames = self.frames;
-            self.progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (frames,)).map(drop))
+            self.progress.map_or(Ok(()), |progress| progress.tell(py, (frames,)))
         });
         self.heed(told);
     }

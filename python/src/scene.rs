@@ -7,6 +7,7 @@ use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Calibration, Error, Options};
 
 use crate::error::{OrRaise, usage};
+use crate::same::{hash_of, same};
 
 /// What is asked of a body: which fields, which outputs, with which knobs.
 ///
@@ -22,6 +23,8 @@ use crate::error::{OrRaise, usage};
 /// Traceback (most recent call last):
 ///     ...
 /// somatic_touch.UsageError: `sink` is for the command; leave it out of this scene
+///
+/// Two that ask for the same are equal (`==`), whether of text or of keywords.
 #[pyclass(module = "somatic_touch", name = "Scene", frozen)]
 pub(crate) struct PyScene {
     file: SceneFile,
@@ -65,7 +68,7 @@ fn table_of(dict: &Bound<'_, PyDict>) -> PyResult<toml::Table> {
 
 impl PyScene {
     /// The scene in `text`, or an error that has the line.
-    fn of_text(py: Python<'_>, text: &str) -> PyResult<Self> {
+    pub(crate) fn of_text(py: Python<'_>, text: &str) -> PyResult<Self> {
         let table: toml::Table = parse_toml(text).or_raise(py)?;
         if let Some(why) = table.iter().find_map(|(key, value)| why_not(key, value)) {
             return Err(usage(py, why));
@@ -193,6 +196,23 @@ impl PyScene {
         let lines: Vec<&str> = self.text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         let shown = if lines.is_empty() { "of everything".to_owned() } else { lines.join(", ") };
         format!("<Scene {shown}>")
+    }
+
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        same(py, other, |other: &Self| self.file == other.file)
+    }
+
+    fn __hash__(&self) -> u64 {
+        // Equal scenes are written alike, but for the sign of a zero.
+        hash_of(&format!("{:?}", self.file).replace("-0.0", "0.0"))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyDict>) -> Py<Self> {
+        slf
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (String,)) {

@@ -1,15 +1,18 @@
 //! `SelfContacts`: where the robot touches itself, in a batch.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyCapsule;
+use pyo3::types::{PyCapsule, PyDict};
+use somatic::error::suggestion;
 use somatic::sink::TableKind;
 use somatic::{Percepts, SelfContact};
 
 use crate::arrays::array;
+use crate::error::{stays_here, unknown_name};
 use crate::session::Run;
-use crate::stream::stream;
+use crate::stream::{Part, in_python, stream, to_arrow, to_pandas, to_polars};
 
 /// The self-contacts of some frames, a row each, in the order of frames: touches of two links at one place in the
 /// world. Frames without poses have none.
@@ -26,13 +29,19 @@ use crate::stream::stream;
 pub(crate) struct PySelfContacts {
     pub(crate) percepts: Arc<Percepts>,
     pub(crate) run: Arc<Run>,
+    /// The frames that it is of.
+    pub(crate) frames: Range<usize>,
 }
+
+/// The names of its columns.
+const COLUMNS: [&str; 9] = ["frame", "t", "id", "link", "touch", "total", "position", "distance", "angle"];
 
 impl PySelfContacts {
     /// Frame and contact of each row.
     fn rows(&self) -> impl Iterator<Item = (usize, &SelfContact)> {
         let of = |frame| self.percepts.self_contacts(frame).unwrap_or_default().iter();
-        (0..self.percepts.frames()).flat_map(move |frame| of(frame).map(move |contact| (frame, contact)))
+        let first = self.frames.start;
+        self.frames.clone().flat_map(move |frame| of(frame).map(move |contact| (frame - first, contact)))
     }
 
     fn column<T: numpy::Element>(
@@ -59,7 +68,7 @@ impl PySelfContacts {
     /// The time of its frame, float64 [self-contacts], in seconds.
     #[getter]
     fn t(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.column(py, 1, |(frame, _), to| to.push(self.percepts.t_s(frame)))
+        self.column(py, 1, |(frame, _), to| to.push(self.percepts.t_s(self.frames.start + frame)))
     }
 
     /// Its identity, uint64 [self-contacts]: lasts as long as both touches.
@@ -113,7 +122,93 @@ impl PySelfContacts {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         // The interface lets a producer keep to its own schema.
         let _ = requested_schema;
-        stream(py, &self.percepts, &self.run, TableKind::SelfContacts)
+        let part = Part { percepts: Arc::clone(&self.percepts), frames: self.frames.clone(), fields: None };
+        stream(py, &part, &self.run, TableKind::SelfContacts)
+    }
+
+    /// A column by its name, such as `contacts["distance"]`.
+    fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
+        match name {
+            "frame" => self.frame(py),
+            "t" => self.t(py),
+            "id" => self.id(py),
+            "link" => self.link(py),
+            "touch" => self.touch(py),
+            "total" => self.total(py),
+            "position" => self.position(py),
+            "distance" => self.distance(py),
+            "angle" => self.angle(py),
+            _ => {
+                let near = suggestion(name, COLUMNS);
+                Err(unknown_name(py, format!("self-contacts have no column `{name}`; {near}")))
+            }
+        }
+    }
+
+    /// The names of its columns.
+    #[expect(clippy::unused_self, reason = "a method of dicts")]
+    fn keys(&self) -> Vec<&'static str> {
+        COLUMNS.to_vec()
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        self.keys().contains(&name)
+    }
+
+    /// The column called `name`; `default` where there is none.
+    #[pyo3(signature = (name, default = None))]
+    fn get(&self, py: Python<'_>, name: &str, default: Option<Py<PyAny>>) -> PyResult<Option<Py<PyAny>>> {
+        if self.__contains__(name) { self.__getitem__(py, name).map(Some) } else { Ok(default) }
+    }
+
+    /// The names of its columns, each with the column.
+    fn items(&self, py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>)>> {
+        self.keys().into_iter().map(|name| Ok((name, self.__getitem__(py, name)?))).collect()
+    }
+
+    fn __iter__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_tables", "rows", (slf,))
+    }
+
+    /// The self-contacts of each frame, one `SelfContacts` after the other, also of frames without any.
+    fn by_frame<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_tables", "by_frame", (slf, slf.get().frames.len()))
+    }
+
+    fn _of_frame(&self, frame: usize) -> Self {
+        let at = self.frames.start + frame;
+        Self { percepts: Arc::clone(&self.percepts), run: Arc::clone(&self.run), frames: at..at + 1 }
+    }
+
+    /// The table, a row a self-contact, as a `pyarrow.Table`. Needs pyarrow.
+    fn to_arrow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        to_arrow(slf)
+    }
+
+    /// The table as a `pandas.DataFrame`. Needs pandas and pyarrow.
+    fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        to_pandas(slf)
+    }
+
+    /// The table as a `polars.DataFrame`. Needs polars.
+    fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        to_polars(slf)
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        in_python(slf.py(), "_html", "self_contacts", (slf,))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyDict>) -> Py<Self> {
+        slf
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(stays_here("self-contacts cannot be pickled; send their arrays, or the table `self_contacts.to_arrow()`"))
     }
 
     fn __len__(&self) -> usize {

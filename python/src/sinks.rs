@@ -83,6 +83,10 @@ struct File {
 
 impl File {
     fn write(&mut self, py: Python<'_>, percepts: &PyPercepts) -> PyResult<()> {
+        if !percepts.is_whole() {
+            let what = "these are a part of percepts, by `between` or `select`; write all of them, or the part's table, as by `to_polars().write_parquet`";
+            return Err(usage(py, what));
+        }
         if self.open.is_none() {
             let sink = self.start(&percepts.run).or_raise(py)?;
             self.open = Some((sink, Arc::clone(&percepts.run)));

@@ -175,7 +175,10 @@ fn a_field_of_one_taxel_and_one_without_a_chart_have_no_filtered_motion() {
         assert!(agreement.holds(), "{agreement}");
         for index in 1..3 {
             let percept = percepts.get(index, 0);
-            assert!(percept.flags.intersects(Flags::HELD | Flags::STILL) && percept.filtered_direction.is_none(), "{percept:?}");
+            assert!(
+                percept.flags.intersects(Flags::HELD | Flags::STILL) && percept.filtered_direction.is_none(),
+                "{percept:?}"
+            );
         }
     }
     // The humanoid's whole body wraps around: no chart, so no motion, and it says so.

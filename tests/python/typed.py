@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from typing import assert_type
 
 import numpy as np
@@ -18,5 +19,16 @@ assert_type(p.touches.id, npt.NDArray[np.uint64])
 assert_type(body.fields["hand/back"].uv, npt.NDArray[np.float64] | None)
 assert_type(st.read("a.csv").calibration, st.Calibration | None)
 assert_type(engine.verify([0.0], [[0.0] * 40])["quantities"]["total"]["worst_share"], float)
+assert_type(p.between(0, datetime.datetime.now(datetime.UTC)).select(["hand/*"]), st.Percepts)
+assert_type(p.touches["link"], list[str])
+assert_type([len(touches) for touches in p.touches.by_frame()], list[int])
+assert_type(body.surface[1], npt.NDArray[np.uint32])
+assert_type(body.forward({"elbow": [0.1, 0.2]})["hand"], npt.NDArray[np.float64])
+assert_type(body.joints["elbow"]["limits"], tuple[float, float] | None)
+with st.open("a.csv", seconds=10, progress=True) as parts:
+    assert_type([part.t for part in parts], list[npt.NDArray[np.float64]])
+engine.step(datetime.datetime.now(datetime.UTC), {4: 512.0, 7: None})
+engine.process([datetime.datetime.now(datetime.UTC)], [{4: 512.0}], joints={"elbow": 0.1})
+assert_type(body == st.Body.from_arrays([[0, 0, 0]], [[0, 0, 1]], surface=([[0, 0, 0]], [[0, 0, 0]])), bool)
 engine.step("now", [0.0] * 40)  # type: ignore[arg-type]
 st.Engine(body, backend="gpus")  # type: ignore[arg-type]

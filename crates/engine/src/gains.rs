@@ -90,7 +90,8 @@ pub struct GainsEstimate {
     pub sigma_m: f64,
     /// By what share taxels still differ from the contacts, root mean square.
     pub left: f64,
-    /// The part of that which noise does not explain: the `gain_spread` of fits, at least 0.01.
+    /// What gains and model are still off by as a share, the `gain_spread` of fits: the part of `left` that noise does not explain, and
+    /// what of the gains touches cannot tell. At least 0.01.
     pub gain_spread: f64,
     /// How many touches it was found from.
     pub touches: usize,
@@ -273,7 +274,7 @@ fn estimate(
     let mut spacings: Vec<f64> = touches.iter().map(|touch| touch.spacing_m).collect();
     spacings.sort_by(f64::total_cmp);
     let (mut gains, mut sigma_m) = (vec![0.0_f64; taxels], START * spacings[spacings.len() / 2]);
-    let (mut width_m, mut left, mut unexplained, mut used) = (0.0, 0.0, 0.0, 0);
+    let (mut width_m, mut left, mut unexplained, mut unknowable, mut used) = (0.0, 0.0, 0.0, 0.0, 0);
     let mut pressed = vec![0; taxels];
     let parts = connected(touches, taxels);
     for round in 0..ROUNDS {
@@ -308,14 +309,20 @@ fn estimate(
         }
         let mean = |sum: f64| sum / f64::max(counted, 1.0);
         left = mean(squares).sqrt();
-        unexplained = mean(squares - of_noise).max(0.0).sqrt();
+        unexplained = mean(squares - of_noise).max(0.0);
         for ((gain, weight), sum) in gains.iter_mut().zip(&weights).zip(&sums) {
             *gain += sum / (weight + 1.0 / (SPREAD * SPREAD));
         }
+        let mut taken_off = 0;
         for part in &parts {
             let known: Vec<usize> = part.iter().copied().filter(|&taxel| pressed[taxel] >= LEAST_TOUCHES).collect();
-            take_off(&mut gains, spots, &known);
+            taken_off += take_off(&mut gains, spots, &known);
         }
+        let known = || gains.iter().zip(&pressed).filter(|(_, count)| **count >= LEAST_TOUCHES).map(|(gain, _)| gain);
+        // What is taken off has as much of the gains' true variance for each shape as every other direction has.
+        let others = known().count().saturating_sub(taken_off).max(1) as f64;
+        unknowable =
+            known().map(|gain| gain * gain).sum::<f64>() / others * (taken_off as f64 / (others + taken_off as f64));
         widths.sort_by(f64::total_cmp);
         width_m = widths[widths.len() / 2];
         if round < WIDTH_ROUNDS {
@@ -327,12 +334,12 @@ fn estimate(
     }
     let told = |(gain, count): (&f64, &u32)| (*count >= LEAST_TOUCHES).then(|| gain.exp());
     let gains = gains.iter().zip(&pressed).map(told).collect();
-    let gain_spread = unexplained.max(LEAST_SPREAD);
+    let gain_spread = (unexplained + unknowable).sqrt().max(LEAST_SPREAD);
     Ok(GainsEstimate { gains, pressed, width_m, sigma_m, left, gain_spread, touches: used })
 }
 
-/// Takes off the logarithms of `gains` of the taxels `known`, which are at `spots`, what touches cannot tell.
-fn take_off(gains: &mut [f64], spots: &[Spot], known: &[usize]) {
+/// Takes off the logarithms of `gains` of the taxels `known`, which are at `spots`, what touches cannot tell: so many shapes.
+fn take_off(gains: &mut [f64], spots: &[Spot], known: &[usize]) -> usize {
     let count = known.len();
     let mean =
         |of: fn(&Spot) -> DVec3| known.iter().map(|&taxel| of(&spots[taxel])).sum::<DVec3>() / count.max(1) as f64;
@@ -366,6 +373,7 @@ fn take_off(gains: &mut [f64], spots: &[Spot], known: &[usize]) {
         let along: f64 = known.iter().zip(vector).map(|(&taxel, x)| gains[taxel] * x).sum();
         known.iter().zip(vector).for_each(|(&taxel, x)| gains[taxel] -= along * x);
     }
+    basis.len()
 }
 
 impl Observed {

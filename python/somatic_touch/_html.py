@@ -1,0 +1,101 @@
+"""What notebooks show: a few rows of each."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+
+_MOST_ROWS = 10
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else ""
+
+
+def _table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[object]], more: int = 0) -> str:
+    def cells(tag: str, row: Sequence[object]) -> str:
+        return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in row) + "</tr>"
+
+    body = "".join(cells("td", row) for row in rows)
+    if more:
+        body += f'<tr><td colspan="{len(heads)}">… and {more} more</td></tr>'
+    head = f"<thead>{cells('th', heads)}</thead>" if any(heads) else ""
+    # A caption of tables is centred and far away in some notebooks.
+    return f"<div><code>{html.escape(caption)}</code><table>{head}<tbody>{body}</tbody></table></div>"
+
+
+def percepts(p: _native.Percepts) -> str:
+    """The fields that are touched, for how long, and how hard."""
+    output = next((name for name in ("force", "total", "peak") if name in p), None)
+    frames = p.contact.sum(axis=0)
+    order = np.flatnonzero(frames)
+    heads = ["field", "frames in contact"]
+    if output is not None:
+        unit = p.unit(output)
+        heads.append(f"largest {output}" + ("" if unit == "1" else f" [{unit}]"))
+    rows: list[Sequence[object]] = []
+    for index in order[:_MOST_ROWS]:
+        row: list[object] = [p.fields[index], int(frames[index])]
+        if output is not None:
+            values = p[output][:, index][p.present(output)[:, index]]
+            row.append(_number(float(values.max())) if values.size else "")
+        rows.append(row)
+    return _table(repr(p), heads, rows or [["none is touched", *[""] * (len(heads) - 1)]], max(0, len(order) - _MOST_ROWS))
+
+
+def touches(found: _native.Touches) -> str:
+    """The first rows."""
+    heads = ["frame", "t [s]", "id", "link", f"total [{found.unit('total')}]", "active", "position [m]"]
+    columns = zip(found.frame, found.t, found.id, found.link, found.total, found.active, found.position, strict=True)
+    rows: list[Sequence[object]] = []
+    for frame, t, identity, link, total, active, position in columns:
+        if len(rows) == _MOST_ROWS:
+            break
+        rows.append([frame, _number(t), identity, link, _number(total), active, ", ".join(map(_number, position))])
+    return _table(repr(found), heads, rows, max(0, len(found) - _MOST_ROWS))
+
+
+def self_contacts(found: _native.SelfContacts) -> str:
+    """The first rows."""
+    heads = ["frame", "t [s]", "id", "links", "touches", "position [m]", "distance [m]"]
+    columns = zip(found.frame, found.t, found.id, found.link, found.touch, found.position, found.distance, strict=True)
+    rows: list[Sequence[object]] = []
+    for frame, t, identity, link, touch, position, distance in columns:
+        if len(rows) == _MOST_ROWS:
+            break
+        rows.append([frame, _number(t), identity, *[f"{a}, {b}" for a, b in (link, touch)], ", ".join(map(_number, position)), _number(distance)])
+    return _table(repr(found), heads, rows, max(0, len(found) - _MOST_ROWS))
+
+
+def body(shape: _native.Body) -> str:
+    """The links that have taxels."""
+    taxels = shape.taxels
+    links, counts = np.unique(taxels["link"], return_counts=True)
+    rows = [[shape.links[link], count, _area(taxels["area"][taxels["link"] == link])] for link, count in zip(links[:_MOST_ROWS], counts, strict=False)]
+    return _table(repr(shape), ["link", "taxels", "area [cm²]"], rows, max(0, len(links) - _MOST_ROWS))
+
+
+def _area(areas: npt.NDArray[np.float64]) -> str:
+    return _number(1e4 * float(areas.sum())) if (areas > 0).all() else "unknown"
+
+
+def recording(read: _native.Recording) -> str:
+    """What it has."""
+    steps = np.diff(read.t)
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    rows: list[list[object]] = [
+        ["frames", len(read)],
+        ["rate", f"{_number(1 / float(np.median(steps)))} Hz" if len(steps) else "unknown"],
+        ["taxels", len(read.taxels)],
+        ["missing values", f"{_number(100 * float(read.mask.mean()))} %" if read.mask.size else "none"],
+        ["links with poses", ", ".join(read.pose) or "none"],
+        ["body", read.body if read.body is not None else "none; read it with body="],
+        ["calibration", read.calibration if read.calibration is not None else "none"],
+    ]
+    rows += [["lost", loss] for loss in read.losses[:_MOST_ROWS]]
+    return _table(repr(read), ["", ""], rows, max(0, len(read.losses) - _MOST_ROWS))

@@ -1,0 +1,172 @@
+//! A body of arrays.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DVec3, Vec3};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use somatic::author::{Recipe, author};
+use somatic::body::{BODY_FROM_WORLD, Glb, MAX_TAXEL_ID, MeshData, Modality, Original, Taxel};
+use somatic::error::suggestion;
+
+use crate::arrays::{doubles, shown, vectors};
+use crate::error::{unknown_name, usage};
+
+/// The link of all taxels, or of each.
+#[derive(FromPyObject)]
+pub(crate) enum LinkNames {
+    One(String),
+    Each(Vec<String>),
+}
+
+/// Taxels and surfaces by link.
+pub(crate) struct ArrayBody {
+    links: Vec<(String, Vec<Taxel>)>,
+    meshes: BTreeMap<String, MeshData>,
+}
+
+impl ArrayBody {
+    pub(crate) fn new(
+        py: Python<'_>,
+        [positions, normals]: [&Bound<'_, PyAny>; 2],
+        link: Option<LinkNames>,
+        ids: Option<Vec<u32>>,
+        areas: Option<&Bound<'_, PyAny>>,
+        surface: Option<&Bound<'_, PyAny>>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let (positions, normals) = (vectors(positions, "positions")?, vectors(normals, "normals")?);
+        let count = positions.len();
+        let as_many = |what: &str, given: usize| match given == count {
+            true => Ok(()),
+            false => Err(usage(py, format!("{what} should be one a taxel, {count}; there are {given}"))),
+        };
+        if count == 0 {
+            return Err(usage(py, "positions has no rows; a body has a taxel at least"));
+        }
+        as_many("normals", normals.len())?;
+        for (row, (position, normal)) in positions.iter().zip(&normals).enumerate() {
+            if !position.is_finite() || !normal.is_finite() {
+                return Err(usage(
+                    py,
+                    format!("the position or the normal of row {row} is not finite; leave the row out"),
+                ));
+            }
+            if normal.length() < 1e-9 {
+                return Err(usage(
+                    py,
+                    format!("the normal of row {row} is zero; give the direction that is outwards there"),
+                ));
+            }
+        }
+        let ids = ids.unwrap_or_else(|| (0..count as u32).collect());
+        as_many("ids", ids.len())?;
+        let mut seen = BTreeSet::new();
+        if let Some(id) = ids.iter().find(|id| !seen.insert(**id) || **id > MAX_TAXEL_ID) {
+            let what = if *id > MAX_TAXEL_ID { format!("is over {MAX_TAXEL_ID}") } else { "is there twice".to_owned() };
+            return Err(usage(py, format!("ids: {id} {what}")));
+        }
+        let areas = match areas.map(|areas| doubles(areas, "areas")).transpose()? {
+            None => vec![0.0; count],
+            Some((areas, shape)) if shape.is_empty() => vec![areas[0]; count],
+            Some((areas, shape)) if shape == [count] => areas,
+            Some((_, shape)) => {
+                return Err(usage(py, format!("areas should have shape [] or [{count}]; this has {}", shown(&shape))));
+            }
+        };
+        if let Some(row) = areas.iter().position(|area| !area.is_finite() || *area < 0.0) {
+            return Err(usage(
+                py,
+                format!("the area of row {row} is {}; give m², or 0 where it is unknown", areas[row]),
+            ));
+        }
+        let names = match link {
+            None => vec![name.to_owned(); count],
+            Some(LinkNames::One(link)) => vec![link; count],
+            Some(LinkNames::Each(links)) => {
+                as_many("link", links.len())?;
+                links
+            }
+        };
+        let mut links: Vec<(String, Vec<Taxel>)> = Vec::new();
+        for (row, link) in names.into_iter().enumerate() {
+            let taxel = Taxel {
+                id: ids[row],
+                link: 0,
+                position_in_link: positions[row],
+                normal_in_link: normals[row].normalize(),
+                area: areas[row],
+                modality: Modality::Pressure,
+            };
+            match links.iter_mut().find(|(known, _)| *known == link) {
+                Some((_, taxels)) => taxels.push(taxel),
+                None => links.push((link, vec![taxel])),
+            }
+        }
+        let mut meshes = BTreeMap::new();
+        if let Some(surface) = surface {
+            if let Ok(of_links) = surface.cast::<PyDict>() {
+                for (link, surface) in of_links.iter() {
+                    let link: String = link.extract()?;
+                    if !links.iter().any(|(known, _)| *known == link) {
+                        let near = suggestion(&link, links.iter().map(|(name, _)| name.as_str()));
+                        return Err(unknown_name(py, format!("surface: no taxel is on a link `{link}`; {near}")));
+                    }
+                    meshes.insert(link, mesh(&surface)?);
+                }
+            } else {
+                meshes.insert(links[0].0.clone(), mesh(surface)?);
+            }
+        }
+        Ok(Self { links, meshes })
+    }
+
+    /// It as a file called `name`, with the fields that authoring makes.
+    pub(crate) fn to_glb(&self, name: &str) -> somatic::Result<Vec<u8>> {
+        let mut glb = Glb::new();
+        for (link, taxels) in &self.links {
+            // So that coordinates of the link are those of the world.
+            let node = glb.placed_node(link, None, BODY_FROM_WORLD);
+            if let Some(mesh) = self.meshes.get(link) {
+                glb.mesh(node, link, mesh, None, None);
+            }
+            glb.taxels(&format!("{link} taxels"), Some(node), taxels, None);
+        }
+        let file = Original::from_bytes(name, &glb.to_bytes()?, None)?;
+        author(file, &Recipe::none(), |_| {})?.file.to_glb()
+    }
+}
+
+/// The triangles in `any`, vertices and faces, with normals that are means of those of faces by their areas.
+fn mesh(any: &Bound<'_, PyAny>) -> PyResult<MeshData> {
+    let py = any.py();
+    let wrong =
+        |what: String| usage(py, format!("surface should be (vertices, faces), [vertices, 3] and [faces, 3]; {what}"));
+    let (vertices, faces): (Bound<'_, PyAny>, Bound<'_, PyAny>) =
+        any.extract().map_err(|_| wrong("this is no pair".to_owned()))?;
+    let (vertices, faces) = (vectors(&vertices, "vertices")?, vectors(&faces, "faces")?);
+    if let Some(row) = vertices.iter().position(|vertex| !vertex.is_finite()) {
+        return Err(wrong(format!("vertex {row} is not finite")));
+    }
+    let mut triangles = Vec::with_capacity(faces.len());
+    for (row, face) in faces.iter().enumerate() {
+        let is_index = |index: &f64| *index >= 0.0 && index.fract() == 0.0 && *index < vertices.len() as f64;
+        if !face.to_array().iter().all(is_index) {
+            return Err(wrong(format!("face {row} has no vertex of that index among {}", vertices.len())));
+        }
+        triangles.push(face.to_array().map(|index| index as u32));
+    }
+    let mut normals = vec![DVec3::ZERO; vertices.len()];
+    for triangle in &triangles {
+        let [a, b, c] = triangle.map(|vertex| vertices[vertex as usize]);
+        let normal = (b - a).cross(c - a);
+        triangle.iter().for_each(|&vertex| normals[vertex as usize] += normal);
+    }
+    let unit = |normal: &DVec3| normal.try_normalize().map_or(Vec3::Z, DVec3::as_vec3).to_array();
+    Ok(MeshData {
+        positions: vertices.iter().map(|vertex| vertex.as_vec3().to_array()).collect(),
+        normals: normals.iter().map(unit).collect(),
+        triangles,
+        skinning: None,
+    })
+}
