@@ -144,9 +144,13 @@ impl Flat {
     }
 }
 
-/// An engine on `kind` with everything else as it comes.
+/// An engine on `kind` that computes all that follows from a frame and the one before it.
 pub fn engine(body: &Body, kind: BackendKind) -> Engine {
-    Engine::new(body, Options::default().backend(kind).batch(64)).unwrap()
+    Engine::new(
+        body,
+        Options::default().scene(somatic::Scene::default().outputs(somatic::Outputs::PLAIN)).backend(kind).batch(64),
+    )
+    .unwrap()
 }
 
 pub fn frame(t_s: f64, values: &[f64]) -> Frame {
