@@ -226,13 +226,18 @@ fn filtered_motion_is_given_where_it_is_asked_for() {
         let having = |key: &str| frames.iter().flat_map(fields).filter(|field| field[key].is_number()).count();
         (having("filtered_direction"), having("filtered_speed"))
     };
-    let (directions, speeds) = counted(&[]);
+    // By steps that are long enough.
+    let (directions, speeds) = counted(&["--filter-by", "distance"]);
     assert!(speeds > 20 && directions > speeds, "{directions} {speeds}");
     // Wider steps are fewer.
     let wide = counted(&["--filter-window", "2mm.."]);
     assert!(wide.1 > 2 && wide.1 < speeds / 2 && wide.0 > wide.1, "{wide:?}");
     assert!(counted(&["--filter-by", "radial"]).1 > 20);
-    for other in [["--filter-by", "radial"], ["--filter-time", "1"], ["--filter-over", "0.2"]] {
+    // Over 0.2 s, unless something else is asked for.
+    assert_eq!(done(&run), done(&[&run[..], &["--filter-over", "0.2"]].concat()));
+    for other in
+        [["--filter-by", "distance"], ["--filter-by", "radial"], ["--filter-time", "1"], ["--filter-over", "0.1"]]
+    {
         assert_ne!(done(&run), done(&[&run[..], &other].concat()), "{other:?}");
     }
 

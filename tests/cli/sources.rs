@@ -120,7 +120,7 @@ fn a_row_on_standard_input_is_answered_at_once() {
 fn a_source_that_is_written_otherwise_is_named_as_it_should_be() {
     let error = fails(2, &["run", "--source", "/dev/ttyUSB0"]);
     assert!(error.contains("text:/dev/ttyUSB0 if its board prints numbers"), "{error}");
-    assert!(error.contains("serial:/dev/ttyUSB0 where"), "{error}");
+    assert!(error.contains("serial:/dev/ttyUSB0 if"), "{error}");
     for input in ["t,4\n0,5\n", "0.5,1,2,\n"] {
         let output = fed(&["--source", "-"], input);
         let what =

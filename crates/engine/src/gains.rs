@@ -45,9 +45,9 @@ const MOST: usize = 6000;
 const LEAST_SHARE: f64 = 0.1;
 /// Touches that a taxel needs for its gain to be told.
 const LEAST_TOUCHES: u32 = 5;
-/// Touches count as longer than wide where blobs leave less than this share of what round contacts leave. Their two more parameters
-/// alone leave 0.93 of it where fifteen taxels are pressed.
-const LONGER: f64 = 0.85;
+/// Touches count as longer than wide where blobs leave less than this share of the variance that round contacts leave, both without
+/// noise. Their two more parameters alone leave 0.87 of it where fifteen taxels are pressed.
+const LONGER: f64 = 0.7;
 /// What gains and model are off by at least, as a share.
 const LEAST_SPREAD: f64 = 0.01;
 /// A point has four parameters; with one taxel more than that some agree by chance.
@@ -198,9 +198,10 @@ impl GainsSurvey {
         let skin = self.engine.skin().map_or(&[][..], |skin| skin.taxels());
         let spots: Vec<Spot> =
             skin.iter().map(|taxel| Spot { position: taxel.position, normal: taxel.mean_normal }).collect();
-        let round = estimate(&self.touches, &spots, false, &mut |share| progress(0.5 * share))?;
+        let (round, of_round) = estimate(&self.touches, &spots, false, &mut |share| progress(0.5 * share))?;
         let long = estimate(&self.touches, &spots, true, &mut |share| progress(0.5 + 0.5 * share));
-        let of_skin = long.ok().filter(|long| long.left < LONGER * round.left).unwrap_or(round);
+        let is_longer = |of_long: f64| of_long + LEAST_SPREAD.powi(2) < LONGER * (of_round + LEAST_SPREAD.powi(2));
+        let of_skin = long.ok().filter(|long| is_longer(long.1)).map_or(round, |(long, _)| long);
         let mut estimate = GainsEstimate { gains: vec![None; self.taxels], pressed: vec![0; self.taxels], ..of_skin };
         for (node, &taxel) in self.engine.plan().body_taxels.iter().enumerate() {
             (estimate.gains[taxel], estimate.pressed[taxel]) = (of_skin.gains[node], of_skin.pressed[node]);
@@ -255,13 +256,14 @@ fn connected(touches: &[Observed], taxels: usize) -> Vec<Vec<usize>> {
     parts
 }
 
-/// What `touches` of taxels at `spots` tell, fitted as the kind that explains each best, or all of them that can be as blobs.
+/// What `touches` of taxels at `spots` tell, fitted as the kind that explains each best, or all of them that can be as blobs; and the
+/// mean square of what is left of the shares and is not noise.
 fn estimate(
     touches: &[Observed],
     spots: &[Spot],
     as_blobs: bool,
     progress: &mut dyn FnMut(f64) -> bool,
-) -> Result<GainsEstimate> {
+) -> Result<(GainsEstimate, f64)> {
     const LEAST: usize = 50;
     if touches.len() < LEAST {
         return Err(failed!(
@@ -335,7 +337,7 @@ fn estimate(
     let told = |(gain, count): (&f64, &u32)| (*count >= LEAST_TOUCHES).then(|| gain.exp());
     let gains = gains.iter().zip(&pressed).map(told).collect();
     let gain_spread = (unexplained + unknowable).sqrt().max(LEAST_SPREAD);
-    Ok(GainsEstimate { gains, pressed, width_m, sigma_m, left, gain_spread, touches: used })
+    Ok((GainsEstimate { gains, pressed, width_m, sigma_m, left, gain_spread, touches: used }, unexplained))
 }
 
 /// Takes off the logarithms of `gains` of the taxels `known`, which are at `spots`, what touches cannot tell: so many shapes.
