@@ -279,12 +279,15 @@ class Comparison:
         if np.linalg.norm(normal - here) > 10 * SAME:
             wrong["normal"] = (normal.tolist(), here.tolist())
         if len(skin.surface.corners) == 0:
-            base = members[np.linalg.norm(skin.at[members] - mean, axis=1).argmin()]
-            n = skin.mean_normal[base]
-            here = mean - n * ((mean - skin.at[base]) @ n)
+            # It lies in the plane of the taxel nearest to the mean; of two as near, in that of either.
+            gaps = np.linalg.norm(skin.at[members] - mean, axis=1)
+            bases = members[gaps <= gaps.min() * (1 + CLOSE)]
+            heights = ((mean - skin.at[bases]) * skin.mean_normal[bases]).sum(axis=1)
+            planes = mean - skin.mean_normal[bases] * heights[:, None]
+            off = np.linalg.norm(planes - position, axis=1)
             self.excluded["_placed"] += 1
-            if np.linalg.norm(position - here) > SAME:
-                wrong["position"] = (position.tolist(), here.tolist())
+            if off.min() > SAME:
+                wrong["position"] = (position.tolist(), planes.tolist())
             return
         away = np.linalg.norm(position - mean)
         # The taxels are points of their cells.
