@@ -84,7 +84,7 @@ fn stages(frames: usize) -> Vec<Case> {
         ("3 centroid, principal_axis", Outputs::CENTROID | Outputs::PRINCIPAL_AXIS | Outputs::ANISOTROPY),
         ("3 centroid, motion", Outputs::CENTROID | Outputs::DISPLACEMENT | Outputs::DIRECTION | Outputs::SPEED),
         ("3 centroid, position", Outputs::CENTROID | Outputs::POSITION | Outputs::NORMAL),
-        ("4 all but touches", Outputs::PLAIN),
+        ("4 all but touches", Outputs::USUAL_AND_MOTION),
     ];
     let (_, sensors, fields, members) = SKINS[2];
     let shape = Shape { sensors, fields, members, wide: 0, local: false, frames, seed: 1 };

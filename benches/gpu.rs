@@ -67,7 +67,8 @@ fn main() -> Result<()> {
 fn compare(shape: &Shape, body: &Body) -> Result<()> {
     let frames = (MOST_COMPARED / shape.memberships()).clamp(1, 30) as usize;
     let shape = Shape { frames, ..*shape };
-    let mut engine = shape.engine(body, BackendKind::Gpu, Outputs::PLAIN - Outputs::POSITION - Outputs::NORMAL)?;
+    let mut engine =
+        shape.engine(body, BackendKind::Gpu, Outputs::USUAL_AND_MOTION - Outputs::POSITION - Outputs::NORMAL)?;
     let (_, agreement) = engine.process_and_compare(&shape.frames())?;
     match agreement.holds() {
         true => Ok(()),

@@ -51,7 +51,7 @@ fn parse_csv(bencher: Bencher<'_, '_>, sensors: usize) {
 fn write_ndjson(bencher: Bencher<'_, '_>, fields: usize) {
     let shape = Shape { sensors: 1000, fields, members: 16, wide: 0, local: false, frames: FRAMES, seed: 1 };
     let body = shape.body();
-    let mut engine = shape.engine(&body, BackendKind::Cpu, Outputs::PLAIN).unwrap();
+    let mut engine = shape.engine(&body, BackendKind::Cpu, Outputs::USUAL_AND_MOTION).unwrap();
     let names = FieldNames::all_of(engine.plan());
     let percepts = engine.process(&shape.frames()).unwrap();
     let write = |to: Box<dyn std::io::Write + Send>| {

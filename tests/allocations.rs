@@ -34,7 +34,7 @@ fn a_frame_on_the_cpu_allocates_nothing() {
     for bytes in [bundled::HAND, bundled::MAT, bundled::HUMANOID] {
         let body = Body::from_bytes("body", bytes).unwrap();
         for calibration in [None, Some(checks)] {
-            for outputs in [Outputs::CENTROID | Outputs::ORIENTATION, Outputs::PLAIN] {
+            for outputs in [Outputs::CENTROID | Outputs::ORIENTATION, Outputs::USUAL_AND_MOTION] {
                 assert_eq!(allocations(&body, outputs, calibration), 0, "{outputs:?} {calibration:?}");
             }
         }

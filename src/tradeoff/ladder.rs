@@ -56,7 +56,8 @@ mod tests {
 
     #[test]
     fn rungs_have_every_stage_that_runs_and_every_output_once() {
-        for outputs in [Outputs::PLAIN, Outputs::all(), Outputs::SPEED, Outputs::ORIENTATION, Outputs::PEAK] {
+        for outputs in [Outputs::USUAL_AND_MOTION, Outputs::all(), Outputs::SPEED, Outputs::ORIENTATION, Outputs::PEAK]
+        {
             let plan = plan(outputs);
             let rungs = ladder(&plan);
             let explained = plan.explain();

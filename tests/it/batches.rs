@@ -116,7 +116,7 @@ fn percepts_of_a_frame_at_a_time_are_those_of_many() {
     frames[3].values.fill(RawValue::MISSING);
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibrated = somatic::Calibration::parse("[all]\np_max = 900\ndead_band = 20", &ids).unwrap();
-    let outputs = somatic::Outputs::PLAIN | somatic::Outputs::SPEED;
+    let outputs = somatic::Outputs::USUAL_AND_MOTION | somatic::Outputs::SPEED;
     for kind in backends().into_iter().filter(|kind| *kind != BackendKind::Reference) {
         for (calibration, arithmetic) in [
             (None, Arithmetic::OnePass),

@@ -148,7 +148,10 @@ impl Flat {
 pub fn engine(body: &Body, kind: BackendKind) -> Engine {
     Engine::new(
         body,
-        Options::default().scene(somatic::Scene::default().outputs(somatic::Outputs::PLAIN)).backend(kind).batch(64),
+        Options::default()
+            .scene(somatic::Scene::default().outputs(somatic::Outputs::USUAL_AND_MOTION))
+            .backend(kind)
+            .batch(64),
     )
     .unwrap()
 }

@@ -159,7 +159,7 @@ fn a_rod_at_any_angle_has_it() {
 fn pressures_of_every_size_are_measured_or_told() {
     let body = ring();
     for backend in backends() {
-        let mut engine = engine(&body, backend, Outputs::PLAIN - Outputs::POSITION - Outputs::NORMAL);
+        let mut engine = engine(&body, backend, Outputs::USUAL_AND_MOTION - Outputs::POSITION - Outputs::NORMAL);
         for exponent in -45..=45 {
             let size = 10.0_f64.powi(exponent);
             let values = [1.0, 3.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0].map(|p| p * size);

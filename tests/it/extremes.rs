@@ -40,7 +40,7 @@ fn at_rest((backend, knobs): (BackendKind, Knobs)) -> Options {
         | Outputs::RADIAL_DISTANCE
         | Outputs::SPEED
         | Outputs::RADIAL_SPEED;
-    let scene = Scene::default().outputs(Outputs::PLAIN - moving).knobs(knobs);
+    let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION - moving).knobs(knobs);
     Options::default().backend(backend).scene(scene)
 }
 
@@ -527,7 +527,7 @@ fn nothing_is_kept_over_a_restart_of_time() {
                 (3.0 * back_or_on, hard),
             ]);
             let asked = touch::Options { on: 5.0, off: 1.0, ..touch::Options::default() };
-            let scene = Scene::default().outputs(Outputs::PLAIN).touches(asked);
+            let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION).touches(asked);
             let options = Options::default().backend(backend).scene(scene).calibration(calibration.clone());
             let mut engine = Engine::new(&body, options.clone()).unwrap();
             let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();

@@ -94,7 +94,7 @@ fn large(coverage: Coverage) -> Engine {
     for patch in 0..400 {
         skin = skin.field(&format!("patch {patch}"), Some("whole"), patch * 16..(patch + 1) * 16);
     }
-    let scene = Scene::default().outputs(Outputs::PLAIN).knobs(Knobs::default().coverage(coverage));
+    let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION).knobs(Knobs::default().coverage(coverage));
     let options = Options::default().scene(scene).backend(BackendKind::Cpu);
     Engine::new(&skin.body(), options).unwrap()
 }

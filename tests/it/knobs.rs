@@ -57,7 +57,7 @@ fn compensated_percepts_agree_with_the_reference_within_their_own_bound() {
             })
             .collect();
         for kind in single() {
-            let mut engine = engine(&body, kind, Outputs::PLAIN, with(Arithmetic::Compensated));
+            let mut engine = engine(&body, kind, Outputs::USUAL_AND_MOTION, with(Arithmetic::Compensated));
             for frames in [&frames[..1], &frames[1..]] {
                 let (_, agreement) = engine.process_and_compare(frames).unwrap();
                 assert!(agreement.holds(), "{name}, {kind:?}: {agreement}");
@@ -72,7 +72,7 @@ fn double_precision_is_the_references_wherever_it_is_asked_for() {
     let values: Vec<f64> = (0..body.taxels.len()).map(|index| (index * 37 % 101) as f64).collect();
     let answer = |backend, arithmetic| {
         let knobs = Knobs::default().arithmetic(arithmetic);
-        let mut engine = engine(&body, backend, Outputs::PLAIN, knobs);
+        let mut engine = engine(&body, backend, Outputs::USUAL_AND_MOTION, knobs);
         assert_eq!(engine.backend().0, "reference");
         format!("{:?}", engine.process(&[frame(0.0, &values)]).unwrap())
     };
@@ -154,7 +154,7 @@ fn a_field_is_looked_at_when_it_changes_and_moves_from_change_to_change() {
     for kind in backends() {
         let mut seen: Vec<Vec<String>> = Vec::new();
         for at_once in [1, 7, 40] {
-            let mut engine = engine(&row(), kind, Outputs::PLAIN, knobs);
+            let mut engine = engine(&row(), kind, Outputs::USUAL_AND_MOTION, knobs);
             let mut said = Vec::new();
             for frames in frames.chunks(at_once) {
                 let (percepts, agreement) = engine.process_and_compare(frames).unwrap();
@@ -175,7 +175,7 @@ fn a_field_is_looked_at_when_it_changes_and_moves_from_change_to_change() {
         }
         assert!(seen[0] == seen[1] && seen[1] == seen[2], "{kind:?}");
         // In every frame, the touch stands still, and then leaps.
-        let mut every = engine(&row(), kind, Outputs::PLAIN, Knobs::default());
+        let mut every = engine(&row(), kind, Outputs::USUAL_AND_MOTION, Knobs::default());
         let percepts = every.process(&frames).unwrap();
         assert!(percepts.get(15, 0).flags.contains(Flags::STILL));
         assert!((percepts.get(20, 0).speed.unwrap() - 10.0).abs() < 1e-4);
@@ -190,7 +190,7 @@ fn a_field_that_changes_in_every_frame_has_the_same_bits_on_change() {
         .map(|turn| frame(turn as f64 * 0.01, &(0..body.taxels.len()).map(|i| value(turn, i)).collect::<Vec<_>>()))
         .collect();
     let percepts = |cadence| {
-        let mut engine = engine(&body, BackendKind::Cpu, Outputs::PLAIN, Knobs::default().cadence(cadence));
+        let mut engine = engine(&body, BackendKind::Cpu, Outputs::USUAL_AND_MOTION, Knobs::default().cadence(cadence));
         format!("{:?}", engine.process(&frames).unwrap())
     };
     assert_eq!(percepts(Cadence::OnChange), percepts(Cadence::EveryFrame));

@@ -34,7 +34,7 @@ fn on_every_backend(calibration: &str, frames: &[Frame]) -> Vec<Vec<Percept>> {
         let options = Options::default()
             .backend(backend)
             .calibration(calibration.clone())
-            .scene(Scene::default().outputs(Outputs::PLAIN).max_gap_s(5.0))
+            .scene(Scene::default().outputs(Outputs::USUAL_AND_MOTION).max_gap_s(5.0))
             .batch(64);
         for cut in [1, frames.len()] {
             let mut engine = Engine::new(&body, options.clone()).unwrap();

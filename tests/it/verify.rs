@@ -83,7 +83,7 @@ fn constants_that_single_precision_has_not_are_no_disagreement() {
         // Of the frames in contact, and of the one that may have been.
         assert_eq!(of("centroid").0, 2, "{agreement}");
     }
-    let mut right = engine(&row(), BackendKind::Reference, calibration, Outputs::PLAIN);
+    let mut right = engine(&row(), BackendKind::Reference, calibration, Outputs::USUAL_AND_MOTION);
     let percepts = right.process(&frames).unwrap();
     let total = |frame| percepts.get(frame, 0).total.unwrap();
     assert_eq!((percepts.get(0, 0).contact, total(0)), (false, 0.0));

@@ -24,7 +24,7 @@ fn percepts(path: &PathBuf, backend: BackendKind) -> Percepts {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     assert_eq!(ids, source.taxels());
     let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids).unwrap());
-    let scene = Scene::default().outputs(Outputs::PLAIN | Outputs::FORCE);
+    let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION | Outputs::FORCE);
     let options = Options::default().scene(scene).calibration(calibration).backend(backend);
     let mut engine = Engine::new(&body, options).unwrap();
     engine.set_channels(source.taxels()).unwrap();

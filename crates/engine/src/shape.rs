@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn every_field_of_it_is_touched_and_has_all_that_is_usual() {
-        let mut engine = SHAPE.engine(&SHAPE.body(), BackendKind::Reference, Outputs::PLAIN).unwrap();
+        let mut engine = SHAPE.engine(&SHAPE.body(), BackendKind::Reference, Outputs::USUAL_AND_MOTION).unwrap();
         let mut frames = SHAPE.frames();
         engine.process(&frames).unwrap();
         SHAPE.advance(&mut frames);

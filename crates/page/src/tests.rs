@@ -201,7 +201,7 @@ const ALL_LETTERS: [Receptor; 2] = [Receptor::Sustained, Receptor::Change];
 
 fn book() -> Book {
     let letters = Letter::all_of(&ALL_LETTERS, &[]);
-    let scene = Scene::default().outputs(Outputs::PLAIN | Outputs::SELF_CONTACTS).letters(letters);
+    let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION | Outputs::SELF_CONTACTS).letters(letters);
     let scene = scene.touches(touch::Options::default());
     let mut bench = Bench::of(scene, "[all]\np_max = 100\n[taxel.9]\nmask = true");
     let mut viewer = Viewer::new(0);
@@ -383,7 +383,7 @@ fn a_viewer_has_credit_for_two_frames_and_the_newest_wins() {
 
 #[test]
 fn the_steady_state_does_not_allocate() {
-    let scene = Scene::default().outputs(Outputs::PLAIN).touches(touch::Options::default());
+    let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION).touches(touch::Options::default());
     let mut bench = Bench::of(scene, "");
     let mut viewer = Viewer::new(0);
     let text = r#"{"type":"series","series":[{"field":1,"column":"total","component":0}]}"#;
@@ -415,7 +415,7 @@ fn the_steady_state_does_not_allocate() {
 
 #[test]
 fn a_viewer_owes_what_it_has_not_drawn() {
-    let mut bench = Bench::new(Outputs::PLAIN, &ALL_LETTERS[..1], "");
+    let mut bench = Bench::new(Outputs::USUAL_AND_MOTION, &ALL_LETTERS[..1], "");
     let mut viewer = Viewer::new(0);
     assert_eq!(viewer.owes_since(), None);
     let frame = bench.frame(0.0, [1.0; 5]);

@@ -132,7 +132,7 @@ mod tests {
         // A contact that thresholds keep, motion, and a change: all that a state has.
         let calibration = Calibration::parse("[contact]\non = 900\noff = 1\n", &ids).unwrap();
         let letters = Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[]);
-        let scene = Scene { outputs: Outputs::PLAIN, letters, ..Scene::default() };
+        let scene = Scene { outputs: Outputs::USUAL_AND_MOTION, letters, ..Scene::default() };
         let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
         let lost = |calls| Box::new(Lost { cpu: cpu::Cpu::new(&plan), calls });
         let run = |backend: &mut dyn Backend| {

@@ -293,13 +293,13 @@ columns! {
 }
 
 impl Outputs {
-    /// What is given unless something else is asked for: [`Outputs::PLAIN`] without [`Outputs::MOTION`], which is from frame to frame:
+    /// What is given unless something else is asked for: [`Outputs::USUAL_AND_MOTION`] without [`Outputs::MOTION`], which is from frame to frame:
     /// between two frames noise moves a centroid more than a finger does.
-    pub const USUAL: Self = Self::PLAIN.difference(Self::MOTION);
+    pub const USUAL: Self = Self::USUAL_AND_MOTION.difference(Self::MOTION);
 
     /// What is computed from a frame and the one before it: all but [`Outputs::SELF_CONTACTS`], [`Outputs::FILTERED`],
     /// [`Outputs::SIGMAS`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the calibration.
-    pub const PLAIN: Self = Self::all()
+    pub const USUAL_AND_MOTION: Self = Self::all()
         .difference(Self::SELF_CONTACTS)
         .difference(Self::FILTERED)
         .difference(Self::SIGMAS)

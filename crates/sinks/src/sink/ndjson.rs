@@ -184,14 +184,14 @@ mod tests {
 
     /// Two frames of two fields; the first field is touched, in the second frame in the world.
     fn percepts(precision: Precision) -> Percepts {
-        let mut percepts = Percepts::new(Outputs::PLAIN, 2, precision);
+        let mut percepts = Percepts::new(Outputs::USUAL_AND_MOTION, 2, precision);
         percepts.reset(2);
         percepts.first_frame = 7;
         percepts.t_s = vec![0.05, 0.1];
         percepts.in_world[2] = true;
         percepts.flags = vec![Flags::TIE | Flags::SATURATED, Flags::NO_CONTACT, Flags::empty(), Flags::NO_CONTACT];
         let present = [
-            (Outputs::PLAIN - Outputs::MOTION) | Outputs::DISPLACEMENT,
+            (Outputs::USUAL_AND_MOTION - Outputs::MOTION) | Outputs::DISPLACEMENT,
             Outputs::TOTAL,
             Outputs::TOTAL | Outputs::POSITION,
             Outputs::empty(),

@@ -185,7 +185,7 @@ fn delivered(raw: &[RawValue], channels: &[u32], width: usize) -> Vec<Frame> {
 fn bits_do_not_depend_on_how_much_of_a_skin_is_at_hand() {
     const FRAMES: usize = 37;
     let body = sheet(30_000);
-    for outputs in [Outputs::PLAIN, Outputs::PLAIN - Outputs::MOTION] {
+    for outputs in [Outputs::USUAL_AND_MOTION, Outputs::USUAL_AND_MOTION - Outputs::MOTION] {
         let plan = plan_of(&body, &Scene { outputs, ..Scene::default() });
         let window = window::Window::new(&plan);
         assert!(window.slots() < plan.slots() && window.stretches().len() > 3);
@@ -200,7 +200,7 @@ fn a_frame_that_all_cores_share_has_the_same_bits() {
     for letters in [Vec::new(), Letter::all_of(&[Receptor::Sustained, Receptor::Change], &[])] {
         // Nothing is left out, as then there is little to share.
         let knobs = Knobs { coverage: Coverage::All, ..Knobs::default() };
-        let mut scene = Scene { outputs: Outputs::PLAIN - Outputs::MOTION, knobs, ..Scene::default() };
+        let mut scene = Scene { outputs: Outputs::USUAL_AND_MOTION - Outputs::MOTION, knobs, ..Scene::default() };
         if !letters.is_empty() {
             scene.letters = letters;
         }
@@ -231,7 +231,7 @@ fn fields_wider_than_what_is_at_hand_have_the_same_bits() {
     // Among the others, as charted fields and on both sides of the fold, where there is no chart.
     body.fields.insert(5, wide("all", (0..30_000).step_by(2).collect()));
     body.fields.push(wide("one side", (0..FOLD).filter(|id| id % 5 != 1).collect()));
-    for outputs in [Outputs::PLAIN, Outputs::TOTAL, Outputs::CENTROID, Outputs::PRINCIPAL_AXIS] {
+    for outputs in [Outputs::USUAL_AND_MOTION, Outputs::TOTAL, Outputs::CENTROID, Outputs::PRINCIPAL_AXIS] {
         let plan = plan_of(&body, &Scene { outputs, ..Scene::default() });
         assert_eq!(window::Window::new(&plan).slots(), plan.slots());
         same_bits_however_cut(&plan, FRAMES);
@@ -257,7 +257,7 @@ fn same_bits_however_cut(plan: &Plan, frames: usize) {
 fn bits_do_not_depend_on_where_values_lie() {
     const FRAMES: usize = 217;
     let body = sheet(1000);
-    let plan = plan_of(&body, &Scene { outputs: Outputs::PLAIN - Outputs::MOTION, ..Scene::default() });
+    let plan = plan_of(&body, &Scene { outputs: Outputs::USUAL_AND_MOTION - Outputs::MOTION, ..Scene::default() });
     // In frames as they come some values are nobody's, some lie one after the other, some the other way round, and some come
     // from two, four and five boards in turn.
     let in_turn = |index: u32, boards: u32, apart: u32| index % boards * apart + index / boards;
@@ -305,7 +305,7 @@ fn fields_of_few_taxels_have_the_same_bits() {
     // In a window that slides, without one, and fewer than stand abreast.
     for fields in [body.fields.len(), 107, 7] {
         body.fields.truncate(fields);
-        for outputs in [Outputs::PLAIN - Outputs::MOTION, sums | Outputs::ORIENTATION, sums] {
+        for outputs in [Outputs::USUAL_AND_MOTION - Outputs::MOTION, sums | Outputs::ORIENTATION, sums] {
             let plan = plan_of(&body, &Scene { outputs, ..Scene::default() });
             let is_large = fields > 1000;
             assert_eq!(window::Window::new(&plan).slots() < plan.slots(), is_large);

@@ -144,7 +144,8 @@ mod tests {
         let body = shape.body();
         for arithmetic in [Arithmetic::OnePass, Arithmetic::Compensated] {
             let knobs = Knobs { arithmetic: Some(arithmetic), ..Knobs::default() };
-            let scene = Scene { outputs: Outputs::PLAIN | Outputs::PRINCIPAL_AXIS, knobs, ..Scene::default() };
+            let scene =
+                Scene { outputs: Outputs::USUAL_AND_MOTION | Outputs::PRINCIPAL_AXIS, knobs, ..Scene::default() };
             let mut plan = plan_of(&body, &scene);
             // Some without a chart, whose third coordinate counts.
             let mut fields = plan.fields.to_vec();

@@ -269,7 +269,7 @@ pub(super) fn plan_of(body: &Body, scene: &Scene) -> Plan {
 fn raw_values_are_read_alike_as_they_come_and_through_calibration() {
     let Ok(device) = adapter::shared() else { return skip("GPU", "no adapter answers") };
     let body = Body::from_bytes("hand", somatic_bodies::HAND).unwrap();
-    let scene = Scene { outputs: Outputs::PLAIN - Outputs::POSITION - Outputs::NORMAL, ..Scene::default() };
+    let scene = Scene { outputs: Outputs::USUAL_AND_MOTION - Outputs::POSITION - Outputs::NORMAL, ..Scene::default() };
     let plan = plan_of(&body, &scene);
     // One that must be calibrated, though nothing comes of it: what is so small counts as 0 anyway.
     let mut calibrated = plan.clone();

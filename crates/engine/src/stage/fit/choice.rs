@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::descent::{Fitted, STEPS, descend};
 use super::kinds::{Blob, Contact, Kind, Line, Point, Segment};
 use super::objective::Sensor;
-use super::place::{Fitted as FittedPlace, Place};
+use super::place::{Place, PlaceOfFit};
 use super::real::Real;
 use super::shape::{Parameter, Shape};
 use super::touch::{LEAST_PRESSED, Start, Touch};
@@ -269,7 +269,7 @@ impl Touch {
         let felt = best.felt(self);
         let line = is_line.then_some(along);
         let fit = Fit {
-            blended: self.blended(FittedPlace { felt: &felt, place, variance, floor: best.floor, line }),
+            blended: self.blended(PlaceOfFit { felt: &felt, place, variance, floor: best.floor, line }),
             kind: best.kind,
             place: (place * self.unit_m + self.origin).to_array(),
             force: is_whole.then_some(force),

@@ -31,7 +31,7 @@ pub(crate) struct Place {
 
 /// What a fit says of the place, in units of the fit.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fitted<'a> {
+pub(super) struct PlaceOfFit<'a> {
     /// What it makes the taxels feel, as shares of the touch's largest pressure.
     pub(super) felt: &'a [f64],
     pub(super) place: DVec2,
@@ -64,7 +64,7 @@ impl Mean {
 
 impl Touch {
     /// The place of `fitted` and that of the moments as one; `None` if the moments have none.
-    pub(super) fn blended(&self, fitted: Fitted<'_>) -> Option<Place> {
+    pub(super) fn blended(&self, fitted: PlaceOfFit<'_>) -> Option<Place> {
         let own = || self.sensors().iter().zip(&self.pulls).zip(fitted.felt);
         let own = || own().filter(|((sensor, pull), _)| sensor.pressed > 0.0 && pull.weight > 0.0);
         let at = |sensor: &super::Sensor<f64>| DVec2::from_array(sensor.at);
@@ -135,7 +135,7 @@ mod tests {
 
     fn blended(touch: &Touch, felt: &[f64], place_m: DVec2, variance: f64, line: Option<DVec2>) -> Place {
         let place = (place_m - touch.origin) / UNIT_M;
-        let fitted = Fitted { felt, place, variance: DVec2::splat(variance), floor: 0.01, line };
+        let fitted = PlaceOfFit { felt, place, variance: DVec2::splat(variance), floor: 0.01, line };
         touch.blended(fitted).unwrap()
     }
 
