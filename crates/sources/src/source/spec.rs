@@ -358,10 +358,7 @@ mod tests {
         for port in ["/dev/ttyUSB0", "/dev/ttyACM0@9600", "/dev/serial/by-path/pci-0:1.0-port0", "/dev/cu.usb1", "COM3"]
         {
             let why = why(port);
-            assert!(
-                why.contains(&format!("text:{port} where")) && why.contains(&format!("serial:{port} where")),
-                "{why}"
-            );
+            assert!(why.contains(&format!("text:{port} if")) && why.contains(&format!("serial:{port} if")), "{why}");
         }
         assert!(why("COM3.pdf").contains("csv:FILE"));
     }

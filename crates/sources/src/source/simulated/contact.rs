@@ -195,19 +195,25 @@ impl Footprint {
             }
             Kernel::Radial(kernel) => Blur::Radial { kernel, depth_m: layer.thickness_m.max(least) },
         };
-        let scale_m = patch::scale_m(blur);
+        let loads = Self::loads(indenter, layer.kernel, [patch_m, half_along_m], patch::scale_m(blur));
+        let stretch = indenter.aspect().sqrt();
+        Self { loads, blur, half_across_m: patch_m, half_along_m: half_along_m.max(patch_m * stretch) }
+    }
+
+    /// The loads that stand for a patch of half sides `across` and `along`, m, under a kernel of this scale.
+    fn loads(indenter: &Indenter, kernel: Kernel, [across, along]: [f64; 2], scale_m: f64) -> Vec<Load> {
         let loads = match indenter {
-            Indenter::Rod { .. } => patch::rod(patch_m, half_along_m, scale_m),
-            Indenter::Edge { .. } => Load::line(half_along_m),
-            Indenter::Ball { .. } | Indenter::Fingertip { .. } => patch::dome(patch_m, scale_m),
-            Indenter::Flat { .. } => patch::disc(patch_m, scale_m),
+            Indenter::Rod { .. } => patch::rod(across, along, scale_m),
+            Indenter::Edge { .. } => Load::line(along),
+            Indenter::Ball { .. } | Indenter::Fingertip { .. } => patch::dome(across, scale_m),
+            Indenter::Flat { .. } => patch::disc(across, scale_m),
         };
-        let mut loads = if layer.kernel == Kernel::Gaussian { loads } else { patch::points(loads, scale_m) };
+        let mut loads = if kernel == Kernel::Gaussian { loads } else { patch::points(loads, scale_m) };
         let stretch = indenter.aspect().sqrt();
         for load in &mut loads {
             (load.across_m, load.along_m) = (load.across_m / stretch, load.along_m * stretch);
         }
-        Self { loads, blur, half_across_m: patch_m, half_along_m: half_along_m.max(patch_m * stretch) }
+        loads
     }
 
     /// Maximum distance from the tangent plane at which a taxel is touched, m.
@@ -354,14 +360,8 @@ mod tests {
             let scale = patch::scale_m(footprint.blur);
             let peak = footprint.share_on(0.0, 0.0, 4e-3);
             let with = |scale: f64| {
-                let (patch, half) = (footprint.half_across_m, footprint.half_along_m);
-                let loads = match indenter {
-                    Indenter::Rod { .. } => patch::rod(patch, half, scale),
-                    Indenter::Edge { .. } => Load::line(half),
-                    Indenter::Flat { .. } => patch::disc(patch, scale),
-                    _ => patch::dome(patch, scale),
-                };
-                let loads = if layer.kernel == Kernel::Gaussian { loads } else { patch::points(loads, scale) };
+                let halves = [footprint.half_across_m, footprint.half_along_m];
+                let loads = Footprint::loads(indenter, layer.kernel, halves, scale);
                 Footprint { loads, ..footprint.clone() }
             };
             let off = |other: &Footprint| {
@@ -371,7 +371,7 @@ mod tests {
                     .map(|(x, y)| (other.share_on(x, y, 4e-3) - footprint.share_on(x, y, 4e-3)).abs())
                     .fold(0.0, f64::max)
             };
-            assert_eq!(off(&with(scale)), 0.0);
+            assert_eq!(off(&with(scale)), 0.0, "{indenter:?} {layer:?}");
             let finer = off(&with(scale / 3.0));
             // The squares of these kernels are summed by rules of a few nodes, and one has a sharp top.
             let is_summed = matches!(layer.kernel, Kernel::Radial(Radial::Exponential | Radial::Bonded));
