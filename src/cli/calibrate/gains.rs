@@ -117,18 +117,22 @@ fn with(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<String> {
     let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
     let number =
         |item: Option<&Item>| item.and_then(|item| item.as_float().or_else(|| item.as_integer().map(|n| n as f64)));
+    let untold = untold_spread(estimate);
     for (id, gain) in ids.iter().zip(&estimate.gains) {
-        let Some(gain) = gain else { continue };
         let id = id.to_string();
         let of = |document: &DocumentMut, key: &str| {
             let own = document.get("taxel").and_then(|taxels| taxels.get(&id)).and_then(|taxel| taxel.get(key));
             number(own).or_else(|| number(document.get("all").and_then(|all| all.get(key))))
         };
-        let new = [
-            ("gain", Some(of(&document, "gain").unwrap_or(1.0) / gain)),
-            ("dead_band", of(&document, "dead_band").map(|band| band / gain)),
-            ("p_max", of(&document, "p_max").map(|most| most / gain)),
-        ];
+        let new = match gain {
+            Some(gain) => [
+                ("gain", Some(of(&document, "gain").unwrap_or(1.0) / gain)),
+                ("dead_band", of(&document, "dead_band").map(|band| band / gain)),
+                ("p_max", of(&document, "p_max").map(|most| most / gain)),
+                ("gain_spread", None),
+            ],
+            None => [("gain", None), ("dead_band", None), ("p_max", None), ("gain_spread", Some(untold))],
+        };
         let taxels = document.entry("taxel").or_insert_with(|| {
             let mut table = Table::new();
             table.set_implicit(true);
@@ -140,8 +144,11 @@ fn with(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<String> {
             return Err(Error::failed(format!("`taxel.{id}` is not a table")));
         };
         for (key, number) in new {
-            if let Some(number) = number {
-                taxel.insert(key, value(rounded(number)));
+            match number {
+                Some(number) => _ = taxel.insert(key, value(rounded(number))),
+                // One that is told now has the layer's.
+                None if key == "gain_spread" => _ = taxel.remove(key),
+                None => {}
             }
         }
     }
@@ -166,6 +173,11 @@ fn untold(ids: &[u32], estimate: &GainsEstimate) -> Vec<u32> {
 fn spread(estimate: &GainsEstimate) -> f64 {
     let logarithms = || estimate.gains.iter().flatten().map(|gain| gain.ln());
     (logarithms().map(|x| x * x).sum::<f64>() / logarithms().count().max(1) as f64).sqrt()
+}
+
+/// What gains that no touch told may be off by: as much as the others were.
+fn untold_spread(estimate: &GainsEstimate) -> f64 {
+    spread(estimate).max(estimate.gain_spread)
 }
 
 fn table_of(ids: &[u32], estimate: &GainsEstimate, from: &Path) -> String {
@@ -195,7 +207,10 @@ fn table_of(ids: &[u32], estimate: &GainsEstimate, from: &Path) -> String {
     if !untold.is_empty() {
         let listed = untold.iter().take(12).map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let more = if untold.len() > 12 { ", …" } else { "" };
-        let what = format!("taxels {listed}{more} were pressed too seldom and keep their gains: touch there, too");
+        let what = format!(
+            "taxels {listed}{more} were pressed too seldom: they keep their gains, each with a gain_spread of {}; touch there, too",
+            percent(untold_spread(estimate))
+        );
         text += &format!("{}\n", bullet(&what));
     }
     text
@@ -236,9 +251,16 @@ mod tests {
         }
         assert_eq!(after.taxels[1].p_max, 640.0);
         assert_eq!(after.layer.unwrap().sigma_m, 0.002_345_7);
+        // What no touch told may be off by what the others were, and one that is told later no more than they.
+        assert_eq!(
+            after.taxels.iter().map(|taxel| taxel.gain_spread.is_some()).collect::<Vec<_>>(),
+            [false, false, true]
+        );
+        assert!((after.taxels[2].gain_spread.unwrap() / 0.223 - 1.0).abs() < 1e-2, "{:?}", after.taxels[2]);
         // Again with other gains: a layer that was there is replaced.
-        let again = with(&written, &[3, 7, 9], &estimate(&[None; 3])).unwrap();
-        assert_eq!(again, written);
+        let again = with(&written, &[3, 7, 9], &estimate(&[Some(1.0); 3])).unwrap();
+        let again = Calibration::parse(&again, &[3, 7, 9]).unwrap();
+        assert_eq!((again.layer, again.taxels[2].gain_spread), (after.layer, None));
     }
 
     #[test]
