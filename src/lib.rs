@@ -74,6 +74,9 @@ mod scene_file;
 #[doc(hidden)]
 pub mod setup;
 #[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod survey;
+#[cfg(feature = "cli")]
 pub mod tradeoff;
 
 pub use somatic_skin::error;

@@ -12,12 +12,13 @@
 mod at_rest;
 mod figure;
 mod file;
+pub mod gains;
 pub mod known;
 pub mod tuning;
 mod which_way;
 
-use somatic::error::{Error, Result};
-use somatic::signal::{RawValue, UnitOfP};
+use crate::error::{Error, Result};
+use crate::signal::{RawValue, UnitOfP};
 
 use self::at_rest::{chance_of, median, middle, movement_of, rest_of, sigma_of};
 
@@ -523,7 +524,7 @@ mod tests {
         let found = twelve(12).finish(Wishes::default()).unwrap();
         assert_eq!(found.raw_range, Some([0.0, 1023.0]));
         let ids: Vec<u32> = (0..12).collect();
-        let read = somatic::Calibration::parse(&found.calibration("a"), &ids).unwrap();
+        let read = crate::Calibration::parse(&found.calibration("a"), &ids).unwrap();
         assert_eq!((read.taxels[5].baseline, read.taxels[5].p_max, read.taxels[5].gain), (600.0, 422.5, 1.0));
         let why = twelve(12).finish(Wishes { bits: Some(8), ..Wishes::default() }).unwrap_err();
         assert!(

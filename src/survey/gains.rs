@@ -1,0 +1,106 @@
+//! Gains and a layer that were found from touches, written into a calibration.
+
+use toml_edit::{DocumentMut, Item, Table, value};
+
+use crate::error::{Error, Result};
+use crate::gains::GainsEstimate;
+
+/// The layer's own σ where all touches were by the flat end of a stamp: an even disc has a variance of R²/4 each way.
+///
+/// # Errors
+/// The touches are narrower than such a stamp makes them.
+pub fn layer_under(radius_m: f64, width_m: f64) -> Result<f64> {
+    let variance = width_m * width_m - radius_m * radius_m / 4.0;
+    if variance <= 0.0 {
+        return Err(Error::failed(format!(
+            "the touches are {:.2} mm wide, less than a stamp with a radius of {:.2} mm makes them; is it the radius, and flat?",
+            width_m * 1e3,
+            radius_m * 1e3
+        )));
+    }
+    Ok(variance.sqrt())
+}
+
+/// The calibration `text` with the gains and the layer of `estimate`, for taxels of `ids`. What is counted in P goes with the gain.
+///
+/// # Errors
+/// It is not the text of a calibration.
+pub fn with_gains(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<String> {
+    let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
+    let number =
+        |item: Option<&Item>| item.and_then(|item| item.as_float().or_else(|| item.as_integer().map(|n| n as f64)));
+    for (id, gain) in ids.iter().zip(&estimate.gains) {
+        let Some(gain) = gain else { continue };
+        let id = id.to_string();
+        let of = |document: &DocumentMut, key: &str| {
+            let own = document.get("taxel").and_then(|taxels| taxels.get(&id)).and_then(|taxel| taxel.get(key));
+            number(own).or_else(|| number(document.get("all").and_then(|all| all.get(key))))
+        };
+        let new = [
+            ("gain", Some(of(&document, "gain").unwrap_or(1.0) / gain)),
+            ("dead_band", of(&document, "dead_band").map(|band| band / gain)),
+            ("p_max", of(&document, "p_max").map(|most| most / gain)),
+        ];
+        let taxels = document.entry("taxel").or_insert_with(|| {
+            let mut table = Table::new();
+            table.set_implicit(true);
+            Item::Table(table)
+        });
+        let Some(taxels) = taxels.as_table_like_mut() else { return Err(Error::failed("`taxel` is not a table")) };
+        let taxel = taxels.entry(&id).or_insert_with(|| Item::Table(Table::new()));
+        let Some(taxel) = taxel.as_table_like_mut() else {
+            return Err(Error::failed(format!("`taxel.{id}` is not a table")));
+        };
+        for (key, number) in new {
+            if let Some(number) = number {
+                taxel.insert(key, value(rounded(number)));
+            }
+        }
+    }
+    let layer = document.entry("layer").or_insert_with(|| Item::Table(Table::new()));
+    let Some(layer) = layer.as_table_like_mut() else { return Err(Error::failed("`layer` is not a table")) };
+    layer.insert("sigma_m", value(rounded(estimate.sigma_m)));
+    layer.insert("gain_spread", value(rounded(estimate.gain_spread)));
+    Ok(document.to_string())
+}
+
+/// Five digits: gains are known to a few per cent.
+fn rounded(number: f64) -> f64 {
+    format!("{number:.4e}").parse().unwrap_or(number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(gains: &[Option<f64>]) -> GainsEstimate {
+        let mut estimate = GainsEstimate::default();
+        (estimate.gains, estimate.sigma_m) = (gains.to_vec(), 0.002_345_67);
+        estimate
+    }
+
+    #[test]
+    fn gains_go_into_a_calibration_with_what_is_counted_in_p() {
+        let text =
+            "# Mine.\n[all]\nbaseline = 12\ndead_band = 3 # counts\ngain = 2\n\n[taxel.7]\ngain = 4.0\np_max = 800\n";
+        let written = with_gains(text, &[3, 7, 9], &estimate(&[Some(0.8), Some(1.25), None])).unwrap();
+        assert!(written.contains("# Mine.") && written.contains("dead_band = 3 # counts"), "{written}");
+        let [before, after] = [text, &written].map(|text| Calibration::parse(text, &[3, 7, 9]).unwrap());
+        for (index, factor) in [0.8, 1.25, 1.0].into_iter().enumerate() {
+            let [before, after] = [&before, &after].map(|calibration| &calibration.taxels[index]);
+            assert!((after.gain * factor / before.gain - 1.0).abs() < 1e-4, "{index}");
+            assert!((after.dead_band * factor / before.dead_band - 1.0).abs() < 1e-4, "{index}");
+        }
+        assert_eq!(after.taxels[1].p_max, 640.0);
+        assert_eq!(after.layer.unwrap().sigma_m, 0.002_345_7);
+        // Again with other gains: a layer that was there is replaced.
+        let again = with_gains(&written, &[3, 7, 9], &estimate(&[None; 3])).unwrap();
+        assert_eq!(again, written);
+    }
+
+    #[test]
+    fn a_stamp_tells_the_layer_apart_from_itself() {
+        assert!((layer_under(0.006, 0.005).unwrap() - 0.004).abs() < 1e-12);
+        assert!(layer_under(0.02, 0.005).unwrap_err().to_string().contains("is it the radius"));
+    }
+}
