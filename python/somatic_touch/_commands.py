@@ -49,7 +49,7 @@ def inspect(body: _native.Body | _Path, *, contact_tolerance_m: float | None = N
     >>> import somatic_touch as st
     >>> seen = st.inspect("hand")
     >>> seen["taxels"], len(seen["fields"]), seen["islands"]
-    (40, 13, 1)
+    (40, 13, 5)
     """
     seen: dict[str, Any] = json.loads(_native._inspect(_of(body), contact_tolerance_m))
     return seen

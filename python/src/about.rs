@@ -184,13 +184,16 @@ pub(crate) fn inspect(py: Python<'_>, body: &PyBody, contact_tolerance_m: Option
     Ok(seen.to_string())
 }
 
-/// A quantity that is a list, and not a number.
-fn list_of(name: &str) -> &'static str {
-    match name {
-        "wrench" => "N, N m",
-        "links" | "fields" => "1",
-        _ => "",
-    }
+/// The unit of a quantity of touches that is a list, and what it is.
+fn list_of(name: &str) -> Option<(&'static str, &'static str)> {
+    Some(match name {
+        "links" => ("1", "The links that it lies on, with their shares of its total."),
+        "fields" => ("1", "The fields that hold parts of it, with their shares of its total."),
+        "taxels" => ("", "The ids of its taxels."),
+        "wrench" => ("N, N m", "Force and torque on each link that it lies on."),
+        "fit_sigmas" => ("", "The standard deviations of the fit's place, force, direction, width and length."),
+        _ => return None,
+    })
 }
 
 #[pyfunction]
@@ -199,10 +202,16 @@ pub(crate) fn outputs() -> String {
     let touch = |name: String| {
         let output = TouchOutputs::named(&name)?;
         let column = TOUCH_COLUMNS.iter().find(|column| column.output == output);
+        let (unit, components, what) = match (list_of(&name), column) {
+            (Some((unit, what)), _) => (unit, 0, what),
+            (None, column) => {
+                let column = column?;
+                (column.unit.symbol(), column.components, column.help.trim())
+            }
+        };
         Some(json!({
-            "name": format!("touches.{name}"), "unit": column.map_or_else(|| list_of(&name), |column| column.unit.symbol()),
-            "components": column.map_or(0, |column| column.components), "default": TouchOutputs::USUAL.contains(output),
-            "what": column.map_or("A list of each touch.", |column| column.help.trim()),
+            "name": format!("touches.{name}"), "unit": unit, "components": components,
+            "default": TouchOutputs::USUAL.contains(output), "what": what,
         }))
     };
     let field = |column: &somatic::Column| {

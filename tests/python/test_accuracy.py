@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import json
 import pathlib
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import somatic_touch as st
 
 
-def session(path: pathlib.Path, sensors: int = 4, at_once: bool = False) -> pathlib.Path:
+def session(path: pathlib.Path, ids: Sequence[int] = range(4), at_once: bool = False) -> pathlib.Path:
     """Nothing for three seconds, then each sensor in its turn, or all at once, as a 10-bit converter gives it."""
     random = np.random.default_rng(2)
-    t = np.arange(900) / 100
+    t, sensors = np.arange(900) / 100, len(ids)
     raw = 200 + random.integers(-1, 2, (900, sensors))
     for sensor in range(sensors):
         at = 350 if at_once else 350 + 100 * sensor
         raw[at : at + 50, sensor] += 100 * (sensor % 4 + 1)
-    header = ",".join(["t", *map(str, range(sensors))])
+    header = ",".join(["t", *map(str, ids)])
     np.savetxt(path, np.column_stack([t, raw]), delimiter=",", header=header, comments="", fmt="%g")
     return path
 
@@ -35,7 +37,7 @@ def test_a_calibration_is_the_commands(somatic, tmp_path: pathlib.Path) -> None:
     assert found.calibration.text == (tmp_path / "pad.toml").read_text()
     assert [row["travel"] for row in found] == [sensor["travel"] for sensor in told["sensors"]]
     assert found.report["raw_range"] == told["raw_range"] == [0, 1023] and not found.report["invert"]
-    assert found.to_pandas()["baseline"].tolist() == found["baseline"].tolist() == [200.0] * 4
+    assert found.to_pandas()["baseline"].tolist() == found["baseline"].tolist() == pytest.approx([200.0] * 4, abs=0.5)
     assert found.to_polars().columns == found.keys()
     found.calibration.save(tmp_path / "own.toml")
     assert (tmp_path / "own.toml").read_text() == found.calibration.text
@@ -62,27 +64,11 @@ def test_what_cannot_be_calibrated_says_so(tmp_path: pathlib.Path) -> None:
 
 
 @pytest.mark.once
-def test_gains_are_found_from_touches(tmp_path: pathlib.Path) -> None:
-    simulation = """
-        body = "mat"
-        rate_hz = 20
-        duration_s = 30
-        [sensor]
-        gain_spread = 0.2
-        [[touch]]
-        on = "mat"
-        indenter = "ball"
-        radius_m = 0.02
-        path = [[-0.2, -0.2], [0.2, -0.1], [-0.2, 0.0], [0.2, 0.1]]
-        times_s = [0, 10, 20, 30]
-        force_newton = [[0, 10], [30, 10]]
-    """
-    try:
-        touches = st.simulate(simulation).recording
-    except st.SomaticError as error:
-        pytest.fail(str(error))
+def test_gains_are_found_from_touches() -> None:
+    grid = st.Body.grid(13, 13, 0.005, name="grid")
+    touches = st.simulate(ROOT / "examples" / "simulations" / "finger.toml", body=grid).recording
     shares: list[float] = []
-    found = st.calibrate(touches.body, gains_from=touches, calibration=touches.calibration, progress=shares.append)
+    found = st.calibrate(grid, gains_from=touches, calibration=touches.calibration, progress=shares.append)
     told = found["pressed"] > 0
     assert told.any() and np.isfinite(found["gain"][told]).any() and found.report["sigma_m"] > 0
     assert "[layer]" in found.calibration.text and shares == sorted(shares)
@@ -91,24 +77,25 @@ def test_gains_are_found_from_touches(tmp_path: pathlib.Path) -> None:
 @pytest.mark.once
 def test_a_trade_has_the_commands_rows(somatic, touch: st.Recording) -> None:
     scene = {"outputs": ["centroid", "orientation"], "fields": "hand/*"}
-    found = st.tradeoff(scene=scene, source=touch, backend="cpu", seconds=0.2, frames=60, within="3 mm")
+    found = st.tradeoff(scene=scene, backend="cpu", seconds=0.2, frames=160, within="3 mm")
     told = json.loads(somatic(
-        "tradeoff", "--outputs", "centroid,orientation", "--fields", "hand/*", "--backend", "cpu", "--seconds", "0.2", "--frames", 60,
+        "tradeoff", "--outputs", "centroid,orientation", "--fields", "hand/*", "--backend", "cpu", "--seconds", "0.2", "--frames", 160,
         "--json",
     ))
     names = ["way", "backend", "arithmetic", "charts", "orientation_by", "coverage", "cadence"]
     assert {tuple(row[name] for name in names) for row in found} == {tuple(row[name] for name in names) for row in told["rows"]}
-    assert found.report["frames"] == 60 and found.missed == [] and found.pick is not None
+    assert found.report["frames"] == told["frames"] and found.report["truth"] and found.pick is not None
+    assert "truth_round_mm_p95" in found
     table = found.to_pandas()
     assert len(table) == len(found) and (table["p50_us"] > 0).all() and table["front"].any()
     assert table["centroid_mm_p95"].notna().all()
     # What was picked is a scene.
     st.Engine(st.Body.bundled("hand"), {**scene, **found.scene}).step(0.0, touch.values[0])
-    impossible = st.tradeoff(scene=scene, source=touch, backend="cpu", seconds=0.05, frames=20, budget="1 ns")
+    impossible = st.tradeoff(scene=scene, source=touch, backend="cpu", seconds=0.05, frames=160, budget="1 ns")
     assert impossible.missed and "times" in impossible.missed[0]
     for wrong in ({"seconds": 0}, {"within": "3 kg"}, {"backend": "reference"}):
         with pytest.raises(st.UsageError):
-            st.tradeoff(**{"seconds": 0.05, "frames": 10, **wrong})  # type: ignore[arg-type]
+            st.tradeoff(**{"seconds": 0.05, "frames": 160, **wrong})  # type: ignore[arg-type]
 
 
 def test_a_table_of_columns() -> None:

@@ -109,19 +109,33 @@ def test_bags_are_read(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> 
         st.read(f"ros2-mcap:{tmp_path / 'bag'}")
 
 
+MODEL = """<mujoco model="pad">
+  <asset><mesh name="plate" builtin="plate" params="5 7" scale="0.02 0.03 0.01"/></asset>
+  <worldbody><body name="palm">
+    <geom type="box" size="0.02 0.03 0.01" mass="0.1"/>
+    <geom name="palm skin" type="mesh" mesh="plate" mass="0" contype="0" conaffinity="0"/>
+  </body></worldbody>
+  <sensor><tactile name="palm" geom="palm skin" mesh="plate"/></sensor>
+</mujoco>
+"""
+
+
 @pytest.mark.once
 def test_skins_that_come_with_their_places(tmp_path: pathlib.Path) -> None:
     robot = ROOT / "examples" / "robots" / "arm.urdf"
-    bare = st.author(robot, geometry="none")
+    bare = st.author(robot)
     assert len(bare.taxels) == 0 and bare.name == "arm.glb" and len(bare.links) > 2
-    body = st.author(robot, taxels=60, up="z", clear="2 mm", mirror="y")
+    body = st.author(robot, taxels=60, up="z", clear="2 mm")
     assert len(body.taxels) > 0 and set(body.joints) == set(bare.joints)
     with pytest.warns(UserWarning):
         st.convert(body, tmp_path / "skin.urdf")
     skin = st.author(urdf_skin=tmp_path / "skin.urdf", geometry="none")
     assert skin.taxels["id"].tolist() == body.taxels["id"].tolist()
-    model = st.author(mjcf_skin=ROOT / "tests" / "mujoco" / "skin.xml")
-    assert len(model.taxels) > 0 and model.name == "skin.glb"
+    mirrored = st.author("humanoid", taxels=100, seed=1, mirror="y").taxels["place"]
+    assert np.allclose(np.sort(mirrored[:, 1]), np.sort(-mirrored[:, 1]), atol=1e-3)
+    (tmp_path / "pad.xml").write_text(MODEL)
+    model = st.author(mjcf_skin=tmp_path / "pad.xml")
+    assert len(model.taxels) > 0 and model.links == ["palm"] and model.name == "pad.glb"
     # A layout that is there is brought up to date.
     body.save(tmp_path / "edited.glb")
     assert st.author(tmp_path / "edited.glb").taxels["id"].tolist() == body.taxels["id"].tolist()

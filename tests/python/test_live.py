@@ -19,6 +19,8 @@ import somatic_touch as st
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are pseudo-terminals on POSIX alone")
 SENSORS = st.Body.grid(1, 3, 0.01, name="pad")
+TEXT = {"columns": "1-3"}
+"""Also the one that never changes."""
 
 
 class Printer:
@@ -71,7 +73,7 @@ def boards(command: pathlib.Path, folder: pathlib.Path) -> Iterator[str]:
 
 @pytest.mark.once
 def test_a_board_that_prints_numbers(printer: Printer) -> None:
-    keys = {"outputs": ["total"], "backend": "cpu", "text": {"columns": "1-3"}}
+    keys = {"outputs": ["total"], "backend": "cpu", "text": TEXT}
     with pytest.warns(UserWarning, match="text"), st.live(keys, source=f"text:{printer.name}", body=SENSORS) as live:
         assert live.fields == ["pad"] and live.taxels == [0, 1, 2] and live.backend == "cpu"
         found = [p for p, _ in zip(live, range(20), strict=False)]
@@ -89,7 +91,7 @@ def test_a_board_that_prints_numbers(printer: Printer) -> None:
 @pytest.mark.once
 @pytest.mark.filterwarnings("ignore")
 def test_another_thread_stops_it(printer: Printer) -> None:
-    live = st.live(source=f"text:{printer.name}", body=SENSORS, outputs=["total"], backend="cpu")
+    live = st.live(source=f"text:{printer.name}", text=TEXT, body=SENSORS, outputs=["total"], backend="cpu")
     seen: list[int] = []
     stopped: list[float] = []
 
@@ -110,7 +112,7 @@ def test_another_thread_stops_it(printer: Printer) -> None:
 @pytest.mark.once
 @pytest.mark.filterwarnings("ignore")
 def test_ctrl_c_ends_it_also_where_nothing_comes(printer: Printer) -> None:
-    live = st.live(source=f"text:{printer.name}", body=SENSORS, backend="cpu")
+    live = st.live(source=f"text:{printer.name}", text=TEXT, body=SENSORS, backend="cpu")
     next(live)
     printer.over.set()
     with ctrl_c():
