@@ -74,6 +74,9 @@ mod scene_file;
 #[doc(hidden)]
 pub mod setup;
 #[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod survey;
+#[cfg(feature = "cli")]
 pub mod tradeoff;
 
 pub use somatic_skin::error;
@@ -324,8 +327,8 @@ pub mod field {
     pub use somatic_skin::field::{Chart, Field, FieldSet, Member, NoChart, TaxelGraph, WORLD};
     #[doc(hidden)]
     pub use somatic_skin::field::{
-        ContactTolerance, Distortion, Lattice, Lift, RestOverlap, Unroller, geodesic, mean_normals, neighbours,
-        rest_overlaps, unions,
+        ContactTolerance, Distortion, Lift, RestOverlap, Unroller, geodesic, mean_normals, neighbours, rest_overlaps,
+        unions,
     };
 }
 

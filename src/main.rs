@@ -2,7 +2,6 @@
 
 mod cli;
 mod experiments;
-mod survey;
 
 use std::process::ExitCode;
 

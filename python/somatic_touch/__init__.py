@@ -11,14 +11,19 @@
 np.float32(360.0)
 """
 
+from ._accuracy import Calibrated, Tradeoff, calibrate, tradeoff
+from ._columns import Table
+from ._commands import bench, info, inspect, outputs, plan, plot
 from ._errors import InputError, SomaticError, UnknownNameError, UsageError
 from ._flags import Flags, TouchFlags
+from ._live import live
 from ._native import (
     Body,
     Calibration,
     Engine,
     EngineState,
     Field,
+    Live,
     Parts,
     Percepts,
     Picture,
@@ -30,6 +35,7 @@ from ._native import (
     View,
     __version__,
     author,
+    convert,
     metadata,
     open,
     read,
@@ -38,35 +44,52 @@ from ._native import (
     simulate,
     write,
 )
+from ._view import Shown, view
 
 __all__ = [
     "Body",
+    "Calibrated",
     "Calibration",
     "Engine",
     "EngineState",
     "Field",
     "Flags",
     "InputError",
+    "Live",
     "Parts",
     "Percepts",
     "Picture",
     "Recording",
     "Scene",
     "SelfContacts",
+    "Shown",
     "Simulation",
     "SomaticError",
+    "Table",
     "TouchFlags",
     "Touches",
+    "Tradeoff",
     "UnknownNameError",
     "UsageError",
     "View",
     "__version__",
     "author",
+    "bench",
+    "calibrate",
+    "convert",
+    "info",
+    "inspect",
+    "live",
     "metadata",
     "open",
+    "outputs",
+    "plan",
+    "plot",
     "read",
     "render",
     "run",
     "simulate",
+    "tradeoff",
+    "view",
     "write",
 ]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import html
+import itertools
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -99,3 +101,14 @@ def recording(read: _native.Recording) -> str:
     ]
     rows += [["lost", loss] for loss in read.losses[:_MOST_ROWS]]
     return _table(repr(read), ["", ""], rows, max(0, len(read.losses) - _MOST_ROWS))
+
+
+def rows(table: Any) -> str:
+    """The first rows of a table of columns."""
+    names = table.keys()
+
+    def cell(value: object) -> object:
+        return _number(value) if isinstance(value, float) else value
+
+    shown = [[cell(row.get(name, "")) for name in names] for row in itertools.islice(table, _MOST_ROWS)]
+    return _table(repr(table), names, shown, max(0, len(table) - _MOST_ROWS))

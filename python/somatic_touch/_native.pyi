@@ -12,6 +12,7 @@ __all__ = [
     "Engine",
     "EngineState",
     "Field",
+    "Live",
     "Parts",
     "Percepts",
     "Picture",
@@ -23,6 +24,7 @@ __all__ = [
     "View",
     "__version__",
     "author",
+    "convert",
     "metadata",
     "open",
     "read",
@@ -166,6 +168,7 @@ class Calibration:
     def quantity(self) -> Literal["Pa", "N", "count", "mixed"]: ...
     @property
     def text(self) -> str: ...
+    def save(self, path: _Path, *, force: bool = False) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __copy__(self) -> Calibration: ...
@@ -316,6 +319,8 @@ class Touches:
     def position(self) -> _Doubles: ...
     @property
     def flags(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def wrenches(self) -> npt.NDArray[np.void]: ...
     @overload
     def __getitem__(self, name: Literal["link"], /) -> list[str]: ...  # type: ignore[overload-overlap]
     @overload
@@ -445,6 +450,27 @@ class Parts:
     def __reduce__(self) -> Never: ...
 
 @final
+class Live:
+    @property
+    def body(self) -> Body: ...
+    @property
+    def taxels(self) -> list[int]: ...
+    @property
+    def fields(self) -> list[str]: ...
+    @property
+    def outputs(self) -> list[str]: ...
+    @property
+    def backend(self) -> str: ...
+    @property
+    def losses(self) -> list[str]: ...
+    def stop(self) -> None: ...
+    def __iter__(self) -> Live: ...
+    def __next__(self) -> Percepts: ...
+    def __enter__(self) -> Live: ...
+    def __exit__(self, _kind: object, _raised: object, _traceback: object, /) -> None: ...
+    def __reduce__(self) -> Never: ...
+
+@final
 class Simulation:
     @property
     def recording(self) -> Recording: ...
@@ -467,7 +493,7 @@ class View:
 def read(
     source: _Path,
     *,
-    body: Body | str | None = None,
+    body: Body | _Path | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
     rate_hz: float | None = None,
@@ -481,7 +507,7 @@ def open(
     source: _Path,
     *,
     seconds: float = 10.0,
-    body: Body | str | None = None,
+    body: Body | _Path | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
     rate_hz: float | None = None,
@@ -534,7 +560,7 @@ def run(
 ) -> _Ran: ...
 def metadata(path: _Path) -> dict[str, str]: ...
 def author(
-    shape: _Path,
+    shape: _Path | None = None,
     recipe: _Path | None = None,
     *,
     taxels: int | None = None,
@@ -545,5 +571,53 @@ def author(
     even: bool | None = None,
     hidden: Literal["drop", "keep"] | None = None,
     clear: str | None = None,
+    mirror: Literal["y"] | None = None,
+    up: Literal["y", "z"] | None = None,
+    package: dict[str, _Path] | None = None,
+    geometry: Literal["visual", "collision", "none"] | None = None,
+    urdf_skin: _Path | None = None,
+    mjcf_skin: _Path | None = None,
+    csv_skin: _Path | None = None,
+    icub: Sequence[_Path] | None = None,
     progress: bool | Callable[[float], object] | None = None,
 ) -> Body: ...
+def convert(
+    source: Recording | Body | _Path,
+    to: _Path,
+    *,
+    body: Body | _Path | None = None,
+    calibration: Calibration | None = None,
+    rate_hz: float | None = None,
+    force: bool = False,
+) -> int: ...
+def _body(body: Body | _Path) -> Body: ...
+def _tradeoff(
+    body: Body | _Path | None,
+    scene: Scene | dict[str, Any] | str | None,
+    source: Recording | _Path | None,
+    calibration: Calibration | None,
+    backend: str | None,
+    seconds: float,
+    frames: int | None,
+    within: str | None,
+    budget: str | None,
+    progress: bool | Callable[[float], object] | None,
+) -> str: ...
+def _calibrate(
+    body: Body, source: Recording | _Path | Sequence[str], asked: dict[str, Any], say: Callable[[str], object]
+) -> tuple[str, str]: ...
+def _gains(
+    body: Body,
+    source: Recording | _Path,
+    calibration: Calibration,
+    stamp_m: float | None,
+    rate_hz: float | None,
+    progress: bool | Callable[[float], object] | None,
+) -> tuple[str, str]: ...
+def _live(scene: Scene | dict[str, Any] | _Path | None, keys: dict[str, Any]) -> Live: ...
+def _info(source: str, rate_hz: float | None) -> str: ...
+def _inspect(body: Body, contact_tolerance_m: float | None) -> str: ...
+def _outputs() -> str: ...
+def _plot(
+    recordings: Sequence[Recording], to: _Path, outputs: Sequence[str], fields: Sequence[str], force: bool
+) -> None: ...

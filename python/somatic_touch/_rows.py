@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 _COMPONENTS = {"position": "xyz", "normal": "xyz", "place": "xyz", "velocity": "xyz", "direction": "xyz"} | {
+    "force": "xyz",
+    "torque": "xyz",
     "principal_axis": "xyz",
     "uv": "uv",
     "velocity_uv": "uv",

@@ -16,6 +16,7 @@ use somatic::{Body, OutputPath, bundled};
 use crate::array_body::{ArrayBody, LinkNames};
 use crate::arrays::{array, pose_frames, poses, structured};
 use crate::error::{OrRaise, unknown_name, usage};
+use crate::field::{PitchOfGrid, PyField};
 use crate::kinematics::{Positions, joints};
 use crate::same::{hash_of, same};
 use crate::stream::in_python;
@@ -62,91 +63,6 @@ impl PyBody {
             Some(bytes) if !std::path::Path::new(name).is_file() => Self::of_bytes(name, bytes.to_vec()),
             _ => Self::of_file(std::path::Path::new(name)),
         }
-    }
-}
-
-/// A field of a body: which taxels it has, and where these are in its chart.
-///
-/// >>> import somatic_touch as st
-/// >>> back = st.Body.bundled("hand").fields["hand/back"]
-/// >>> back
-/// <Field hand/back: 9 taxels on hand, chart plane>
-/// >>> back.uv.shape
-/// (9, 2)
-#[pyclass(module = "somatic_touch", name = "Field", frozen)]
-pub(crate) struct PyField {
-    name: String,
-    parent: Option<String>,
-    anchor: Option<String>,
-    chart: Option<String>,
-    distortion: Option<f64>,
-    taxels: Py<PyAny>,
-    weights: Py<PyAny>,
-    uv: Option<Py<PyAny>>,
-}
-
-#[pymethods]
-impl PyField {
-    /// Its name, such as 'hand/back'.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// The name of the field that it is a part of.
-    #[getter]
-    fn parent(&self) -> Option<&str> {
-        self.parent.as_deref()
-    }
-
-    /// The link in whose frame its positions are; None where its taxels sit on several links.
-    #[getter]
-    fn anchor(&self) -> Option<&str> {
-        self.anchor.as_deref()
-    }
-
-    /// The kind of its chart, 'plane' or 'geodesic'; None where it has none.
-    #[getter]
-    fn chart(&self) -> Option<&str> {
-        self.chart.as_deref()
-    }
-
-    /// The largest relative error of distances between neighbours in the chart.
-    #[getter]
-    fn distortion(&self) -> Option<f64> {
-        self.distortion
-    }
-
-    /// The ids of its taxels, uint32 [members], ascending.
-    #[getter]
-    fn taxels(&self, py: Python<'_>) -> Py<PyAny> {
-        self.taxels.clone_ref(py)
-    }
-
-    /// Their weights, float64 [members].
-    #[getter]
-    fn weights(&self, py: Python<'_>) -> Py<PyAny> {
-        self.weights.clone_ref(py)
-    }
-
-    /// Where they are in the chart, float64 [members, 2], in metres; None without a chart.
-    #[getter]
-    fn uv(&self, py: Python<'_>) -> Option<Py<PyAny>> {
-        self.uv.as_ref().map(|uv| uv.clone_ref(py))
-    }
-
-    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
-        self.taxels.bind(py).len()
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let (anchor, chart) = (self.anchor.as_deref().unwrap_or("several links"), self.chart.as_deref());
-        Ok(format!(
-            "<Field {}: {} taxels on {anchor}, chart {}>",
-            self.name,
-            self.__len__(py)?,
-            chart.unwrap_or("none")
-        ))
     }
 }
 
@@ -285,21 +201,7 @@ impl PyBody {
         let set = FieldSet::new(&self.inner).or_raise(py)?;
         let fields = PyDict::new(py);
         for field in &set.fields {
-            let count = field.members.len();
-            let members = || field.members.iter();
-            let chart = field.chart.as_ref().ok();
-            let uv =
-                chart.map(|_| members().flat_map(|member| member.place.truncate().to_array()).collect::<Vec<f64>>());
-            let made = PyField {
-                name: field.name.clone(),
-                parent: field.parent.map(|parent| set.fields[parent].name.clone()),
-                anchor: field.anchor.map(|anchor| self.inner.links[anchor].name.clone()),
-                chart: chart.map(|chart| format!("{:?}", chart.kind).to_lowercase()),
-                distortion: chart.map(|chart| chart.distortion),
-                taxels: array(py, members().map(|member| self.inner.taxels[member.taxel].id).collect(), &[count])?,
-                weights: array(py, members().map(|member| member.weight).collect(), &[count])?,
-                uv: uv.map(|uv| array(py, uv, &[count, 2])).transpose()?,
-            };
+            let made = PyField::of(py, &self.inner, &set, field)?;
             fields.set_item(&field.name, Bound::new(py, made)?)?;
         }
         Ok(fields)
@@ -544,11 +446,4 @@ impl PyBody {
     fn unpickled(py: Python<'_>, name: &str, bytes: Vec<u8>) -> PyResult<Self> {
         Self::of_bytes(name, bytes).or_raise(py)
     }
-}
-
-/// From one sensor to the next: in both directions, or from row to row and from column to column.
-#[derive(FromPyObject)]
-pub(crate) enum PitchOfGrid {
-    Both(f64),
-    Each(f64, f64),
 }

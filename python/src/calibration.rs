@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use somatic::Calibration;
+use somatic::{Calibration, OutputPath};
 
 use crate::body::PyBody;
 use crate::error::OrRaise;
@@ -78,6 +78,18 @@ impl PyCalibration {
     fn load(py: Python<'_>, path: PathBuf, body: &PyBody) -> PyResult<Self> {
         let text = std::fs::read_to_string(&path).map_err(|e| somatic::Error::io(&path, &e)).or_raise_of(py, &path)?;
         Self::of_text(&text, body).map_err(|e| e.at(path.display())).or_raise_of(py, &path)
+    }
+
+    /// Writes it to `path`, a TOML file; a file that exists is replaced only with `force`.
+    ///
+    /// >>> import somatic_touch as st, tempfile, pathlib
+    /// >>> path = pathlib.Path(tempfile.mkdtemp()) / "hand.toml"
+    /// >>> st.Calibration("[all]\ngain = 2", st.Body.bundled("hand")).save(path)
+    /// >>> path.read_text()
+    /// '[all]\ngain = 2'
+    #[pyo3(signature = (path, *, force = false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+        OutputPath::new(&path, force, &[]).and_then(|to| to.write(self.text.as_bytes())).or_raise_of(py, &path)
     }
 
     /// What all taxels measure: 'Pa', 'N', 'count', or 'mixed'.

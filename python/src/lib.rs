@@ -1,20 +1,28 @@
 //! The module `somatic_touch._native`: what the Python package has in Rust.
 
+mod about;
+mod accuracy;
 mod agreement;
 mod array_body;
 mod arrays;
 mod author;
 mod body;
 mod calibration;
+mod convert;
 #[cfg(feature = "gpu")]
 mod drawing;
 mod engine;
 mod error;
+mod field;
+mod given;
 mod globs;
 mod kinematics;
+mod live;
+mod opening;
 mod parts;
 mod percepts;
 mod picture;
+mod plotting;
 mod progress;
 mod recording;
 mod runner;
@@ -27,6 +35,7 @@ mod sinks;
 mod state;
 mod stream;
 mod threads;
+mod touch_parts;
 mod touches;
 mod view;
 
@@ -38,19 +47,33 @@ mod native {
     use super::*;
 
     #[pymodule_export]
+    use about::{info, inspect, outputs};
+    #[pymodule_export]
+    use accuracy::{calibrate, gains, tradeoff};
+    #[pymodule_export]
     use author::author;
     #[pymodule_export]
-    use body::{PyBody, PyField};
+    use body::PyBody;
     #[pymodule_export]
     use calibration::PyCalibration;
     #[pymodule_export]
+    use convert::convert;
+    #[pymodule_export]
     use engine::PyEngine;
+    #[pymodule_export]
+    use field::PyField;
+    #[pymodule_export]
+    use live::{PyLive, open_live};
+    #[pymodule_export]
+    use opening::body_of;
     #[pymodule_export]
     use parts::{PyParts, open};
     #[pymodule_export]
     use percepts::PyPercepts;
     #[pymodule_export]
     use picture::{PyPicture, render};
+    #[pymodule_export]
+    use plotting::plot;
     #[pymodule_export]
     use recording::{PyRecording, read};
     #[pymodule_export]

@@ -9,8 +9,9 @@ use somatic::Frame;
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, stays_here, usage};
+use crate::opening::{Keys, Opening};
 use crate::progress::Progress;
-use crate::recording::{Frames, Keys, Opening, PyRecording};
+use crate::recording::{Frames, PyRecording};
 use crate::threads::free;
 
 /// Frames that are read until Ctrl-C is heard.

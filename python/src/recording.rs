@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use somatic::recording::{BODY, CALIBRATION, Reader};
-use somatic::signal::{Pose, UnitOfP};
-use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec, VendorFormat, VendorOptions, VendorSource};
-use somatic::{Calibration, Error, Frame, RawValue, bundled};
+use somatic::signal::Pose;
+use somatic::source::Source;
+use somatic::{Frame, RawValue};
 
-use crate::arrays::{array, times, values};
+use crate::arrays::{array, poses, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, usage, warn};
+use crate::opening::{Keys, Opening};
 use crate::stream::in_python;
 use crate::threads::free;
 
@@ -218,6 +218,21 @@ impl PyRecording {
         self
     }
 
+    /// Its first frames, up to `most`.
+    pub(crate) fn first_frames(&self, py: Python<'_>, most: usize) -> PyResult<Vec<Frame>> {
+        let t_s = times(self.t.bind(py))?.as_slice()?.to_vec();
+        let shape = [t_s.len(), self.taxels.len()];
+        let held = values(self.values.bind(py), None, &shape, "[frames, taxels]", &self.taxels)?;
+        let placed = poses(self.pose.bind(py), t_s.len())?;
+        let frame = |(index, &t_s): (usize, &f64)| Frame {
+            t_s,
+            values: held.slice()[index * shape[1]..(index + 1) * shape[1]].to_vec(),
+            pose: placed.iter().map(|(link, poses)| (link.clone(), poses[index])).collect(),
+            ..Frame::default()
+        };
+        Ok(t_s.iter().enumerate().take(most).map(frame).collect())
+    }
+
     /// The calibration that holds for it on `body`: its own, with `given` laid over it.
     pub(crate) fn calibrated(
         &self,
@@ -311,148 +326,6 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
             return Ok(frames);
         }
         py.check_signals()?;
-    }
-}
-
-/// A body's name and file.
-type NamedBytes = (String, Vec<u8>);
-
-/// The body in the recording at `path`, and the text of its calibration.
-fn attached(path: &Path) -> somatic::Result<(Option<NamedBytes>, Option<String>)> {
-    let mut reader = Reader::open(path)?;
-    let body = reader.find_attached(|attached| attached.media_type == BODY)?;
-    let body = body.map(|(attached, bytes)| (attached.name, bytes));
-    let calibration = reader.find_attached(|attached| attached.name == CALIBRATION)?;
-    let text = calibration.map(|(_, bytes)| String::from_utf8(bytes)).transpose();
-    let text = text.map_err(|_| Error::failed("the attached calibration is not text").at(path.display()))?;
-    Ok((body, text.map(|text| Calibration::with_names_of_now(text).0)))
-}
-
-/// Opens the source and finds what comes with it: the source, its body, the text of its calibration.
-pub(crate) type Opened = (Box<dyn Source + Send>, Option<PyBody>, Option<String>);
-
-pub(crate) fn open(
-    spec: &SourceSpec,
-    body: Option<&PyBody>,
-    options: &VendorOptions,
-    cut: Cut,
-) -> somatic::Result<Opened> {
-    let (own, calibration) = match spec {
-        SourceSpec::Mcap(path) => attached(path)?,
-        SourceSpec::Vendor(path) => {
-            let export = VendorSource::open(path, options)?;
-            // Of another body than its own it would be refused by name.
-            let text = export.calibration().map(|text| match body {
-                None => text,
-                Some(_) => text.lines().filter(|line| !line.starts_with("body")).collect::<Vec<_>>().join("\n"),
-            });
-            (Some((export.body_name(), export.body()?)), text)
-        }
-        SourceSpec::Sim(_) => {
-            return Err(Error::usage("a simulation has a truth too; read it with `simulate`"));
-        }
-        SourceSpec::Csv(_) => (None, None),
-        _ => return Err(Error::usage("only files are read here; give live frames to `Engine.step`")),
-    };
-    // A recording's calibration is that of its body.
-    let calibration = calibration.filter(|_| body.is_none() || matches!(spec, SourceSpec::Vendor(_)));
-    let own = own.filter(|_| body.is_none()).map(|(name, bytes)| PyBody::of_bytes(&name, bytes)).transpose()?;
-    let ids = body.or(own.as_ref()).map(PyBody::ids).unwrap_or_default();
-    let (again, kept) = (spec.clone(), options.clone());
-    let open = move || again.open(&ids, &kept);
-    let source = if cut == Cut::WHOLE { open()? } else { Box::new(Replay::new(open, cut)?) };
-    Ok((source, own, calibration))
-}
-
-/// The keywords of `read` and `open`.
-pub(crate) struct Keys<'a, 'py> {
-    pub(crate) body: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) from_s: Option<f64>,
-    pub(crate) to_s: Option<f64>,
-    pub(crate) rate_hz: Option<f64>,
-    pub(crate) format: Option<&'a str>,
-    pub(crate) grid: Option<&'a str>,
-    pub(crate) pitch: Option<&'a str>,
-    pub(crate) unit: Option<&'a str>,
-    pub(crate) layout: Option<PathBuf>,
-}
-
-/// A file that is open, with what comes with it.
-pub(crate) struct Opening {
-    pub(crate) name: String,
-    pub(crate) file: PathBuf,
-    pub(crate) source: Box<dyn Source + Send>,
-    pub(crate) body: Option<Py<PyBody>>,
-    pub(crate) calibration: Option<Py<PyCalibration>>,
-}
-
-impl Opening {
-    /// These frames of it.
-    pub(crate) fn recording(&self, py: Python<'_>, frames: Frames) -> PyResult<PyRecording> {
-        let body = self.body.as_ref().map(|body| body.clone_ref(py));
-        let calibration = self.calibration.as_ref().map(|calibration| calibration.clone_ref(py));
-        frames.finish(py, self.name.clone(), &*self.source, body, calibration, false)
-    }
-
-    pub(crate) fn new(py: Python<'_>, source: &Bound<'_, PyAny>, keys: Keys<'_, '_>) -> PyResult<Self> {
-        let Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout } = keys;
-        let text = match source.extract::<String>() {
-            Ok(text) => text,
-            Err(_) => source.extract::<PathBuf>()?.display().to_string(),
-        };
-        let body = match body {
-            None => None,
-            Some(body) => Some(match body.extract::<String>() {
-                Ok(name) => Py::new(py, PyBody::bundled_or_file(&name).or_raise_of(py, Path::new(&name))?)?,
-                Err(_) => body
-                    .cast::<PyBody>()
-                    .map_err(|_| usage(py, "body should be a Body, or its file's name"))?
-                    .clone()
-                    .unbind(),
-            }),
-        };
-        let cut = Cut { from_s: from_s.unwrap_or(Cut::WHOLE.from_s), to_s: to_s.unwrap_or(Cut::WHOLE.to_s), times: 1 };
-        let made = || -> somatic::Result<(VendorOptions, SourceSpec)> {
-            let options = VendorOptions {
-                format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
-                rate_hz,
-                grid: grid.map(VendorOptions::grid_of).transpose().map_err(|e| e.at("grid"))?,
-                pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
-                unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
-                layout,
-                ..VendorOptions::default()
-            };
-            let spec = text.parse::<SourceSpec>()?.with_content(&options);
-            Ok((options, spec))
-        };
-        if text == "hand" && body.is_none() {
-            let touch = || -> somatic::Result<Box<dyn Source + Send>> {
-                Ok(Box::new(CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None)?))
-            };
-            let source =
-                if cut == Cut::WHOLE { touch() } else { Replay::new(touch, cut).map(|cut| Box::new(cut) as _) };
-            let source = source.or_raise(py)?;
-            let body = Some(Py::new(py, PyBody::bundled_or_file("hand").or_raise(py)?)?);
-            let (name, file) = ("bundled touch".to_owned(), PathBuf::new());
-            return Ok(Self { name, file, source, body, calibration: None });
-        }
-        let (options, spec) = made().or_raise(py)?;
-        let given = body.as_ref().map(Py::get);
-        let file = spec.file().unwrap_or(Path::new("")).to_owned();
-        let (source, own, calibration) = open(&spec, given, &options, cut).or_raise_of(py, &file)?;
-        let body = match (body, own) {
-            (Some(body), _) => Some(body),
-            (None, own) => own.map(|own| Py::new(py, own)).transpose()?,
-        };
-        let calibration = match (&body, calibration) {
-            (Some(body), Some(text)) => {
-                let made = PyCalibration::of_text(&text, body.get())
-                    .map_err(|e| e.at("its own calibration").at(file.display()));
-                Some(Py::new(py, made.or_raise_of(py, &file)?)?)
-            }
-            _ => None,
-        };
-        Ok(Self { name: file.display().to_string(), file, source, body, calibration })
     }
 }
 

@@ -55,7 +55,7 @@ fn toml_of(any: &Bound<'_, PyAny>, key: &str) -> PyResult<toml::Value> {
     })
 }
 
-fn table_of(dict: &Bound<'_, PyDict>) -> PyResult<toml::Table> {
+pub(crate) fn table_of(dict: &Bound<'_, PyDict>) -> PyResult<toml::Table> {
     let mut table = toml::Table::new();
     for (key, value) in dict.iter() {
         let key: String = key.extract()?;
@@ -64,6 +64,23 @@ fn table_of(dict: &Bound<'_, PyDict>) -> PyResult<toml::Table> {
         }
     }
     Ok(table)
+}
+
+/// Refuses a key that is not one of scenes, or whose value is not; the error has the key.
+pub(crate) fn check_keys(py: Python<'_>, table: &toml::Table) -> PyResult<()> {
+    for (key, value) in table {
+        if let Err(error) = alone(key, value) {
+            // The line of a text that nobody wrote says nothing.
+            let text = error.to_string();
+            let what = text.strip_prefix(error.place().unwrap_or_default()).and_then(|rest| rest.strip_prefix(": "));
+            let what = what.unwrap_or(&text);
+            return Err(match what.starts_with("there is no key") || what.starts_with(&format!("`{key}` is `")) {
+                true => usage(py, what),
+                false => usage(py, format!("{key}: {what}")),
+            });
+        }
+    }
+    Ok(())
 }
 
 impl PyScene {
@@ -80,19 +97,7 @@ impl PyScene {
 
     /// The same of keys, where an error has the key.
     fn of_table(py: Python<'_>, table: &toml::Table) -> PyResult<Self> {
-        for (key, value) in table {
-            if let Err(error) = alone(key, value) {
-                // The line of a text that nobody wrote says nothing.
-                let text = error.to_string();
-                let what =
-                    text.strip_prefix(error.place().unwrap_or_default()).and_then(|rest| rest.strip_prefix(": "));
-                let what = what.unwrap_or(&text);
-                return Err(match what.starts_with("there is no key") || what.starts_with(&format!("`{key}` is `")) {
-                    true => usage(py, what),
-                    false => usage(py, format!("{key}: {what}")),
-                });
-            }
-        }
+        check_keys(py, table)?;
         let text = toml::to_string(table).map_err(|why| usage(py, why.to_string()))?;
         Self::of_text(py, &text)
     }
@@ -116,6 +121,11 @@ impl PyScene {
         Py::new(py, made)
     }
 
+    /// Frames of a call, if it says so.
+    pub(crate) fn batch(&self) -> Option<usize> {
+        self.file.batch.map(|frames| frames as usize)
+    }
+
     /// The engine's options under `calibration`; `backend` comes before the key.
     pub(crate) fn options(
         &self,
@@ -123,7 +133,7 @@ impl PyScene {
         backend: Option<BackendKind>,
         batch: usize,
     ) -> somatic::Result<Options> {
-        let batch = self.file.batch.map_or(batch, |frames| frames as usize);
+        let batch = self.batch().unwrap_or(batch);
         let options = self.file.engine_options(calibration.cloned(), true, batch)?;
         Ok(match backend {
             Some(backend) => options.backend(backend),

@@ -182,7 +182,7 @@ pub(crate) fn simulate(
 }
 
 /// The body that `source` is on: `given`, a bundled one, or the file that the simulation at `path` names.
-fn body_of(source: &SimulatedSource, path: &Path, given: Option<&PyBody>) -> somatic::Result<PyBody> {
+pub(crate) fn body_of(source: &SimulatedSource, path: &Path, given: Option<&PyBody>) -> somatic::Result<PyBody> {
     if let Some(given) = given {
         return Ok(given.clone());
     }

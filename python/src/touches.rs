@@ -15,6 +15,7 @@ use crate::arrays::array;
 use crate::error::{stays_here, unknown_name};
 use crate::session::Run;
 use crate::stream::{Part, in_python, stream, to_arrow, to_pandas, to_polars};
+use crate::touch_parts::wrenches;
 
 /// The touches of some frames, a row each, in the order of frames: of the whole body, over fields and joints.
 ///
@@ -131,6 +132,24 @@ impl PyTouches {
     #[getter]
     fn flags(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.column(py, 1, |(_, touch), to| to.push(touch.flags.bits()))
+    }
+
+    /// What each touch does to each link that it lies on, an array of structures [parts]: `touch`, a row of this table; `link`, an index into
+    /// the body's `links`; `total`; `force` [3] and `torque` [3] about the link's origin, in its frame, in N and N m, NaN where unknown.
+    ///
+    /// Needs the output `touches.wrench` for forces; a table of pandas and polars has columns `force_x`, `torque_z` and so on.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> body = st.Body.grid(1, 5, 0.01)
+    /// >>> kilopascals = st.Calibration("[all]\nunit = 'kPa'", body)
+    /// >>> engine = st.Engine(body, {"outputs": ["touches", "touches.wrench"]}, kilopascals, backend="cpu")
+    /// >>> wrenches = engine.process([0.0], [[3, 1, 0, 0, 5]]).touches.wrenches
+    /// >>> wrenches["force"].shape, float(abs(wrenches["force"]).max().round(6))
+    /// ((2, 3), 0.5)
+    #[getter]
+    fn wrenches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let found = self.frames.clone().filter_map(|frame| self.percepts.touches(frame));
+        wrenches(py, found)
     }
 
     /// A quantity of each touch by its name, such as `touches["principal_axis"]` or `touches["fit_place"]`, float64 [touches] or

@@ -6,8 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use crate::survey::known::{KnownForce, PressedOn};
-use crate::survey::{Findings, Found, Survey, Wishes};
 use clap::Args;
 use serde_json::json;
 use somatic::scene::file::{hertz, length, seconds};
@@ -15,6 +13,8 @@ use somatic::setup::FilesRead;
 use somatic::setup::bodies::{in_body, load_body};
 use somatic::signal::{RawValue, UnitOfP};
 use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, VendorSource};
+use somatic::survey::known::{KnownForce, PressedOn};
+use somatic::survey::{Findings, Found, Survey, Wishes};
 use somatic::{Body, Calibration, Error, Result};
 
 use super::interrupt::stop_on_signal;

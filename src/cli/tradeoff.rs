@@ -12,10 +12,12 @@ use console::style;
 use somatic::scene::file::seconds;
 use somatic::setup::bodies::load_body;
 use somatic::setup::{FilesRead, Setup};
-use somatic::tradeoff::{CallMode, Errors, Measurement, Pick, Report, Store, TrueErrors, plot_png, plot_svg};
+use somatic::tradeoff::{
+    CallMode, Errors, Measurement, Pick, Report, Store, Tested, TrueErrors, plot_png, plot_svg, software, usual_frames,
+};
 use somatic::{BackendKind, Engine, Error, OutputPath, Result};
 
-use self::measured::{Tested, in_words, measure_options, missed, played, recording, software};
+use self::measured::{in_words, measure_options, missed, played, recording};
 use self::settled::driver;
 pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
@@ -41,11 +43,6 @@ with the reference. Combinations take turns, so that a machine that slows down s
 The front has those that no other combination beats: none is as true and faster. Results are kept.
 With them `somatic run` and `somatic plan` choose the backend and the options that a scene leaves
 open, on the same recording or live.";
-
-/// Frames that are measured on, unless told otherwise.
-const FRAMES: usize = 512;
-/// Values that these hold at most, about.
-const VALUES: usize = 1 << 24;
 
 /// Measure speed against accuracy on your body and machine.
 ///
@@ -118,7 +115,7 @@ fn tradeoff_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
         input.as_ref().map_or_else(|| load_body(asked.body.as_deref().unwrap_or("hand")), |input| input.body(asked))?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let options = asked.options(&body, &ids, 1)?;
-    let most = arguments.frames.map_or_else(|| FRAMES.min(VALUES / ids.len().max(1)).max(8), |frames| frames as usize);
+    let most = arguments.frames.map_or_else(|| usual_frames(ids.len()), |frames| frames as usize);
     let played = input.as_ref().map(|input| played(input, asked, &body, most)).transpose()?;
     let tested = Tested::new(&body, &options, played, most)?;
     let measure_options = measure_options(asked, &options, arguments.seconds)?;

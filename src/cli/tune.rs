@@ -7,12 +7,12 @@ use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use clap::Args;
 use somatic::scene::file::seconds;
 use somatic::setup::FilesRead;
 use somatic::setup::bodies::load_body;
 use somatic::signal::{FsrCircuit, Wiring};
+use somatic::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use somatic::{Error, Result};
 
 use self::session::{PhaseEnd, PhaseLimit, TuningSession};

@@ -5,9 +5,9 @@
 
 use std::fmt;
 
-use somatic::field::{FieldSet, Lattice};
-use somatic::signal::RawValue;
-use somatic::{Body, Result};
+use crate::field::{FieldSet, Lattice};
+use crate::signal::RawValue;
+use crate::{Body, Result};
 
 /// Presses of this many dead bands tell of leaks.
 const MIN_PRESS_BANDS: f64 = 10.0;

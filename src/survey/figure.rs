@@ -1,8 +1,8 @@
 //! A survey's findings as a picture: where every sensor rests, and how far it goes.
 
 use super::{Findings, Found};
-use somatic::error::Result;
-use somatic::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel};
+use crate::error::Result;
+use crate::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel};
 
 const TRAVEL: Colour = [120, 170, 220];
 const DEAD: Colour = [225, 150, 60];
@@ -89,7 +89,7 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use somatic::signal::UnitOfP;
+    use crate::signal::UnitOfP;
 
     #[test]
     fn ticks_are_round_and_within() {

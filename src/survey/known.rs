@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use somatic::error::{Error, Result};
-use somatic::signal::{Quantity, UnitOfP};
+use crate::error::{Error, Result};
+use crate::signal::{Quantity, UnitOfP};
 
 /// A force in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,13 +13,14 @@ mod at_rest;
 pub mod crosstalk;
 mod figure;
 mod file;
+pub mod gains;
 pub mod known;
 pub mod tuning;
 mod which_way;
 
-use somatic::Body;
-use somatic::error::{Error, Result};
-use somatic::signal::{RawValue, UnitOfP};
+use crate::Body;
+use crate::error::{Error, Result};
+use crate::signal::{RawValue, UnitOfP};
 
 use self::at_rest::{chance_of, median, middle, movement_of, rest_of, sigma_of};
 use self::crosstalk::{Crosstalk, Leaks};
@@ -158,7 +159,7 @@ impl Survey {
     /// Looks also for crosstalk along the rows and columns of the sensors of `body`.
     ///
     /// # Errors
-    /// As [`somatic::FieldSet::new`].
+    /// As [`crate::FieldSet::new`].
     pub fn on(self, body: &Body) -> Result<Self> {
         Ok(Self { leaks: Leaks::new(body, &self.ids)?, ..self })
     }
@@ -550,7 +551,7 @@ mod tests {
         let found = twelve(12).finish(Wishes::default()).unwrap();
         assert_eq!(found.raw_range, Some([0.0, 1023.0]));
         let ids: Vec<u32> = (0..12).collect();
-        let read = somatic::Calibration::parse(&found.calibration("a"), &ids).unwrap();
+        let read = crate::Calibration::parse(&found.calibration("a"), &ids).unwrap();
         assert_eq!((read.taxels[5].baseline, read.taxels[5].p_max, read.taxels[5].gain), (600.0, 422.5, 1.0));
         let why = twelve(12).finish(Wishes { bits: Some(8), ..Wishes::default() }).unwrap_err();
         assert!(

@@ -10,8 +10,8 @@
 
 use super::at_rest::rest_of;
 use super::{MIN_TRAVEL_BANDS, Pressed, Survey, Wishes};
-use somatic::error::Result;
-use somatic::signal::{FsrCircuit, RawValue};
+use crate::error::Result;
+use crate::signal::{FsrCircuit, RawValue};
 
 /// Share of the range that a firm press leaves unused.
 pub const HEADROOM: f64 = 1.0 / 16.0;

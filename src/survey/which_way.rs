@@ -1,6 +1,6 @@
 //! Which way sensors go when they are pressed, and where their range ends.
 
-use somatic::error::{Error, Result};
+use crate::error::{Error, Result};
 
 use super::{AtRest, Survey, several};
 

@@ -12,6 +12,7 @@ mod measure;
 mod plot;
 mod store;
 mod target;
+mod tested;
 mod touches;
 mod truth;
 
@@ -27,6 +28,8 @@ pub use plot::{plot_png, plot_svg};
 #[doc(hidden)]
 pub use store::{Found, Store, Stored, day};
 pub use target::Pick;
+#[doc(hidden)]
+pub use tested::{Tested, software, usual_frames};
 pub use touches::SimulatedTouches;
 
 use crate::backend::BackendKind;

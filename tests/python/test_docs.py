@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import os
 import re
 import subprocess
 import sys
 
 import pytest
 from conftest import ROOT, without_gpu
+from test_accuracy import session
+from test_live import boards
 
 import somatic_touch as st
 
@@ -74,3 +77,37 @@ def test_a_page_shows_code_that_runs(page: str, tmp_path, monkeypatch) -> None:
     first = (ROOT / "python" / "examples" / "first_touch.py").read_text()
     if page == "README.md":
         assert blocks[0].strip() in first
+
+
+TASKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "how-to" / "python-tasks.md").read_text(), re.DOTALL)
+
+
+@pytest.mark.once
+def test_there_are_twelve_tasks_of_at_most_ten_lines() -> None:
+    assert len(TASKS) == 12
+    assert all(len([line for line in task.splitlines() if line]) <= 10 for task in TASKS)
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("task", TASKS, ids=range(1, len(TASKS) + 1))
+def test_a_task_is_done_by_its_program(task: str, somatic, command, tmp_path) -> None:
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    if "survey.csv" in task:
+        session(tmp_path / "survey.csv", st.Body.bundled("hand").taxels["id"], at_once=True)
+    if "ros2-mcap:bag" in task:
+        somatic("run", "--quiet", "--sink", f"ros2-mcap:{tmp_path / 'bag'}", "--outputs", "total")
+    before = set(tmp_path.iterdir())
+    environment = {**os.environ, "BROWSER": "true", "MPLBACKEND": "Agg"}
+
+    def run(program: str) -> None:
+        done = subprocess.run(
+            [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout or set(tmp_path.iterdir()) - before
+
+    if "/dev/ttyUSB0" in task and "live" in task:
+        with boards(command, tmp_path) as port:
+            run(task.replace("serial:/dev/ttyUSB0", port))
+    else:
+        run(task)

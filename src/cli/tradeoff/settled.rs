@@ -3,10 +3,10 @@
 use somatic::scene::{Coverage, OrientationBy};
 use somatic::setup::Input;
 use somatic::setup::Setup;
-use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, day};
+use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, Tested, day, software};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::measured::{Tested, in_words, made_up, measure_options, missed, played, software};
+use super::measured::{in_words, made_up, measure_options, missed, played};
 use crate::cli::stdio::say;
 
 /// Seconds of a brief measurement, and its frames.

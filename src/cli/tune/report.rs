@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::survey::tuning::{Tuned, Tuning};
 use serde_json::{Value, json};
 use somatic::signal::{FsrCircuit, Wiring};
+use somatic::survey::tuning::{Tuned, Tuning};
 use somatic::{Error, Result};
 
 use super::session::TunedChannel;

@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use crate::survey::tuning::Tuning;
 use console::Term;
 use somatic::signal::Wiring;
 use somatic::source::{BoardState, Lines, SerialSource};
+use somatic::survey::tuning::Tuning;
 use somatic::{Error, Frame, Result};
 
 use crate::cli::stdio::{for_terminal, say};

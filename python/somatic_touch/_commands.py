@@ -1,0 +1,147 @@
+"""The command's other subcommands: `info`, `inspect`, `outputs`, `plan`, `bench` and `plot`."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Sequence
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from . import _native
+from ._columns import Table
+
+_Path: TypeAlias = str | os.PathLike[str]
+_Backend: TypeAlias = Literal["auto", "reference", "cpu", "gpu"]
+_Asked: TypeAlias = _native.Scene | dict[str, Any] | str | None
+
+
+def _of(body: _native.Body | _Path) -> _native.Body:
+    return body if isinstance(body, _native.Body) else _native._body(body)
+
+
+def info(source: _Path, *, rate_hz: float | None = None) -> dict[str, Any]:
+    """What is in the recording at `source`, as `somatic info` tells it, but for contacts.
+
+    Of a recording `kind`, `bytes`, `taxels`, `frames`, `start` and `duration` in seconds, `rate_hz`, `gaps`, `longest_gap`, `backwards`, `losses`; of an MCAP
+    `topics` and `attached` too, of an export `unit` and `panels`; of a ROS 2 bag its `topics`.
+
+    >>> import pathlib, tempfile
+    >>> import somatic_touch as st
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "touch.mcap"
+    >>> _ = st.convert(st.read("hand"), path)
+    >>> known = st.info(path)
+    >>> known["kind"], known["frames"], known["duration"], [file["name"] for file in known["attached"]]
+    ('MCAP', 280, 5.58, ['hand'])
+    """
+    known: dict[str, Any] = json.loads(_native._info(os.fspath(source), rate_hz))
+    return known
+
+
+def inspect(body: _native.Body | _Path, *, contact_tolerance_m: float | None = None) -> dict[str, Any]:
+    """What `body` holds, and what is odd about it, as `somatic inspect` tells it: `links`, `fields`, `skin`, `holes`, `islands` and `findings`.
+
+    Areas are in m²; `covered` is how much of them is near a taxel. `near_at_rest` counts pairs of links whose taxels are closer at rest than
+    `contact_tolerance_m`.
+
+    >>> import somatic_touch as st
+    >>> seen = st.inspect("hand")
+    >>> seen["taxels"], len(seen["fields"]), seen["islands"]
+    (40, 13, 5)
+    """
+    seen: dict[str, Any] = json.loads(_native._inspect(_of(body), contact_tolerance_m))
+    return seen
+
+
+def outputs() -> Table:
+    """The quantities that can be asked for, a row each: `name`, `unit`, `components` (0 of a list), `default` and `what`.
+
+    >>> import somatic_touch as st
+    >>> {row["name"]: row["unit"] for row in st.outputs()}["force"]
+    'N'
+    """
+    return Table(json.loads(_native._outputs()))
+
+
+def plan(
+    body: _native.Body | _Path = "hand",
+    scene: _Asked = None,
+    calibration: _native.Calibration | None = None,
+    backend: _Backend | None = None,
+) -> dict[str, Any]:
+    """What `scene` computes on `body`, over how much, and what is left out and why: `Engine.plan` without frames.
+
+    >>> import somatic_touch as st
+    >>> [stage["stage"] for stage in st.plan("hand", {"outputs": ["centroid"]}, backend="cpu")["stages"] if stage["runs"]]
+    ['calibrate', 'contact', 'centroid']
+    """
+    return _native.Engine(_of(body), scene, calibration, backend).plan()
+
+
+def bench(
+    body: _native.Body | _Path = "hand",
+    scene: _Asked = None,
+    calibration: _native.Calibration | None = None,
+    backend: _Backend | None = None,
+    *,
+    frames: int = 1,
+    seconds: float = 1.0,
+) -> dict[str, Any]:
+    """How long a call takes on this machine, from frames in memory to percepts in memory, with every taxel pressed.
+
+    `frames` is how many a call has: 1 as on a robot, more as in a recording. Gives `backend`, `calls`, `us_median` and `us_p99` of a call, and
+    `rate`, memberships (a sensor in a field in a frame) per second. `somatic bench` measures made-up skins; this measures yours, from Python.
+
+    >>> import somatic_touch as st
+    >>> told = st.bench("hand", {"outputs": ["total"]}, backend="cpu", seconds=0.05)
+    >>> told["backend"], told["calls"] > 2, told["us_median"] <= told["us_p99"]
+    ('cpu', True, True)
+    """
+    body = _of(body)
+    engine = _native.Engine(body, scene, calibration, backend, batch=frames)
+    fields = body.fields
+    members = sum(len(fields[name]) for name in engine.fields if name in fields)
+    values = np.random.default_rng(1).uniform(1, 1000, (frames, len(body.taxels))).astype(np.float32)
+    times = np.arange(frames) * 0.01
+    took: list[float] = []
+    start = time.perf_counter()
+    while len(took) < 4 or time.perf_counter() - start < seconds:
+        times += frames * 0.01
+        began = time.perf_counter()
+        engine.process(times, values)
+        took.append(time.perf_counter() - began)
+    # The first one fetches memory.
+    us = 1e6 * np.array(took[1:])
+    median = float(np.median(us))
+    rate = 1e6 * members * frames / median
+    return {"backend": engine.backend, "calls": len(us), "us_median": median, "us_p99": float(np.quantile(us, 0.99)), "rate": rate}
+
+
+def plot(
+    recordings: _native.Recording | _Path | Sequence[_native.Recording | _Path],
+    path: _Path,
+    *,
+    outputs: Sequence[str] = (),
+    fields: str | Sequence[str] = (),
+    force: bool = False,
+) -> None:
+    """Draws recordings side by side into `path`, a .svg or .png, as `somatic plot` does: quantities over time, and the highest pressures.
+
+    `outputs` are drawn over time in the place of load and area; `fields` are globs. `Percepts.plot` draws on matplotlib's axes.
+
+    >>> import pathlib, tempfile
+    >>> import somatic_touch as st
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "touch.svg"
+    >>> st.plot("hand", path, outputs=["total"])
+    >>> path.read_text()[:4]
+    '<svg'
+    """
+    several = [recordings] if isinstance(recordings, str | os.PathLike | _native.Recording) else recordings
+    read = [one if isinstance(one, _native.Recording) else _native.read(one) for one in several]
+    _native._plot(read, path, list(outputs), [fields] if isinstance(fields, str) else list(fields), force)
+
+
+for _public in (info, inspect, outputs, plan, bench, plot):
+    _public.__module__ = "somatic_touch"

@@ -1,0 +1,152 @@
+"""What the command can, Python can."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+import re
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+import somatic_touch as st
+
+ALONE = {"completions", "devices", "board", "tune", "paper", "help"}
+"""What is for a terminal, or for boards' own settings."""
+
+
+@pytest.mark.once
+def test_all_that_the_command_lists_is_callable(somatic) -> None:
+    listed = set(re.findall(r"^  ([a-z]+)  +\S", somatic("--help"), re.MULTILINE))
+    assert len(listed) > 15 and listed >= ALONE, listed
+    callables = {name for name in st.__all__ if callable(getattr(st, name))}
+    assert listed - ALONE - callables == set()
+
+
+@pytest.mark.once
+def test_info_is_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    assert st.convert(touch, tmp_path / "touch.mcap") == 280
+    with pytest.warns(UserWarning, match="no place for a body"):
+        assert st.convert(tmp_path / "touch.mcap", tmp_path / "touch.csv") == 280
+    for name in ("touch.mcap", "touch.csv"):
+        told = json.loads(somatic("info", tmp_path / name, "--json"))
+        known = st.info(tmp_path / name)
+        for key in ("kind", "bytes", "taxels", "frames", "start", "duration", "rate_hz", "gaps", "backwards", "losses"):
+            assert known[key] == pytest.approx(told[key]), key
+    assert known["frames"] == 280
+    with pytest.raises(st.InputError, match="no-such"):
+        st.info("no-such.csv")
+
+
+@pytest.mark.once
+def test_frames_come_through_bit_for_bit(touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    st.convert(touch, tmp_path / "touch.mcap", calibration=st.Calibration("[all]\ngain = 2", touch.body))
+    again = st.read(tmp_path / "touch.mcap")
+    assert again.values.tobytes() == touch.values.tobytes() and again.calibration.text == "[all]\ngain = 2"
+    with pytest.raises(st.SomaticError, match="exists"):
+        st.convert(touch, tmp_path / "touch.mcap")
+    with pytest.warns(UserWarning, match="no place for fields"):
+        assert st.convert("hand", tmp_path / "skin.csv") == 40
+    assert len(st.author(csv_skin=tmp_path / "skin.csv").taxels) == 40
+    with pytest.raises(st.UsageError, match="becomes a .csv or a .urdf"):
+        st.convert(touch.body, tmp_path / "skin.mcap")
+
+
+@pytest.mark.once
+def test_bodies_and_quantities_are_the_commands(somatic) -> None:
+    told, seen = json.loads(somatic("inspect", "hand", "--json")), st.inspect("hand")
+    assert [field["name"] for field in told["fields"]] == [field["name"] for field in seen["fields"]]
+    assert seen["taxels"] == 40 and sum(link["taxels"] for link in seen["links"]) == 40 and 0 < seen["skin"]["covered"] < seen["skin"]["area"]
+    listed = json.loads(somatic("outputs", "--json"))
+    assert [row["name"] for row in listed["touches"] + listed["fields"]] == st.outputs()["name"].tolist()
+    assert [row["unit"] for row in listed["touches"] + listed["fields"]] == st.outputs()["unit"].tolist()
+    assert [row["default"] for row in listed["touches"] + listed["fields"]] == st.outputs()["default"].tolist()
+
+
+@pytest.mark.once
+def test_plots_are_drawn(touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    st.plot([touch, "hand"], tmp_path / "two.png", fields="hand/palm*")
+    assert (tmp_path / "two.png").read_bytes()[:4] == b"\x89PNG"
+    for wrong in (tmp_path / "two.png", tmp_path / "two.pdf"):
+        with pytest.raises(st.SomaticError):
+            st.plot(touch, wrong)
+    with pytest.raises(st.UsageError, match="did you mean `total`"):
+        st.plot(touch, tmp_path / "a.svg", outputs=["totl"])
+
+
+@pytest.mark.once
+def test_a_view_plays_a_recording_and_returns_at_once(touch: st.Recording) -> None:
+    with st.view(touch, {"outputs": ["total"]}, speed=100, listen="127.0.0.1:0", open=False) as shown:
+        assert shown.url.startswith("http://127.0.0.1:") and shown.viewers == 0
+        assert shown.wait(20)
+    assert repr(shown) == "<Shown, closed>"
+    with st.view("hand", speed=1e-3, listen="127.0.0.1:0", open=False) as shown:
+        assert not shown.wait(0.1)
+    assert shown.wait(5), "it ends with its page"
+    with pytest.raises(st.UsageError, match="positive"):
+        st.view("hand", speed=0)
+
+
+@pytest.mark.once
+def test_a_bag_of_percepts_is_refused(touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    p = touch.engine({"outputs": ["total"]}, backend="cpu").process(touch.t, touch.values)
+    with pytest.raises(st.UsageError, match="has frames too, and percepts alone are written") as raised:
+        st.write(p, f"ros2-mcap:{tmp_path / 'bag'}")
+    assert "\n" not in str(raised.value) and not (tmp_path / "bag").exists()
+
+
+@pytest.mark.once
+def test_bags_are_read(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    somatic("run", "--quiet", "--sink", f"ros2-mcap:{tmp_path / 'bag'}", "--outputs", "total")
+    known = st.info(f"ros2-mcap:{tmp_path / 'bag'}")
+    assert known["topics"] and known["kind"] == "bag of ROS 2"
+    again = st.read(f"ros2-mcap:{tmp_path / 'bag'}", body="hand")
+    assert len(again) == 280
+    order = [again.taxels.index(id) for id in touch.taxels]
+    np.testing.assert_array_equal(again.values[:, order], touch.values)
+    with pytest.raises(st.SomaticError, match="body="):
+        st.read(f"ros2-mcap:{tmp_path / 'bag'}")
+
+
+MODEL = """<mujoco model="pad">
+  <asset><mesh name="plate" builtin="plate" params="5 7" scale="0.02 0.03 0.01"/></asset>
+  <worldbody><body name="palm">
+    <geom type="box" size="0.02 0.03 0.01" mass="0.1"/>
+    <geom name="palm skin" type="mesh" mesh="plate" mass="0" contype="0" conaffinity="0"/>
+  </body></worldbody>
+  <sensor><tactile name="palm" geom="palm skin" mesh="plate"/></sensor>
+</mujoco>
+"""
+
+
+@pytest.mark.once
+def test_skins_that_come_with_their_places(tmp_path: pathlib.Path) -> None:
+    robot = ROOT / "examples" / "robots" / "arm.urdf"
+    bare = st.author(robot)
+    assert len(bare.taxels) == 0 and bare.name == "arm.glb" and len(bare.links) > 2
+    body = st.author(robot, taxels=60, up="z", clear="2 mm")
+    assert len(body.taxels) > 0 and set(body.joints) == set(bare.joints)
+    with pytest.warns(UserWarning):
+        st.convert(body, tmp_path / "skin.urdf")
+    skin = st.author(urdf_skin=tmp_path / "skin.urdf", geometry="none")
+    assert skin.taxels["id"].tolist() == body.taxels["id"].tolist()
+    mirrored = st.author("humanoid", taxels=100, seed=1, mirror="y").taxels["place"]
+    assert np.allclose(np.sort(mirrored[:, 1]), np.sort(-mirrored[:, 1]), atol=1e-3)
+    (tmp_path / "pad.xml").write_text(MODEL)
+    model = st.author(mjcf_skin=tmp_path / "pad.xml")
+    assert len(model.taxels) > 0 and model.links == ["palm"] and model.name == "pad.glb"
+    # A layout that is there is brought up to date.
+    body.save(tmp_path / "edited.glb")
+    assert st.author(tmp_path / "edited.glb").taxels["id"].tolist() == body.taxels["id"].tolist()
+    for keys, what in [
+        ({"shape": "hand", "urdf_skin": "a.urdf"}, "give one shape"),
+        ({}, "give one shape"),
+        ({"csv_skin": "a.csv", "taxels": 3}, "taxels: this skin has its places"),
+        ({"shape": "hand", "taxels": 3, "up": "z"}, "up: it is for"),
+        ({"shape": "hand", "taxels": 3, "mirror": "x"}, "mirror: there is no 'x'"),
+        ({"shape": "hand", "mirror": "y"}, "mirror: it is for taxels"),
+        ({"shape": robot, "geometry": "thick"}, "geometry: there is no 'thick'"),
+    ]:
+        with pytest.raises(st.UsageError, match=what):
+            st.author(**keys)  # type: ignore[arg-type]
