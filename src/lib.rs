@@ -235,8 +235,8 @@ pub mod page {
     pub(crate) use somatic_page::*;
     #[doc(hidden)]
     pub use somatic_page::{
-        EventKind, History, Mode, PageInfo, PageInput, PageScene, Publisher, RecordingEvents, Replies, Request, Series,
-        ViewerId,
+        EventKind, History, Mode, PageInfo, PageInput, PageScene, PeakMap, Publisher, RecordingEvents, Replies,
+        Request, Series, ViewerId,
     };
     #[doc(inline)]
     pub use somatic_page::{Listen, Server};

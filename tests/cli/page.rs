@@ -87,7 +87,7 @@ impl Run {
 
     pub(super) fn viewer(&self) -> Viewer {
         let mut socket = self.own_socket();
-        say(&mut socket, &json!({"type": "hello", "version": 3, "token": self.token, "after_event": null}));
+        say(&mut socket, &json!({"type": "hello", "version": 4, "token": self.token, "after_event": null}));
         Viewer { socket, texts: Vec::new() }
     }
 
@@ -194,7 +194,7 @@ fn a_page_gets_the_scene_and_then_every_frame_that_it_draws() {
         touches += u32_at(&frame, 40);
         samples += u32_at(&frame, 44);
         // Six bytes a taxel, and what is in contact and plotted; of a touch its values, taxels, shares and trail.
-        let of_touch = 112 + 4 * taxels + 8 * (links + 13) + 20 * 34;
+        let of_touch = 132 + 4 * taxels + 8 * (links + 13) + 20 * 34;
         let most = 64 + 6 * taxels + 56 * u32_at(&frame, 36) as usize + of_touch * u32_at(&frame, 40) as usize;
         assert!(frame.len() <= most + 24 * u32_at(&frame, 44) as usize + 32, "{}", frame.len());
         if last > 20 && contacts > 0 && samples > 0 && viewer.text("events").is_some() {

@@ -108,7 +108,7 @@ fn a_percept_is_explained_and_its_history_told() {
     // Before the seek: waiting for a text passes over frames.
     text(&mut viewer, "status", |status| status["playing"] == false);
     say(&mut viewer.socket, &json!({"type": "seek", "t_s": 2.9}));
-    frame(&mut viewer, 145);
+    let shown = frame(&mut viewer, 145);
     say(&mut viewer.socket, &json!({"type": "explain", "field": field}));
     let why = text(&mut viewer, "explain", |_| true);
     assert_eq!((&why["frame"], &why["backend"], &why["t_s"]), (&145.into(), &"cpu".into(), &2.9.into()));
@@ -135,6 +135,30 @@ fn a_percept_is_explained_and_its_history_told() {
     let of_back = totals.filter(|percept| percept["field"] == "hand/back");
     let largest = of_back.map(|percept| percept["total"].as_f64().unwrap()).fold(0.0, f64::max);
     assert_eq!(most, largest as f32, "no peak is lost");
+
+    // By its number, whatever is shown.
+    for number in [150, 145] {
+        say(&mut viewer.socket, &json!({"type": "show", "frame": number}));
+        frame(&mut viewer, number);
+    }
+    // Of one moment they are its pressures, and of all the highest.
+    let mut peaks = |from_s: f64, to_s: f64| {
+        say(&mut viewer.socket, &json!({"type": "peaks", "id": 5, "from_s": from_s, "to_s": to_s}));
+        let bytes = loop {
+            let bytes = viewer.binary();
+            if bytes[0] == 4 {
+                break bytes;
+            }
+        };
+        assert_eq!(u32_at(&bytes, 4), 5);
+        (24..bytes.len()).step_by(4).map(|at| f32_at(&bytes, at)).collect::<Vec<f32>>()
+    };
+    let now = peaks(2.9, 2.9);
+    let pressures: Vec<f32> = (0..now.len()).map(|taxel| f32_at(&shown, 64 + 4 * taxel)).collect();
+    assert!(now == pressures && pressures.iter().any(|&pressure| pressure > 0.0), "{now:?} {pressures:?}");
+    let highest = run.iter().flat_map(|frame| frame["fields"].as_array().unwrap().clone());
+    let highest = highest.filter_map(|percept| percept["peak"].as_f64()).fold(0.0, f64::max);
+    assert_eq!(peaks(-1.0, 99.0).into_iter().fold(0.0, f32::max), highest as f32);
     assert_eq!(view.interrupt(), Some(0));
 }
 

@@ -279,7 +279,7 @@ pub(super) fn web_socket() -> Vec<u8> {
     };
     frame(
         1,
-        json!({"type": "hello", "version": 3, "token": "0123456789abcdef0123456789abcdef", "after_event": null})
+        json!({"type": "hello", "version": 4, "token": "0123456789abcdef0123456789abcdef", "after_event": null})
             .to_string()
             .as_bytes(),
     );

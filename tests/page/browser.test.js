@@ -216,7 +216,7 @@ test("a page of another origin gets nothing", async () => {
       new Promise((done) => {
         const socket = new WebSocket(`ws://127.0.0.1:${port}/socket`);
         socket.onopen = () =>
-          socket.send(JSON.stringify({ type: "hello", version: 3, token, after_event: null }));
+          socket.send(JSON.stringify({ type: "hello", version: 4, token, after_event: null }));
         socket.onmessage = () => done("a message");
         socket.onclose = () => done("nothing");
       }),

@@ -2,7 +2,13 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { decodeFrame, decodeHistory, decodeMesh, kindOf } from "../../crates/page/src/web/wire.js";
+import {
+  decodeFrame,
+  decodeHistory,
+  decodeMesh,
+  decodePeaks,
+  kindOf,
+} from "../../crates/page/src/web/wire.js";
 
 const here = (name) => new URL(name, import.meta.url);
 const bytes = readFileSync(here("messages.bin"));
@@ -31,7 +37,9 @@ for (const { name, binary, offset, length, values } of entries)
     const message = bytes.subarray(offset, offset + length);
     if (!binary) return assert.deepEqual(JSON.parse(message.toString("utf8")), values);
     const buffer = Uint8Array.from(message).buffer;
-    const decode = [null, decodeMesh, (of) => decodeFrame(of, scene), decodeHistory][kindOf(buffer)];
+    const decode = [null, decodeMesh, (of) => decodeFrame(of, scene), decodeHistory, decodePeaks][
+      kindOf(buffer)
+    ];
     assert.deepEqual(plain(decode(buffer)), values);
   });
 

@@ -158,6 +158,8 @@ const touch = (id, more = {}) => ({
   axis: [NaN, NaN, NaN],
   spread: [NaN, NaN],
   velocity: [NaN, NaN, NaN],
+  place: [NaN, NaN, NaN],
+  placeSigma: [NaN, NaN],
   taxels: new Uint32Array(0),
   links: [],
   fields: [],
@@ -195,7 +197,11 @@ test("a touch is marked where its link is, and its trail where that was", () => 
   same(marked.trail[0].point, [0, 5, 0.25]);
   assert.deepEqual(marked.trail[1], { ago: 0.25, point: [7, 8, 9] });
   const plain = touchInWorld(model, touch(4));
-  assert.deepEqual([plain.halfAxes, plain.motion, plain.trail], [null, null, []]);
+  assert.deepEqual([plain.halfAxes, plain.motion, plain.trail.length], [null, null, 1]);
+  // Its mark stands where it is known best, and its trail ends at its position.
+  const placed = touchInWorld(model, touch(5, { frame: 1, position: [0, 1, 0], place: [0, 2, 0] }));
+  same(placed.point, toWorld(model.rows, 1, [0, 2, 0], 1));
+  same(placed.trail[0].point, toWorld(model.rows, 1, [0, 1, 0], 1));
 });
 
 test("a touch keeps its colour until it ends, and names its load and flags", () => {

@@ -10,6 +10,7 @@ import { Picker } from "../../crates/page/src/web/pick.js";
 import { byPixel } from "../../crates/page/src/web/plot.js";
 import { Span } from "../../crates/page/src/web/span.js";
 import { TouchPast } from "../../crates/page/src/web/touch_plot.js";
+import { webmOf } from "../../crates/page/src/web/webm.js";
 
 const near = (a, b, bound = 1e-9) => assert.ok(Math.abs(a - b) <= bound, `${a} is not near ${b}`);
 
@@ -279,4 +280,61 @@ test("a distance is in millimetres, and a point of the surface is under the poin
   near(picker.pointAt(hit.corners, hit.weights)[0], 2.25, 1e-6);
   camera.eye = [5, 5, 3];
   assert.equal(picker.surfaceAt(0, 0), null);
+});
+
+/** The elements of a WebM file, each with its id, where it begins and its content. */
+function elementsOf(bytes, from = 0, to = bytes.length) {
+  const found = [];
+  for (let at = from; at < to;) {
+    const begin = at;
+    const length = Math.clz32(bytes[at]) - 23;
+    const id = bytes.slice(at, at + length).reduce((sum, byte) => 256 * sum + byte, 0);
+    at += length;
+    assert.equal(bytes[at], 1, "a size in eight bytes");
+    const size = bytes.slice(at + 1, at + 8).reduce((sum, byte) => 256 * sum + byte, 0);
+    at += 8;
+    found.push({ id, begin, from: at, content: bytes.slice(at, at + size) });
+    at += size;
+  }
+  return found;
+}
+
+test("a video has its pictures at their times, and says where each part of it begins", async () => {
+  const pictures = [0, 40, 80, 35000, 80000].map((at, i) => ({
+    data: Uint8Array.from([i, 7]),
+    at,
+    isKey: i === 0 || i === 2,
+  }));
+  const about = { codec: "V_VP8", width: 640, height: 480, length: 80033 };
+  const bytes = new Uint8Array(await new Blob(webmOf(pictures, about)).arrayBuffer());
+  const [head, segment, ...more] = elementsOf(bytes);
+  assert.deepEqual([head.id, segment.id, more.length], [0x1a45dfa3, 0x18538067, 0]);
+  const parts = elementsOf(bytes, segment.from, bytes.length);
+  const cluster = 0x1f43b675;
+  assert.deepEqual(
+    parts.map(({ id }) => id),
+    [0x1549a966, 0x1654ae6b, cluster, cluster, cluster, cluster, 0x1c53bb6b],
+  );
+  const number = (content) => content.reduce((sum, byte) => 256 * sum + byte, 0);
+  const clusters = parts.filter(({ id }) => id === cluster);
+  const shown = clusters.flatMap(({ content }) => {
+    const [time, ...blocks] = elementsOf(content);
+    return blocks.map(({ content: block }) => [
+      number(time.content) + ((block[1] << 8) | block[2]),
+      block[3] === 0x80,
+      block[4],
+    ]);
+  });
+  assert.deepEqual(
+    shown,
+    pictures.map(({ at, isKey, data }) => [at, isKey, data[0]]),
+  );
+  const cues = elementsOf(parts.at(-1).content).map(({ content }) => {
+    const [time, places] = elementsOf(content);
+    return [number(time.content), number(elementsOf(places.content)[1].content)];
+  });
+  assert.deepEqual(
+    cues,
+    clusters.map(({ begin }, i) => [[0, 80, 35000, 80000][i], begin - segment.from]),
+  );
 });

@@ -3,7 +3,19 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
-import { folder, open, picture, seek, serve, taxelIds, view, writeRecording } from "./program.js";
+import {
+  bare,
+  browser,
+  coloursAt,
+  folder,
+  open,
+  picture,
+  seek,
+  serve,
+  taxelIds,
+  view,
+  writeRecording,
+} from "./program.js";
 
 const paused = async (page) => {
   await page.keyboard.press(" ");
@@ -169,6 +181,8 @@ test("plots are saved with each value and its time, and touches are plotted", as
     assert.equal(Number(total), value(n), `row ${n}`);
   });
   assert.match(await page.locator("#hint").innerText(), /101 times/);
+  // Touches are plotted as far as they were seen: on a busy machine that is little of what was played.
+  for (const t of [1, 1.5, 2, 2.5, 3]) await seek(page, t);
   await page.click("#touch-plot-button");
   assert.match(await page.locator("#touch-plot").innerText(), /^#\d+/);
   const inked = await page.evaluate(() => {
@@ -266,6 +280,130 @@ test("a live view pauses while frames go on arriving, and then shows the newest"
   assert.equal(await page.getAttribute("#looks [data-toggle=ids]", "aria-pressed"), "true");
   assert.deepEqual(problems, []);
   clearInterval(feeding);
+  await page.close();
+  await server.stop();
+});
+
+/** Pictures of a video at some times: its length and size, and of each picture the colour of a place. */
+async function watch(bytes, times, [x, y]) {
+  const page = await browser.newPage();
+  const seen = await page.evaluate(
+    async ([bytes, times, x, y]) => {
+      const video = document.createElement("video");
+      const data = Uint8Array.from(atob(bytes), (letter) => letter.charCodeAt(0));
+      const event = (name) =>
+        new Promise((then, failed) => {
+          video.addEventListener(name, then, { once: true });
+          video.addEventListener("error", () => failed(new Error(video.error.message)), { once: true });
+        });
+      const loaded = event("loadeddata");
+      video.src = URL.createObjectURL(new Blob([data], { type: "video/webm" }));
+      await loaded;
+      const { videoWidth: width, videoHeight: height, duration } = video;
+      const canvas = new OffscreenCanvas(width, height);
+      const context = canvas.getContext("2d");
+      const colours = [];
+      for (const t of times) {
+        const sought = event("seeked");
+        video.currentTime = t;
+        await sought;
+        context.drawImage(video, 0, 0);
+        colours.push([...context.getImageData(x, y, 1, 1).data].slice(0, 3));
+      }
+      return { width, height, duration, colours };
+    },
+    [bytes.toString("base64"), times, Math.round(x), Math.round(y)],
+  );
+  await page.close();
+  return seen;
+}
+
+test("a part is saved as a video, and its highest pressures are shown", async () => {
+  const ids = taxelIds("hand");
+  const name = writeRecording("ramp.csv", ids, 101, 0.04, (n) => ids.map((id) => (id === 4 ? 10 * n : 0)));
+  const server = await view(name, "--body", "hand");
+  const { page, problems } = await open(server.url);
+  await page.waitForFunction(() => document.querySelector(".touch"));
+  await paused(page);
+  await seek(page, 3);
+  await bare(page);
+  await page.evaluate(() => window.somatic.span.setLoop(1, 2));
+  const saved = page.waitForEvent("download");
+  await page.click("#video");
+  const download = await saved;
+  assert.equal(download.suggestedFilename(), "hand-1.00-2.00s.webm");
+  const path = join(folder, "part.webm");
+  await download.saveAs(path);
+  assert.match(await page.locator("#hint").innerText(), /: 26 pictures$/);
+  await page.waitForFunction(() => window.somatic.model.frame.t === 3);
+  const { at, size, colours } = await page.evaluate(() => {
+    const { model, pixelOfTaxel } = window.somatic;
+    const stage = document.querySelector("#stage").getBoundingClientRect();
+    const [x, y] = pixelOfTaxel(Array.from(model.mesh.taxelId).indexOf(4));
+    const colour = (p) => model.welcome.colours[Math.round((255 * p) / model.scale.max)];
+    return {
+      at: [x - stage.left, y - stage.top],
+      size: [stage.width, stage.height].map((side) => side & ~1),
+      colours: [270, 500].map(colour),
+    };
+  });
+  const seen = await watch(readFileSync(path), [0.1, 1.01], at);
+  assert.deepEqual([seen.width, seen.height], size);
+  assert.ok(Math.abs(seen.duration - 1.033) < 0.01, `${seen.duration} s`);
+  seen.colours.forEach((colour, i) =>
+    colour.forEach((part, k) =>
+      assert.ok(Math.abs(part - colours[i][k]) < 25, `${colour}, not ${colours[i]}, in picture ${i}`),
+    ),
+  );
+  // It can be stopped, and then nothing is saved.
+  page.on("download", () => problems.push("something was saved"));
+  await page.evaluate(() => window.somatic.span.setLoop(0, 0));
+  await page.keyboard.press("S");
+  await page.waitForFunction(() => window.somatic.model.frame.t > 0 && window.somatic.model.frame.t < 2);
+  assert.equal(await page.getAttribute("#video", "aria-pressed"), "true");
+  await page.keyboard.press("Escape");
+  assert.match(await page.locator("#hint").innerText(), /^Stopped/);
+  await page.waitForFunction(() => window.somatic.model.frame.t === 3);
+  assert.equal(await page.getAttribute("#video", "aria-pressed"), "false");
+  // Highest pressures are those of the time that is shown or repeated.
+  const highest = (from, to, peak) =>
+    page.waitForFunction(
+      ([from, to, peak]) => {
+        const { model } = window.somatic;
+        const { peaks } = model;
+        const of4 = (_, taxel) => model.mesh.taxelId[taxel] === 4;
+        const rest = peaks?.peaks.filter((p, taxel) => !of4(p, taxel));
+        return (
+          peaks?.from === from &&
+          peaks.to === to &&
+          peaks.peaks.find(of4) === peak &&
+          rest.every((p) => p === 0)
+        );
+      },
+      [from, to, peak],
+    );
+  await page.click("#peaks");
+  await highest(0, 4, 1000);
+  await page.evaluate(() => window.somatic.span.setLoop(0.5, 1.5));
+  await highest(0.5, 1.5, 370);
+  assert.match(await page.locator("#legend").innerText(), /Highest raw value[^]*0\.50 s[^]*1\.50 s/);
+  await page.waitForFunction(() => /look=[^&]*peaks/.test(location.hash));
+  await picture(page, "highest.png");
+  const shown = (
+    await coloursAt(page, [await page.evaluate((at) => window.somatic.pixelOfTaxel(at), ids.indexOf(4))])
+  )[0];
+  const expected = await page.evaluate(() => {
+    const { colours, scale } = { ...window.somatic.model.welcome, scale: window.somatic.model.scale };
+    return colours[Math.round((255 * 370) / scale.max)];
+  });
+  assert.ok(
+    shown.every((part, k) => Math.abs(part - expected[k]) < 12),
+    `${shown}, not ${expected}`,
+  );
+  await page.keyboard.press("M");
+  assert.equal(await page.evaluate(() => window.somatic.model.peaks), null);
+  assert.doesNotMatch(await page.locator("#legend").innerText(), /Highest/);
+  assert.deepEqual(problems, []);
   await page.close();
   await server.stop();
 });

@@ -15,7 +15,16 @@ const smallest = (fields) => {
 const lines = () =>
   execFileSync(
     SOMATIC,
-    ["run", "--quiet", "--backend", "cpu", "--outputs", "touches,touches.taxels", "--sink", "-"],
+    [
+      "run",
+      "--quiet",
+      "--backend",
+      "cpu",
+      "--outputs",
+      "touches,touches.taxels,touches.place",
+      "--sink",
+      "-",
+    ],
     { encoding: "utf8", maxBuffer: 1e9 },
   )
     .trim()
@@ -33,6 +42,8 @@ const seen = (page) =>
       position: touch.position,
       normal: touch.normal,
       axis: touch.axis,
+      place: touch.place,
+      placeSigma: touch.placeSigma,
       taxels: Array.from(touch.taxels, (taxel) => model.mesh.taxelId[taxel]),
       fields: touch.fields.map(({ index }) => model.welcome.fields[index].name),
       flags: model.touchFlags(touch),
@@ -42,7 +53,7 @@ const seen = (page) =>
 
 test("touches are those of an uninterrupted run, with the way that they came", async () => {
   const frames = lines();
-  const server = await view("--outputs", "total,touches");
+  const server = await view("--outputs", "total,touches,touches.place");
   const { page, problems } = await open(server.url);
   await page.keyboard.press(" ");
   const same = (a, b, what) => assert.deepEqual(a.map(Math.fround), b.map(Math.fround), what);
@@ -62,6 +73,8 @@ test("touches are those of an uninterrupted run, with the way that they came", a
       same(touch.position, right.position, "position");
       same(touch.normal, right.normal, "normal");
       if (right.principal_axis) same(touch.axis, right.principal_axis, "axis");
+      same(touch.place, right.place ?? [NaN, NaN, NaN], "place");
+      same(touch.placeSigma, right.place_sigma ?? [NaN, NaN], "sigma of the place");
       // Every place of the trail is one where the touch was, from a second ago at most.
       const before = frames.slice(0, index + 1).flatMap((of) => {
         const then = of.touches.find(({ id }) => id === right.id);
@@ -75,6 +88,28 @@ test("touches are those of an uninterrupted run, with the way that they came", a
       assert.ok(touch.trail.length >= Math.min(before.length, 20) / 2, `${touch.trail.length} places`);
     });
   }
+  // The panel tells of it, and the mark stands there.
+  await seek(page, frames[145].t);
+  await page.click(".touch");
+  await page.waitForFunction(() => /place[^]*position/.test(document.querySelector(".touch").innerText));
+  const marked = await page.evaluate(() => {
+    const { model, camera } = window.somatic;
+    const { place, frame } = model.touches[0];
+    const rows = model.rows.slice(12 * frame, 12 * frame + 12);
+    const world = [0, 1, 2].map(
+      (r) => rows[4 * r + 3] + place.reduce((s, x, k) => s + rows[4 * r + k] * x, 0),
+    );
+    const { x, y } = camera.project(world);
+    return [x, y];
+  });
+  await picture(page, "place.png");
+  const ring = await page.evaluate(([x, y]) => {
+    const canvas = document.querySelector("#marks");
+    const ratio = canvas.width / canvas.clientWidth;
+    const { data } = canvas.getContext("2d").getImageData(ratio * (x - 7), ratio * y, 1, 1);
+    return [...data];
+  }, marked);
+  assert.ok(ring[3] > 200, `nothing is drawn there: ${ring}`);
   assert.deepEqual(problems, []);
   await page.close();
   await server.stop();

@@ -1,7 +1,14 @@
 // The decoders of binary messages, against messages made by hand after the protocol.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "../../crates/page/src/web/wire.js";
+import {
+  decodeFrame,
+  decodeHistory,
+  decodeMesh,
+  decodePeaks,
+  kindOf,
+  say,
+} from "../../crates/page/src/web/wire.js";
 
 /** Writes values one after the other, little-endian. */
 function writer(bytes) {
@@ -25,7 +32,7 @@ function writer(bytes) {
 
 function head(w, { sections, fields = 0, touches = 0, samples = 0, columns = 0, answers = 0 }) {
   w.u8(2);
-  w.u8(3);
+  w.u8(4);
   w.u16(sections);
   w.u32(7);
   w.u64(123456789012);
@@ -38,11 +45,11 @@ function head(w, { sections, fields = 0, touches = 0, samples = 0, columns = 0, 
   w.u32(answers);
 }
 
-/** A touch with one place in its trail, by the table of the protocol: 132 bytes, and what it lists. */
+/** A touch with one place in its trail, by the table of the protocol: 152 bytes, and what it lists. */
 function putTouch(w, { id, frame, force, taxels, links, fields }) {
   for (const x of [id, 0, frame, 5, 9, taxels.length, links.length, fields.length, 1]) w.u32(x);
   for (const x of [0.5, 10, force, 7, 0.25]) w.f32(x);
-  for (const x of [1, 2, 3, 0, 0, 1, 0, 1, 0, 0.5, 0.25, 4, 5, 6]) w.f32(x);
+  for (const x of [1, 2, 3, 0, 0, 1, 0, 1, 0, 0.5, 0.25, 4, 5, 6, 1.5, 2, 3, 0.125, NaN]) w.f32(x);
   for (const taxel of taxels) w.u32(taxel);
   for (const [index, share] of [...links, ...fields]) {
     w.u32(index);
@@ -72,7 +79,7 @@ test("a frame with nothing but its head", () => {
 });
 
 test("a frame with all sections, each padded to 8 bytes", () => {
-  const w = writer(64 + 16 + 32 + 56 + 160 + 32);
+  const w = writer(64 + 16 + 32 + 56 + 176 + 32);
   head(w, { sections: 31, fields: 2, touches: 1, samples: 2, columns: 0b101, answers: 4 });
   for (const p of [0, 1.5, NaN]) w.f32(p);
   for (const state of [0, 4, 1]) w.u8(state);
@@ -117,6 +124,13 @@ test("a frame with all sections, each padded to 8 bytes", () => {
       [4, 5, 6],
     ],
   );
+  assert.deepEqual(
+    [touch.place, touch.placeSigma],
+    [
+      [1.5, 2, 3],
+      [0.125, NaN],
+    ],
+  );
   assert.deepEqual([...touch.taxels], [0, 2]);
   assert.deepEqual(touch.links, [{ index: 0, share: 1 }]);
   assert.deepEqual(touch.fields, [{ index: 5, share: 0.75 }]);
@@ -133,7 +147,7 @@ test("a frame with all sections, each padded to 8 bytes", () => {
 });
 
 test("touches stand one after the other, whatever each lists", () => {
-  const w = writer(64 + 3 * 132 + 12 + 8 + 16);
+  const w = writer(64 + 3 * 152 + 12 + 8 + 16);
   head(w, { sections: 8, touches: 3 });
   putTouch(w, { id: 1, frame: 0xffffffff, force: 2, taxels: [], links: [], fields: [] });
   putTouch(w, {
@@ -178,7 +192,7 @@ test("another version is an error", () => {
 test("a mesh", () => {
   const w = writer(20 + 3 * 28 + 12 + 40 + 28);
   w.u8(1);
-  w.u8(3);
+  w.u8(4);
   w.u16(0);
   for (const count of [3, 1, 1, 1]) w.u32(count);
   for (let i = 0; i < 18; i++) w.f32(i);
@@ -202,7 +216,7 @@ test("a mesh", () => {
 test("a history", () => {
   const w = writer(32 + 16);
   w.u8(3);
-  w.u8(3);
+  w.u8(4);
   w.u16(0);
   for (const value of [5, 2, 1]) w.u32(value);
   w.f64(1);
@@ -216,10 +230,24 @@ test("a history", () => {
   );
 });
 
+test("highest pressures", () => {
+  const w = writer(24 + 8);
+  w.u8(4);
+  w.u8(4);
+  w.u16(0);
+  w.u32(6);
+  w.f64(1);
+  w.f64(2);
+  for (const x of [2.5, NaN]) w.f32(x);
+  assert.equal(kindOf(w.buffer), 4);
+  const { id, from, to, peaks } = decodePeaks(w.buffer);
+  assert.deepEqual([id, from, to, [...peaks]], [6, 1, 2, [2.5, NaN]]);
+});
+
 test("outgoing messages", () => {
   assert.deepEqual(JSON.parse(say.hello("ab", null)), {
     type: "hello",
-    version: 3,
+    version: 4,
     token: "ab",
     after_event: null,
   });

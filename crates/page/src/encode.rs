@@ -127,6 +127,32 @@ pub(super) fn write_series(to: &mut Writer, trail: &Trail) {
     to.pad();
 }
 
+/// The highest pressure of each taxel over a part of a recording.
+#[derive(Clone, Debug)]
+pub struct PeakMap {
+    /// The number of the request.
+    pub id: u32,
+    /// Begin of the part, s.
+    pub from_s: f64,
+    /// End of the part, s.
+    pub to_s: f64,
+    /// By taxel of the body, in the unit of P; NaN where nothing is known of it.
+    pub peaks: Vec<f32>,
+}
+
+impl PeakMap {
+    /// The binary message that holds it.
+    #[must_use]
+    pub fn message(&self) -> Vec<u8> {
+        let mut to = Writer::new(4, 0);
+        to.u32(self.id);
+        to.f64(self.from_s);
+        to.f64(self.to_s);
+        to.f32s(&self.peaks);
+        to.finish()
+    }
+}
+
 /// A history: for each series the least and the most in each of `bins` bins.
 #[derive(Clone, Debug)]
 pub struct History {

@@ -52,6 +52,7 @@ const FILES: &[PageFile] = files![
     "model.js",
     "outputs.css",
     "panels.css",
+    "peaks.js",
     "percepts.js",
     "photo.js",
     "pick.js",
@@ -73,9 +74,12 @@ const FILES: &[PageFile] = files![
     "timeline.js",
     "timeline_pointer.js",
     "tokens.js",
+    "toolbar.js",
     "touch_panel.js",
     "touch_plot.js",
+    "video.js",
     "view.js",
+    "webm.js",
     "wire.js",
 ];
 

@@ -40,7 +40,7 @@ mod viewer;
 mod wake;
 
 pub use contacts::RecordingEvents;
-pub use encode::History;
+pub use encode::{History, PeakMap};
 pub use exchange::{Replies, ViewerId};
 pub use listen::Listen;
 pub use log::EventKind;

@@ -6,7 +6,7 @@ use super::series::Series;
 use somatic_engine::percept::Column;
 
 /// The version of the protocol.
-pub(super) const VERSION: u32 = 3;
+pub(super) const VERSION: u32 = 4;
 /// The most bytes of a message.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 << 10;
 /// The most series of a viewer.
@@ -58,6 +58,11 @@ pub enum Request {
         /// Number of frames, negative for earlier ones.
         frames: i32,
     },
+    /// Stop, and show this frame of the recording, or its last one.
+    Show {
+        /// Its number, from 0.
+        frame: u64,
+    },
     /// Play at this many times the recorded speed.
     Speed {
         /// The factor, 0.01 to 100.
@@ -81,6 +86,15 @@ pub enum Request {
         /// The series.
         series: Vec<Series>,
     },
+    /// Send the highest pressure of each taxel in the frames that are shown from one time to another.
+    Peaks {
+        /// The viewer's number for the answer.
+        id: u32,
+        /// Begin, s.
+        from_s: f64,
+        /// End, s.
+        to_s: f64,
+    },
 }
 
 #[derive(Deserialize)]
@@ -95,10 +109,12 @@ enum Raw {
     Pause {},
     Seek { t_s: f64 },
     Step { frames: i32 },
+    Show { frame: u64 },
     Speed { speed: f64 },
     Taxel { taxel: Option<usize> },
     Explain { field: usize },
     History { id: u32, from_s: f64, to_s: f64, bins: usize, series: Vec<RawSeries> },
+    Peaks { id: u32, from_s: f64, to_s: f64 },
 }
 
 #[derive(Deserialize)]
@@ -134,6 +150,7 @@ pub(super) fn parse(text: &str, counts: &Counts) -> Result<Message, String> {
         Raw::Pause {} => Message::Request(Request::Pause),
         Raw::Seek { t_s } if t_s.is_finite() => Message::Request(Request::Seek { t_s }),
         Raw::Step { frames } if (-MAX_STEP..=MAX_STEP).contains(&frames) => Message::Request(Request::Step { frames }),
+        Raw::Show { frame } => Message::Request(Request::Show { frame }),
         Raw::Speed { speed } if (0.01..=100.0).contains(&speed) => Message::Request(Request::Speed { speed }),
         Raw::Explain { field } => Message::Request(Request::Explain { field: below(field, counts.fields, "field")? }),
         Raw::History { id, from_s, to_s, bins, series }
@@ -142,7 +159,10 @@ pub(super) fn parse(text: &str, counts: &Counts) -> Result<Message, String> {
             let series = counts.series(series)?;
             Message::Request(Request::History { id, from_s, to_s, bins, series })
         }
-        Raw::Seek { .. } | Raw::Step { .. } | Raw::Speed { .. } | Raw::History { .. } => {
+        Raw::Peaks { id, from_s, to_s } if from_s.is_finite() && to_s.is_finite() && from_s <= to_s => {
+            Message::Request(Request::Peaks { id, from_s, to_s })
+        }
+        Raw::Seek { .. } | Raw::Step { .. } | Raw::Speed { .. } | Raw::History { .. } | Raw::Peaks { .. } => {
             return Err("a number in a message is out of range".to_owned());
         }
     })
@@ -200,11 +220,11 @@ mod tests {
         let series = Series { field: 2, column: &COLUMNS[4], component: 1 };
         for (text, message) in [
             (
-                r#"{"type":"hello","version":3,"token":"ab","after_event":null}"#,
+                r#"{"type":"hello","version":4,"token":"ab","after_event":null}"#,
                 Message::Hello { token: "ab".to_owned(), after_event: None },
             ),
             (
-                r#"{"after_event":7,"token":"","version":3,"type":"hello"}"#,
+                r#"{"after_event":7,"token":"","version":4,"type":"hello"}"#,
                 Message::Hello { token: String::new(), after_event: Some(7) },
             ),
             (r#"{"type":"drawn","seq":5}"#, Message::Drawn { seq: 5 }),
@@ -218,11 +238,16 @@ mod tests {
             (r#"{"type":"play"}"#, Message::Request(Request::Play)),
             (r#"{"type":"seek","t_s":-1.5}"#, Message::Request(Request::Seek { t_s: -1.5 })),
             (r#"{"type":"step","frames":-1000}"#, Message::Request(Request::Step { frames: -1000 })),
+            (r#"{"type":"show","frame":12}"#, Message::Request(Request::Show { frame: 12 })),
             (r#"{"type":"speed","speed":0.25}"#, Message::Request(Request::Speed { speed: 0.25 })),
             (r#"{"type":"explain","field":0}"#, Message::Request(Request::Explain { field: 0 })),
             (
                 r#"{"type":"history","id":1,"from_s":0,"to_s":2,"bins":4096,"series":[]}"#,
                 Message::Request(Request::History { id: 1, from_s: 0.0, to_s: 2.0, bins: 4096, series: vec![] }),
+            ),
+            (
+                r#"{"type":"peaks","id":2,"from_s":0.5,"to_s":0.5}"#,
+                Message::Request(Request::Peaks { id: 2, from_s: 0.5, to_s: 0.5 }),
             ),
         ] {
             assert_eq!(parsed(text), Ok(message), "{text}");
@@ -243,8 +268,8 @@ mod tests {
             r#"{"type":"drawn","seq":-1}"#,
             r#"{"type":"drawn","seq":1,"seq":2}"#,
             r#"{"type":"drawn","seq":4294967296}"#,
-            r#"{"type":"hello","version":2,"token":"a","after_event":null}"#,
-            r#"{"type":"hello","version":3,"token":7,"after_event":null}"#,
+            r#"{"type":"hello","version":3,"token":"a","after_event":null}"#,
+            r#"{"type":"hello","version":4,"token":7,"after_event":null}"#,
             r#"{"type":"columns","columns":["principal_axis","nothing"]}"#,
             r#"{"type":"series","series":[{"field":3,"column":"total","component":0}]}"#,
             r#"{"type":"series","series":[{"field":0,"column":"total","component":1}]}"#,
@@ -253,9 +278,12 @@ mod tests {
             r#"{"type":"explain","field":3}"#,
             r#"{"type":"seek","t_s":1e999}"#,
             r#"{"type":"step","frames":1001}"#,
+            r#"{"type":"show","frame":-1}"#,
             r#"{"type":"speed","speed":0}"#,
             r#"{"type":"history","id":1,"from_s":0,"to_s":0,"bins":1,"series":[]}"#,
             r#"{"type":"history","id":1,"from_s":0,"to_s":1,"bins":4097,"series":[]}"#,
+            r#"{"type":"peaks","id":1,"from_s":1,"to_s":0}"#,
+            r#"{"type":"peaks","id":1,"from_s":0}"#,
         ] {
             let reason = parsed(text).expect_err(text);
             assert!(!reason.is_empty() && reason.len() <= 123, "{text}: {reason}");
@@ -263,7 +291,7 @@ mod tests {
         let one = r#"{"field":0,"column":"total","component":0}"#;
         let many = |count: usize| format!(r#"{{"type":"series","series":[{}]}}"#, vec![one; count].join(","));
         assert!(parsed(&many(16)).is_ok() && parsed(&many(17)).is_err());
-        let long = format!(r#"{{"type":"hello","version":3,"token":"{}"}}"#, "é".repeat(MAX_MESSAGE_BYTES / 2));
+        let long = format!(r#"{{"type":"hello","version":4,"token":"{}"}}"#, "é".repeat(MAX_MESSAGE_BYTES / 2));
         assert!(parsed(&long).is_err());
         assert!(parsed(&"[".repeat(60_000)).is_err());
     }

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 
-use self::decode::{decode_frame, decode_history, decode_mesh};
+use self::decode::{decode_frame, decode_history, decode_mesh, decode_peaks};
 use super::current::Current;
-use super::encode::History;
+use super::encode::{History, PeakMap};
 use super::exchange::Exchange;
 use super::log::EventKind;
 use super::message::{Message, parse};
@@ -266,6 +266,8 @@ fn book() -> Book {
     };
     let message = history.message();
     book.add("history", &message, &decode_history(&message));
+    let message = PeakMap { id: 8, from_s: 0.5, to_s: 2.5, peaks: vec![0.0, 2.5, f32::NAN, 1.0, 7.0] }.message();
+    book.add("peaks", &message, &decode_peaks(&message, 5));
     book.add_text(&text::scale(Scale { max: 0.2, from: ScaleFrom::Grown }));
     bench.publisher.event(EventKind::Board, 0.5, None, "tty1: unplugged".to_owned());
     bench.publisher.flush();

@@ -61,6 +61,13 @@ impl TouchPlaces {
         number(to, along);
         number(to, across);
         vector(to, touch.velocity);
+        match touch.place {
+            Some(place) => self.place(to, link, place),
+            None => vector(to, None),
+        }
+        let [along_u, along_v] = touch.place_sigma_m.map_or([None; 2], |sigma| sigma.map(Some));
+        number(to, along_u);
+        number(to, along_v);
         for &node in taxels {
             to.u32(self.taxels[node as usize]);
         }

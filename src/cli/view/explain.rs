@@ -1,12 +1,13 @@
-//! What takes longer than a frame: why a percept is what it is, and the history of some outputs.
+//! What takes longer than a frame: why a percept is what it is, the history of some outputs, and the highest pressures of a part.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use somatic::page::{History, Request, Series, ViewerId};
+use somatic::page::{History, PeakMap, Request, Series, ViewerId};
 use somatic::{Engine, Error, Result};
 
 use super::super::explanation::{explanation, no_explanation};
 use super::checkpoints::Checkpoints;
+use super::peaks::Peaks;
 use super::recorded::Differences;
 use super::recording::{CHUNK, Recording};
 use super::shared::Shared;
@@ -14,7 +15,7 @@ use super::shared::Shared;
 /// A question of a viewer.
 enum Question {
     Explain { field: usize, frame: usize },
-    History(Request),
+    Other(Request),
 }
 
 /// Answers on a thread of its own, with an engine of its own.
@@ -34,9 +35,9 @@ impl Explainer {
         let _ = self.0.send((viewer, Question::Explain { field, frame }));
     }
 
-    /// Asks for a history.
-    pub(super) fn history(&self, viewer: ViewerId, request: Request) {
-        let _ = self.0.send((viewer, Question::History(request)));
+    /// Asks for a history or highest pressures.
+    pub(super) fn ask(&self, viewer: ViewerId, request: Request) {
+        let _ = self.0.send((viewer, Question::Other(request)));
     }
 }
 
@@ -51,13 +52,19 @@ fn answer(questions: &Receiver<(ViewerId, Question)>, shared: &Shared) {
                 let failed = |e: Error| no_explanation(field, &e.to_string());
                 shared.replies.text(viewer, explained.unwrap_or_else(failed));
             }
-            Question::History(Request::History { id, from_s, to_s, bins, series }) => {
+            Question::Other(Request::History { id, from_s, to_s, bins, series }) => {
                 let nothing = vec![[vec![f32::NAN; bins], vec![f32::NAN; bins]]; series.len()];
                 let empty = History { id, from_s, to_s, bins, series: nothing };
                 let history = with(&mut started, |answering| answering.history(empty.clone(), &series));
                 shared.replies.binary(viewer, history.unwrap_or(empty).message());
             }
-            Question::History(_) => {}
+            Question::Other(Request::Peaks { id, from_s, to_s }) => {
+                let peaks = with(&mut started, |answering| answering.peaks(from_s, to_s));
+                let nothing = |_| vec![f32::NAN; shared.body.taxels.len()];
+                let map = PeakMap { id, from_s, to_s, peaks: peaks.unwrap_or_else(nothing) };
+                shared.replies.binary(viewer, map.message());
+            }
+            Question::Other(_) => {}
         }
         answering = started.ok();
     }
@@ -83,14 +90,15 @@ struct Answering<'a> {
     recording: &'a Recording,
     differences: &'a Differences,
     checkpoints: &'a Checkpoints,
+    peaks: &'a Peaks,
     done: usize,
 }
 
 impl<'a> Answering<'a> {
     fn new(shared: &'a Shared) -> Result<Self> {
         let ids = shared.body.taxels.iter().map(|taxel| taxel.id).collect();
-        let Shared { recording, checkpoints, differences, .. } = shared;
-        Ok(Self { engine: shared.engine()?, ids, recording, differences, checkpoints, done: 0 })
+        let Shared { recording, checkpoints, differences, peaks, .. } = shared;
+        Ok(Self { engine: shared.engine()?, ids, recording, differences, checkpoints, peaks, done: 0 })
     }
 
     /// Brings the engine to before frame `frame`.
@@ -112,6 +120,27 @@ impl<'a> Answering<'a> {
         let explained = explanation(&mut self.engine, read, field, (&self.recording.taxels, &self.ids), &recorded);
         self.done = frame + 1;
         explained
+    }
+
+    /// By the body's taxels, the highest pressure in the frames that are shown from `from_s` to `to_s`.
+    fn peaks(&mut self, from_s: f64, to_s: f64) -> Result<Vec<f32>> {
+        let mut most = vec![f32::NAN; self.ids.len()];
+        let shown = self.recording.index_at(from_s)..self.recording.index_at(to_s) + 1;
+        let known = self.peaks.of_whole_parts(shown.clone(), &mut most);
+        for rest in [shown.start..known.start, known.end..shown.end] {
+            if rest.is_empty() {
+                continue;
+            }
+            self.go_to(rest.start)?;
+            while self.done < rest.end {
+                let next = rest.end.min(self.done + CHUNK);
+                let frames = &self.recording.frames[self.done..next];
+                self.engine.process(frames)?;
+                self.peaks.add(&self.engine, frames, &mut most);
+                self.done = next;
+            }
+        }
+        Ok(most)
     }
 
     /// `history`, in which nothing is known yet, with the least and most of each of `series` in each bin.

@@ -2,6 +2,7 @@
 
 mod checkpoints;
 mod explain;
+mod peaks;
 mod player;
 mod recorded;
 mod recording;
@@ -25,6 +26,7 @@ use somatic::{BackendKind, Body, Engine, Error, Options, Result};
 
 use self::checkpoints::Checkpoints;
 use self::explain::Explainer;
+use self::peaks::Peaks;
 use self::player::Player;
 use self::recorded::{Differences, Recorded};
 use self::recording::Recording;
@@ -243,6 +245,7 @@ impl Opening<'_> {
             _ => None,
         };
         let shared = Shared {
+            peaks: Arc::new(Peaks::new(&body, &recording)),
             body,
             options,
             recording: Arc::clone(&recording),

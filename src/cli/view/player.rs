@@ -126,7 +126,7 @@ impl Player {
                 self.playing = true;
             }
             Request::Explain { field } => return self.explainer.explain(viewer, field, self.shown()),
-            Request::History { .. } => return self.explainer.history(viewer, request),
+            Request::History { .. } | Request::Peaks { .. } => return self.explainer.ask(viewer, request),
             Request::Play => {
                 if self.is_at_end() {
                     self.target = Some(0);
@@ -140,6 +140,11 @@ impl Player {
                 let last = self.shared.recording.frames.len() - 1;
                 let from = self.target.unwrap_or(self.shown());
                 self.target = Some(from.saturating_add_signed(frames as isize).min(last));
+            }
+            Request::Show { frame } => {
+                self.playing = false;
+                let last = self.shared.recording.frames.len() - 1;
+                self.target = Some(usize::try_from(frame).map_or(last, |frame| frame.min(last)));
             }
             Request::Speed { speed } => self.speed = speed,
             _ => return,

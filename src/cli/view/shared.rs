@@ -6,6 +6,7 @@ use somatic::page::Replies;
 use somatic::{Body, Engine, Options, Result};
 
 use super::checkpoints::Checkpoints;
+use super::peaks::Peaks;
 use super::recorded::Differences;
 use super::recording::Recording;
 
@@ -18,6 +19,8 @@ pub(super) struct Shared {
     pub(super) checkpoints: Arc<Checkpoints>,
     /// What the recording holds of percepts that differ from those computed now.
     pub(super) differences: Arc<Differences>,
+    /// The highest pressures in parts of the recording.
+    pub(super) peaks: Arc<Peaks>,
     pub(super) replies: Replies,
 }
 

@@ -110,7 +110,7 @@ fn pass(
     mut events: RecordingEvents,
     timeline: &Timeline,
 ) -> Result<()> {
-    let Shared { recording, checkpoints, replies, differences, .. } = shared;
+    let Shared { recording, checkpoints, replies, differences, peaks, .. } = shared;
     let mut engine = shared.engine()?;
     let (mut done, mut first_bin) = (0, 0);
     let mut state_at_s = timeline.start_s;
@@ -122,6 +122,7 @@ fn pass(
         if let Some(recorded) = &mut recorded {
             timeline.add_differing(&recorded.compare(percepts, recording, done, differences)?, recording, done);
         }
+        peaks.see(&engine, frames);
         done += frames.len();
         let now_s = frames[frames.len() - 1].t_s;
         if now_s - state_at_s >= checkpoints.spacing_s() {

@@ -48,7 +48,7 @@ impl Reader<'_> {
 
 pub(super) fn decode_mesh(bytes: &[u8]) -> Value {
     let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [1, 3, 0, 0]);
+    assert_eq!(from.bytes(), [1, 4, 0, 0]);
     let [v, t, n, l] = [0; 4].map(|_| from.u32());
     let mesh = json!({
         "position": from.f32s(3 * v), "normal": from.f32s(3 * v), "link": from.u32s(v), "corners": from.u32s(3 * t),
@@ -63,7 +63,7 @@ pub(super) fn decode_mesh(bytes: &[u8]) -> Value {
 pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
     let mut from = Reader(bytes, 0);
     let [kind, version, sections, zero] = from.bytes();
-    assert_eq!((kind, version, zero), (2, 3, 0));
+    assert_eq!((kind, version, zero), (2, 4, 0));
     let mut frame = json!({"seq": from.u32()});
     frame["frame"] = u64::from_le_bytes(from.bytes()).into();
     frame["t"] = from.f64().into();
@@ -129,7 +129,9 @@ fn touch(from: &mut Reader<'_>) -> Value {
     for name in ["age", "total", "force", "peak", "anisotropy"] {
         touch[name] = from.f32();
     }
-    for (name, count) in [("position", 3), ("normal", 3), ("axis", 3), ("spread", 2), ("velocity", 3)] {
+    for (name, count) in
+        [("position", 3), ("normal", 3), ("axis", 3), ("spread", 2), ("velocity", 3), ("place", 3), ("placeSigma", 2)]
+    {
         touch[name] = from.f32s(count).into();
     }
     touch["taxels"] = from.u32s(taxels).into();
@@ -141,9 +143,18 @@ fn touch(from: &mut Reader<'_>) -> Value {
     touch
 }
 
+pub(super) fn decode_peaks(bytes: &[u8], taxels: u32) -> Value {
+    let mut from = Reader(bytes, 0);
+    assert_eq!(from.bytes(), [4, 4, 0, 0]);
+    let (id, begin, end) = (from.u32(), from.f64(), from.f64());
+    let peaks = from.f32s(taxels);
+    from.ends();
+    json!({"id": id, "from": begin, "to": end, "peaks": peaks})
+}
+
 pub(super) fn decode_history(bytes: &[u8]) -> Value {
     let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [3, 3, 0, 0]);
+    assert_eq!(from.bytes(), [3, 4, 0, 0]);
     let [id, bins, series] = [0; 3].map(|_| from.u32());
     let (begin, end) = (from.f64(), from.f64());
     let ends: Vec<[Vec<Value>; 2]> = (0..series).map(|_| [from.f32s(bins), from.f32s(bins)]).collect();

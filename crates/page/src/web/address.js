@@ -21,7 +21,7 @@ export class Address {
   /**
    * @param {{model: import("./model.js").Model, camera: import("./camera.js").Camera,
    *   choices: import("./choices.js").Choices, connection: import("./socket.js").Connection,
-   *   fields: import("./fields.js").Fields, plots: import("./plots.js").Plots, span: import("./span.js").Span,
+   *   fields: import("./fields.js").Fields, plots: import("./plots.js").Plots, peaks: import("./peaks.js").Peaks, span: import("./span.js").Span,
    *   timeline: import("./timeline.js").Timeline, isTurned: () => boolean, onCamera: () => void}} parts
    */
   constructor(parts) {
@@ -29,7 +29,7 @@ export class Address {
     this.timer = 0;
     /** Nothing is written before what the address says has been shown. */
     this.isShown = false;
-    const { model, choices, span, plots } = parts;
+    const { model, choices, span, plots, peaks } = parts;
     this.panels = [...document.querySelectorAll("#side > details")].filter(
       (panel) => panel instanceof HTMLDetailsElement,
     );
@@ -42,6 +42,7 @@ export class Address {
       // While it plays, the moment is no part of it.
       if (!model.status.playing) this.changed();
     });
+    peaks.on("peaks", () => this.changed());
     plots.onTouchPlot = () => this.changed();
   }
 
@@ -76,7 +77,7 @@ export class Address {
    * @returns {import("./fragment.js").ViewState}
    */
   state(whole) {
-    const { model, camera, choices, plots, span, isTurned } = this.parts;
+    const { model, camera, choices, plots, peaks, span, isTurned } = this.parts;
     const { welcome, frame } = model;
     const isStill = !!welcome?.time && !model.status.playing;
     /** @type {import("./fragment.js").ViewState} */
@@ -94,6 +95,7 @@ export class Address {
       choices[name] === LOOKS[name] ? [] : [choices[name] ? name : `no-${name}`],
     );
     if (plots.touches.isShown) look.push("touch-plot");
+    if (peaks.isOn) look.push("peaks");
     if (look.length) state.look = look;
     if (choices.marks !== choices.offered[0]) state.marks = choices.marks;
     const letters = new Set(welcome?.fields.map((field) => field.letter));
@@ -116,7 +118,7 @@ export class Address {
    */
   show(fragment) {
     const state = fromFragment(fragment);
-    const { model, camera, choices, connection, fields, plots, span, timeline, onCamera } = this.parts;
+    const { model, camera, choices, connection, fields, peaks, plots, span, timeline, onCamera } = this.parts;
     const { welcome } = model;
     if (!welcome) return;
     if (state.camera) {
@@ -134,6 +136,7 @@ export class Address {
     if (state.look) {
       for (const name of /** @type {(keyof typeof LOOKS)[]} */ (Object.keys(LOOKS)))
         choices[name] = state.look.includes(name) || (LOOKS[name] && !state.look.includes(`no-${name}`));
+      peaks.show(state.look.includes("peaks"));
       plots.touches.show(state.look.includes("touch-plot"));
     }
     const marks = choices.offered.find((name) => name === state.marks);

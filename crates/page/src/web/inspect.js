@@ -213,6 +213,7 @@ export class Inspector {
       ...(welcome.touches ? [["touch", touch ? `#${touch.id}` : ABSENT]] : []),
       ["raw", value && value.raw !== null ? short(value.raw) : ABSENT],
       [welcome.quantity === "N" ? "force" : "pressure", withUnit(model.pressure[taxel], "P", model.quantity)],
+      ...(model.peaks ? [["highest", withUnit(model.peaks.peaks[taxel], "P", model.quantity)]] : []),
       ["state", value?.health ?? HEALTH[model.health[taxel]]],
     ];
     this.tip.replaceChildren(make("b", "", `Taxel ${mesh.taxelId[taxel]}`), table(rows));

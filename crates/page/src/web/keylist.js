@@ -31,11 +31,12 @@ export const GESTURES = [
  *   timeline: import("./timeline.js").Timeline, look: (name: import("./camera.js").Preset) => void,
  *   lookAt: (field: number) => void, lookAtAll: () => void, release: () => void, moved: () => void, explain: () => void,
  *   photo: () => void, help: () => void, pause: () => void, link: () => void,
- *   measure: import("./measure.js").Measure, plots: import("./plots.js").Plots, table: () => void}} page
+ *   measure: import("./measure.js").Measure, video: import("./video.js").Video,
+ *   peaks: import("./peaks.js").Peaks, plots: import("./plots.js").Plots, table: () => void}} page
  * @returns {import("./keys.js").Key[]}
  */
 export function keyList(page) {
-  const { camera, choices, fields, legend, timeline, measure, plots } = page;
+  const { camera, choices, fields, legend, timeline, measure, peaks, plots, video } = page;
   const move = (/** @type {() => void} */ change) => () => {
     change();
     page.moved();
@@ -78,6 +79,13 @@ export function keyList(page) {
     { group: "Picture", keys: ["d"], does: "taxels on and off", act: () => choices.toggle("taxels") },
     { group: "Picture", keys: ["t"], does: "colour rims by field", act: () => choices.toggle("tint") },
     { group: "Picture", keys: ["s"], does: "save the view as a PNG", act: page.photo },
+    {
+      group: "Picture",
+      keys: ["S"],
+      does: "save a video of what is repeated or shown",
+      act: () => video.toggle(),
+    },
+    { group: "Picture", keys: ["M"], does: "highest pressures over that time", act: () => peaks.toggle() },
     { group: "Picture", keys: ["y"], does: "distance of two clicks", act: () => measure.toggle() },
     { group: "Picture", keys: ["l"], does: "copy a link to this view", act: page.link },
     { group: "Picture", keys: ["k"], does: "ids of taxels on and off", act: () => choices.toggle("ids") },

@@ -1,7 +1,7 @@
 /** The legend: colours of pressure with units, and how states of taxels look. */
 
 import { make, setText } from "./dom.js";
-import { clock, scaleFor, short, tickText, ticks } from "./format.js";
+import { clock, scaleFor, seconds, short, tickText, ticks } from "./format.js";
 import { HEALTH } from "./wire.js";
 
 /** Ticks closer to the end of the bar than this part of it would lie under the number there. */
@@ -66,7 +66,8 @@ export class Legend {
     const by = scaleFor("P", most, model.quantity);
     const what =
       model.quantity === "N" ? "Force of a taxel" : model.quantity === "Pa" ? "Pressure" : "Raw value";
-    setText(this.title, `${what}, ${by.unit}`);
+    const { peaks } = model;
+    setText(this.title, `${peaks ? `Highest ${what.toLowerCase()}` : what}, ${by.unit}`);
     this.paint(welcome.colours);
     this.ticks.replaceChildren(
       ...endedTicks(most * by.factor).map(({ part, text }) => {
@@ -76,7 +77,8 @@ export class Legend {
       }),
     );
     const auto = model.autoscale !== null;
-    setText(this.source, auto ? `autoscale since ${this.since}` : this.sourceText(model.scale.from));
+    if (peaks) setText(this.source, `from ${seconds(peaks.from)} to ${seconds(peaks.to)}`);
+    else setText(this.source, auto ? `autoscale since ${this.since}` : this.sourceText(model.scale.from));
     this.root.classList.toggle("auto", auto);
     setText(this.auto, auto ? "Fixed scale" : "Autoscale");
   }

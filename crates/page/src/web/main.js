@@ -18,6 +18,7 @@ import { dot, toWorld } from "./math.js";
 import { Measure } from "./measure.js";
 import { Model } from "./model.js";
 import { Marks } from "./percepts.js";
+import { Peaks } from "./peaks.js";
 import { Photo } from "./photo.js";
 import { Picker } from "./pick.js";
 import { TaxelIds } from "./taxel_ids.js";
@@ -30,8 +31,10 @@ import { ScaleBar } from "./scale_bar.js";
 import { Span } from "./span.js";
 import { Status } from "./status.js";
 import { Timeline } from "./timeline.js";
+import { joinToolbar } from "./toolbar.js";
 import { tokenIn } from "./tokens.js";
 import { TouchPanel } from "./touch_panel.js";
+import { Video } from "./video.js";
 import { View } from "./view.js";
 import { say } from "./wire.js";
 
@@ -59,6 +62,7 @@ const photo = new Photo(view, model, [marks.canvas, scaleBar.canvas]);
 const legend = new Legend(byId("legend", HTMLElement), model);
 const span = new Span();
 const plots = new Plots(model, connection, span);
+const peaks = new Peaks(model, span, connection);
 const timeline = new Timeline(model, connection, span);
 const percept = new PerceptPanel(model, choices, connection, plots);
 const fields = new Fields(model, choices, lookAt);
@@ -279,6 +283,7 @@ const address = new Address({
   choices,
   connection,
   fields,
+  peaks,
   plots,
   span,
   timeline,
@@ -307,30 +312,10 @@ function look(name) {
   camera.preset(name);
   lookAtAll();
 }
-for (const button of document.querySelectorAll("[data-view]"))
-  button.addEventListener("click", () => {
-    if (!(button instanceof HTMLElement)) return;
-    const name = button.dataset.view ?? "";
-    if (name === "all") lookAtAll();
-    else look(/** @type {import("./camera.js").Preset} */ (name));
-  });
-for (const button of document.querySelectorAll("[data-toggle]")) {
-  if (!(button instanceof HTMLElement)) continue;
-  const name = /** @type {"xray" | "tint" | "labels" | "ids"} */ (button.dataset.toggle);
-  const show = () => button.setAttribute("aria-pressed", String(choices[name]));
-  button.addEventListener("click", () => choices.toggle(name));
-  choices.on("look", show);
-  show();
-}
-const marksBox = byId("marks-choice", HTMLSelectElement);
-marksBox.addEventListener("change", () => {
-  choices.marks = choices.offered[marksBox.selectedIndex];
-  choices.tell("look");
+joinToolbar(choices, (name) => {
+  if (name === "all") lookAtAll();
+  else look(/** @type {import("./camera.js").Preset} */ (name));
 });
-choices.on("offered", () =>
-  marksBox.replaceChildren(...choices.offered.map((name) => new Option(`Marks: ${name}`, name))),
-);
-choices.on("look offered", () => (marksBox.selectedIndex = choices.offered.indexOf(choices.marks)));
 
 const hint = byId("hint", HTMLElement);
 let hintTimer = 0;
@@ -341,6 +326,7 @@ function tell(text) {
   hint.hidden = hint.textContent === "";
   if (text) hintTimer = window.setTimeout(() => tell(""), HINT_MS);
 }
+const video = new Video(photo, span, connection, tell);
 const plotFile = new PlotFile(model, connection, plots, tell);
 measure.on("measure", () => {
   tell("");
@@ -358,11 +344,14 @@ const keys = new Keys(
     legend,
     timeline,
     measure,
+    peaks,
     plots,
+    video,
     look,
     lookAt,
     lookAtAll,
     release: () => {
+      if (video.isOn) return video.toggle();
       if (measure.isOn) return measure.end();
       choices.chooseTouch(null);
       choices.choose(null);
@@ -379,6 +368,11 @@ const keys = new Keys(
 );
 const measureButton = byId("measure", HTMLButtonElement);
 measureButton.addEventListener("click", () => measure.toggle());
+const [peaksButton, videoButton] = ["peaks", "video"].map((id) => byId(id, HTMLButtonElement));
+peaksButton.addEventListener("click", () => peaks.toggle());
+peaks.on("peaks", () => peaksButton.setAttribute("aria-pressed", String(peaks.isOn)));
+videoButton.addEventListener("click", () => video.toggle());
+video.on("video", () => videoButton.setAttribute("aria-pressed", String(video.isOn)));
 byId("hold", HTMLButtonElement).addEventListener("click", () => hold.toggle());
 byId("plots-file", HTMLButtonElement).addEventListener("click", () => plotFile.save());
 byId("touch-plot-button", HTMLButtonElement).addEventListener("click", () => plots.toggleTouches());

@@ -54,6 +54,10 @@ export class Model extends Observed {
     this.scale = { max: 1, from: "" };
     /** Largest pressure since autoscale began; null while the scale is fixed. @type {number | null} */
     this.autoscale = null;
+    /** Highest pressures of a part of the recording, in place of those of the frame. @type {import("./wire.js").PeakMap | null} */
+    this.peaks = null;
+    /** The newest answer to who asked for them. @type {import("./wire.js").PeakMap | null} */
+    this.answeredPeaks = null;
     /** @type {import("./wire.js").Event[]} */
     this.events = [];
     this.eventsLost = 0;
@@ -126,6 +130,7 @@ export class Model extends Observed {
     this.selfContacts = noSelfContacts();
     this.frame = null;
     this.boards = [];
+    this.peaks = null;
     this.ended = null;
     this.timeline = noTimeline();
     if (!sameRun) this.forgetEvents();
@@ -305,6 +310,12 @@ export class Model extends Observed {
         return;
     }
     this.tell(message.type);
+  }
+
+  /** @param {import("./wire.js").PeakMap | null} peaks that are shown, or the frame's pressures again */
+  showPeaks(peaks) {
+    this.peaks = peaks;
+    this.tell("scale");
   }
 
   /** @param {import("./wire.js").History} history */

@@ -93,7 +93,7 @@ export class Marks {
     if (at.depth <= 0) return;
     const facing = dot(normal, subtract(camera.eye, point)) > 0;
     if (facing) {
-      this.trail(context, [...trail, { ago: 0, point }], colour);
+      this.trail(context, trail, colour);
       if (halfAxes) {
         const [along, across] = halfAxes;
         const round = Array.from({ length: 49 }, (_, i) => {

@@ -24,12 +24,12 @@ export class Photo {
   }
 
   /**
-   * The picture with all that lies over it, at the size of the stage or twice that.
+   * The picture with all that lies over it.
    * @param {HTMLCanvasElement} picture
+   * @param {number} [ratio] of its size to that of the stage
    */
-  compose(picture) {
+  compose(picture, ratio = Math.min(2, window.devicePixelRatio || 1)) {
     const { camera } = this.view;
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [Math.round(camera.width * ratio), Math.round(camera.height * ratio)];
     const context = canvas.getContext("2d");
@@ -68,18 +68,23 @@ export class Photo {
     context.textAlign = "left";
     context.textBaseline = "bottom";
     const moment = model.welcome?.time && model.frame ? ` · ${seconds(model.frame.t)}` : "";
-    context.fillText(`${model.welcome?.body ?? ""}${moment}`, left, top - 5);
+    const { peaks } = model;
+    const part = peaks ? ` · highest from ${seconds(peaks.from)} to ${seconds(peaks.to)}` : "";
+    context.fillText(`${model.welcome?.body ?? ""}${peaks ? part : moment}`, left, top - 5);
   }
 }
+
+/** What a file of the moment that is shown is called. @param {import("./model.js").Model} model */
+const momentOf = (model) => (model.welcome?.time && model.frame ? `-${model.frame.t.toFixed(2)}s` : "");
 
 /**
  * Such as `hand-2.90s.png`.
  * @param {import("./model.js").Model} model
  * @param {string} end
+ * @param {string} moment
  */
-export function fileName(model, end) {
+export function fileName(model, end, moment = momentOf(model)) {
   const body = (model.welcome?.body ?? "body").split("/").pop() ?? "body";
   const stem = body.replace(/\.[a-z]+$/i, "").replace(/[^\w.-]+/g, "_") || "body";
-  const moment = model.welcome?.time && model.frame ? `-${model.frame.t.toFixed(2)}s` : "";
   return `${stem}${moment}${end}`;
 }

@@ -12,7 +12,8 @@ const ARROW_S = 0.2;
 const ELLIPSE_SIGMAS = 2;
 
 /**
- * What marks a touch, in the world: its place and normal, the half axes of its ellipse, its motion in `ARROW_S`, and its trail.
+ * What marks a touch, in the world: its best known place and normal, the half axes of its ellipse, its motion in `ARROW_S`, and the
+ * trail of its position.
  * @param {Model} model
  * @param {import("./wire.js").Touch} touch
  */
@@ -20,7 +21,8 @@ export function touchInWorld(model, touch) {
   const { rows } = model;
   const turned = (/** @type {number[]} */ direction) =>
     direction.some(Number.isNaN) ? null : toWorld(rows, touch.frame, direction, 0);
-  const point = toWorld(rows, touch.frame, touch.position, 1);
+  const position = toWorld(rows, touch.frame, touch.position, 1);
+  const point = touch.place.some(Number.isNaN) ? position : toWorld(rows, touch.frame, touch.place, 1);
   const normal = toWorld(rows, touch.frame, touch.normal, 0);
   const axis = turned(touch.axis);
   const [along, across] = touch.spread.map((sigma) => ELLIPSE_SIGMAS * sigma);
@@ -33,7 +35,10 @@ export function touchInWorld(model, touch) {
         ? [scale(axis, along), scale(unit(cross(normal, axis)), Math.max(across, 0.05 * along))]
         : null,
     motion: velocity && scale(velocity, ARROW_S),
-    trail: touch.trail.map(({ ago, frame, position }) => ({ ago, point: toWorld(rows, frame, position, 1) })),
+    trail: [
+      ...touch.trail.map(({ ago, frame, position }) => ({ ago, point: toWorld(rows, frame, position, 1) })),
+      { ago: 0, point: position },
+    ],
   };
 }
 

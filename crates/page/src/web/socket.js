@@ -3,7 +3,7 @@
 import { withoutToken } from "./fragment.js";
 import { Hold } from "./hold.js";
 import { Tokens } from "./tokens.js";
-import { decodeFrame, decodeHistory, decodeMesh, kindOf, say } from "./wire.js";
+import { decodeFrame, decodeHistory, decodeMesh, decodePeaks, kindOf, say } from "./wire.js";
 
 const TOKEN = "somatic token";
 const RETRY_MIN_MS = 250;
@@ -169,6 +169,10 @@ export class Connection {
       }
       case 3:
         model.setHistory(decodeHistory(buffer));
+        break;
+      case 4:
+        model.answeredPeaks = decodePeaks(buffer);
+        model.tell("peaks");
         break;
     }
   }

@@ -159,7 +159,8 @@ void main() {
 }`;
 
 /** States that the plain program draws. */
-const PLAIN_STATES = [0, REST, NOT_SENT];
+const GOOD = HEALTH.indexOf("good");
+const PLAIN_STATES = [GOOD, REST, NOT_SENT];
 const MISSING = HEALTH.indexOf("missing");
 const FAULTY = HEALTH.indexOf("faulty");
 const LEFT_OUT = HEALTH.indexOf("left out");
@@ -191,6 +192,17 @@ export function fillColours(pressure, health, max, colours, rest, out, unsent = 
     if (known && state === 0) out[4 * i + 3] = p > 0 ? 0 : REST;
     else out[4 * i + 3] = known || SAID_ALONE.includes(state) ? state : MISSING;
   }
+}
+
+/**
+ * What taxels are coloured by: pressures and states of the frame, or the highest pressures of a part of the recording, which say
+ * nothing of states.
+ * @param {import("./model.js").Model} model
+ */
+function shownOf({ peaks, pressure, health }) {
+  if (!peaks) return { pressure, health };
+  const states = health.map((state, taxel) => (Number.isNaN(peaks.peaks[taxel]) ? state : GOOD));
+  return { pressure: peaks.peaks, health: states };
 }
 
 /**
@@ -262,7 +274,8 @@ export class Taxels {
   update(model, theme, rectOf, limits) {
     if (!model.welcome || model.pressure.length !== this.count) return [];
     [this.fill, this.before] = [this.before, this.fill];
-    const { pressure, health, scaleMax, welcome } = model;
+    const { scaleMax, welcome } = model;
+    const { pressure, health } = shownOf(model);
     const bare = theme.albedo.map((part) => Math.round(255 * BARE_SHADE * part));
     const unsent = (/** @type {number} */ taxel) => model.colourAtRest(taxel) ?? bare;
     fillColours(pressure, health, scaleMax, welcome.colours, theme.rest, this.fill, unsent);

@@ -140,9 +140,15 @@ export class TouchPanel {
     const told = (/** @type {number[]} */ value, /** @type {string} */ unit) =>
       value.some(Number.isNaN) ? ABSENT : vectorWithUnit(value, unit, quantity);
     const from = touch.frame === NO_LINK ? (model.welcome?.origin ?? [0, 0, 0]) : [0, 0, 0];
-    const place = touch.position.map((x, i) => x + from[i]);
+    const where = (/** @type {number[]} */ place) =>
+      `${told(
+        place.map((x, i) => x + from[i]),
+        "m",
+      )} in ${this.linkName(touch.frame)}`;
     const rows = [
-      ["position", `${told(place, "m")} in ${this.linkName(touch.frame)}`],
+      ...(touch.place.some(Number.isNaN) ? [] : [["place", where(touch.place)]]),
+      ...(touch.placeSigma.some(Number.isNaN) ? [] : [["σ of the place", told(touch.placeSigma, "m")]]),
+      ["position", where(touch.position)],
       ["normal", direction(touch.normal)],
       ["axis", direction(touch.axis)],
       ["spread", told(touch.spread, "m")],

@@ -86,12 +86,13 @@ export class View {
   }
 
   /**
-   * Draws everything once more, as fine as it can be, and hands over the canvas while it holds that.
+   * Draws once more, as fine as it can be, and hands over the canvas while it holds that.
    * @param {(canvas: HTMLCanvasElement) => void} take
+   * @param {boolean} [isAnew] whether the body is drawn too, also where it looks as before
    */
-  keep(take) {
+  keep(take, isAnew = true) {
     this.kept = take;
-    this.drawn = { motion: "", look: "" };
+    if (isAnew || !this.refined) this.drawn = { motion: "", look: "" };
     this.request();
   }
 
@@ -132,9 +133,14 @@ export class View {
       this.refined = false;
       this.movedAt = begun;
       const part = (this.part = moved ? this.detail : 1);
-      const target = this.target("body", Math.ceil(width * part), Math.ceil(height * part));
-      parts.body.draw(target, camera, parts.poses, theme, how);
-      setTimeout(() => this.request(), REFINE_AFTER_MS + 20);
+      if (this.kept) {
+        this.refined = true;
+        this.refine(width, height, theme, how);
+      } else {
+        const target = this.target("body", Math.ceil(width * part), Math.ceil(height * part));
+        parts.body.draw(target, camera, parts.poses, theme, how);
+        setTimeout(() => this.request(), REFINE_AFTER_MS + 20);
+      }
     } else if (!this.refined && begun - this.movedAt > REFINE_AFTER_MS) {
       this.refined = whole = true;
       this.part = 1;
@@ -154,7 +160,7 @@ export class View {
         addRect(rects, rect, limits.rects);
     this.taxelsChanged = this.ringsChanged = false;
     if (whole) rects = [{ x0: 0, y0: 0, x1: size.width, y1: size.height }];
-    if (!rects.length && !resized) {
+    if (!rects.length && !resized && !this.kept) {
       // Nothing looks different: what is on the screen shows this frame.
       finish();
       return;

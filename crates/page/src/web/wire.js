@@ -3,7 +3,7 @@
  * Nothing here touches the document, so it runs under node too.
  */
 
-export const VERSION = 3;
+export const VERSION = 4;
 /** Index of "no link": the world. */
 export const NO_LINK = 0xffffffff;
 /** Bit of a percept's `present`: its position is in the world, not in the frame of a link. */
@@ -44,7 +44,7 @@ export const HEALTH = [
  * @typedef {{ago: number, frame: number, position: number[]}} TrailPoint
  * @typedef {{id: number, link: number, frame: number, flags: number, active: number, age: number, total: number, force: number,
  *   peak: number, anisotropy: number, position: number[], normal: number[], axis: number[], spread: number[],
- *   velocity: number[], taxels: Uint32Array, links: Share[], fields: Share[], trail: TrailPoint[]}} Touch
+ *   velocity: number[], place: number[], placeSigma: number[], taxels: Uint32Array, links: Share[], fields: Share[], trail: TrailPoint[]}} Touch
  * @typedef {{link: number, touch: number, total: number}} SelfContactSide
  * @typedef {{identity: number, sides: [SelfContactSide, SelfContactSide], position: [number, number, number], distance: number,
  *   angle: number}} SelfContact
@@ -54,6 +54,7 @@ export const HEALTH = [
  *   engineMicroseconds: number, pressure: Float32Array | null, health: Uint8Array | null, pose: Float32Array | null,
  *   percepts: Percepts | null, touches: Touch[] | null, selfContacts: SelfContacts | null, samples: Samples | null}} Frame
  * @typedef {{id: number, from: number, to: number, bins: number, least: Float32Array[], most: Float32Array[]}} History
+ * @typedef {{id: number, from: number, to: number, peaks: Float32Array}} PeakMap
  * @typedef {{field: number, column: string, component: number}} Series
  * @typedef {{seq: number, t_s: number, kind: string, field: number | null, touch: number | null, link: number | null,
  *   text: string}} Event
@@ -235,7 +236,7 @@ export function decodeFrame(buffer, scene) {
  */
 function touch(from) {
   const [id, link, frame, flags, active, taxels, links, fields, points] = from.u32(9);
-  const values = from.f32(19);
+  const values = from.f32(24);
   const [age, total, force, peak, anisotropy] = values;
   const part = (/** @type {number} */ at, /** @type {number} */ count) => [
     ...values.subarray(at, at + count),
@@ -258,6 +259,8 @@ function touch(from) {
     axis: part(11, 3),
     spread: part(14, 2),
     velocity: part(16, 3),
+    place: part(19, 3),
+    placeSigma: part(22, 2),
     taxels: from.u32(taxels),
     links: Array.from({ length: links }, share),
     fields: Array.from({ length: fields }, share),
@@ -306,6 +309,16 @@ export function decodeHistory(buffer) {
   return history;
 }
 
+/**
+ * @param {ArrayBuffer} buffer
+ * @returns {PeakMap}
+ */
+export function decodePeaks(buffer) {
+  const view = new DataView(buffer);
+  const [id, from, to] = [view.getUint32(4, true), view.getFloat64(8, true), view.getFloat64(16, true)];
+  return { id, from, to, peaks: new Float32Array(buffer, 24) };
+}
+
 /** Outgoing messages. */
 export const say = {
   /**
@@ -325,6 +338,8 @@ export const say = {
   seek: (t_s) => JSON.stringify({ type: "seek", t_s }),
   /** @param {number} frames */
   step: (frames) => JSON.stringify({ type: "step", frames }),
+  /** @param {number} frame */
+  show: (frame) => JSON.stringify({ type: "show", frame }),
   /** @param {number} speed */
   speed: (speed) => JSON.stringify({ type: "speed", speed }),
   /** @param {number | null} taxel */
@@ -340,4 +355,10 @@ export const say = {
    */
   history: (id, from_s, to_s, bins, series) =>
     JSON.stringify({ type: "history", id, from_s, to_s, bins, series }),
+  /**
+   * @param {number} id
+   * @param {number} from_s
+   * @param {number} to_s
+   */
+  peaks: (id, from_s, to_s) => JSON.stringify({ type: "peaks", id, from_s, to_s }),
 };
