@@ -8,7 +8,7 @@ const MAX_POINTS: usize = 8192;
 pub(super) struct Path {
     pub(super) runs: Vec<Vec<(f64, f64)>>,
     points: usize,
-    /// Every so many points are kept.
+    /// One point in this many is kept.
     step: usize,
     seen: usize,
     in_contact: bool,

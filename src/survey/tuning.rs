@@ -161,9 +161,9 @@ pub struct Sensor {
     /// What it read last, and at which wiper position.
     looked: Option<(u8, Look)>,
     settable: bool,
-    /// Up to so many raw units a way may be noise.
+    /// A way of at most this, raw units, may be noise.
     noise: f64,
-    /// Up to so many raw units a way is not a press.
+    /// A way of at most this, raw units, is not a press.
     clear: f64,
     seen: Pressed,
     tuned: Tuned,

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 
 use super::{AtRest, Survey, several};
 
-/// Where fewer than one in so many sensors fall, and stay there, that is not a press.
+/// Sensors that fall and stay there are a press if at least one in this many does.
 const FEW: usize = 4;
 
 impl Survey {

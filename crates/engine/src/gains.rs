@@ -28,7 +28,7 @@ use crate::error::{Error, Result, failed};
 use crate::percept::{self, Outputs, TouchFlags, TouchFrame, TouchOutputs};
 use crate::scene::{Around, Knobs, Scene};
 use crate::signal::{Calibration, Frame, Letter, RawValue};
-use crate::stage::fit::{Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
+use crate::stage::fit::{Explained, Layer, STEPS, Taxel, Touch, USUAL_WIDTH};
 use crate::touch;
 
 /// Gains are taken to differ by about this share.
@@ -39,7 +39,7 @@ const MODEL: f64 = 0.1;
 const ROUNDS: usize = 20;
 /// Rounds after which the width is no longer changed.
 const WIDTH_ROUNDS: usize = 8;
-/// At most about so many touches are kept, evenly over the recording.
+/// Touches that are kept at most, about, evenly over the recording.
 const MOST: usize = 6000;
 /// A taxel counts where it feels at least this share of the touch's largest pressure: below, the model is more wrong than gains.
 const LEAST_SHARE: f64 = 0.1;
@@ -120,7 +120,7 @@ pub struct GainsSurvey {
     /// Index in a frame by node of the skin, where the frame has the taxel.
     value_of: Vec<Option<usize>>,
     touches: Vec<Observed>,
-    /// Every so many touches one is kept.
+    /// One touch in this many is kept.
     stride: usize,
     seen: usize,
 }
@@ -256,6 +256,57 @@ fn connected(touches: &[Observed], taxels: usize) -> Vec<Vec<usize>> {
     parts
 }
 
+/// What the fits of one round say of gains.
+struct Round {
+    /// By taxel, in how many touches it says something.
+    pressed: Vec<u32>,
+    /// By taxel, the weights of these, and the sums of weighted logarithms by which its gain is off.
+    weights: Vec<f64>,
+    sums: Vec<f64>,
+    /// Of each touch that is explained.
+    widths_m: Vec<f64>,
+    /// Sums over taxels of touches: squares of logarithms that are off, squares of noise, and how many.
+    squares: f64,
+    of_noise: f64,
+    counted: f64,
+}
+
+impl Round {
+    /// Of `touches`, which are `explained` under the logarithms `gains`.
+    fn of(touches: &[Observed], explained: Vec<Option<Explained>>, gains: &[f64]) -> Self {
+        let zeros = || vec![0.0; gains.len()];
+        let mut round = Self {
+            pressed: vec![0; gains.len()],
+            weights: zeros(),
+            sums: zeros(),
+            widths_m: Vec::new(),
+            squares: 0.0,
+            of_noise: 0.0,
+            counted: 0.0,
+        };
+        for (observed, explained) in touches.iter().zip(explained) {
+            let Some(explained) = explained else { continue };
+            round.widths_m.push(explained.width_m);
+            let most = explained.felt.iter().copied().fold(0.0, f64::max);
+            for (&(index, taxel), felt) in observed.taxels.iter().zip(&explained.felt) {
+                if taxel.pressure <= 0.0 || *felt < LEAST_SHARE * most {
+                    continue;
+                }
+                let off = (taxel.pressure / gains[index].exp() / felt).ln();
+                let noise = taxel.sigma.unwrap_or(0.0) / taxel.pressure;
+                let weight = 1.0 / (noise * noise + MODEL * MODEL) * (2.0 * MODEL / off.abs()).min(1.0);
+                round.weights[index] += weight;
+                round.sums[index] += weight * off;
+                round.squares += off * off;
+                round.of_noise += noise * noise;
+                round.counted += 1.0;
+                round.pressed[index] += 1;
+            }
+        }
+        round
+    }
+}
+
 /// What `touches` of taxels at `spots` tell, fitted as the kind that explains each best, or all of them that can be as blobs; and the
 /// mean square of what is left of the shares and is not noise.
 fn estimate(
@@ -282,30 +333,9 @@ fn estimate(
     for round in 0..ROUNDS {
         let fitted: Vec<Touch> = touches.iter().map(|touch| touch.under(&gains, sigma_m)).collect();
         let explained = fit_each(&fitted.iter().collect::<Vec<_>>(), |touch, fits| touch.explained(fits?, as_blobs));
-        let (mut weights, mut sums) = (vec![0.0; taxels], vec![0.0; taxels]);
-        let (mut widths, mut squares, mut of_noise, mut counted) = (Vec::new(), 0.0, 0.0, 0.0);
-        pressed.fill(0);
-        used = 0;
-        for (observed, explained) in touches.iter().zip(explained) {
-            let Some(explained) = explained else { continue };
-            used += 1;
-            widths.push(explained.width_m);
-            let most = explained.felt.iter().copied().fold(0.0, f64::max);
-            for (&(index, taxel), felt) in observed.taxels.iter().zip(&explained.felt) {
-                if taxel.pressure <= 0.0 || *felt < LEAST_SHARE * most {
-                    continue;
-                }
-                let off = (taxel.pressure / gains[index].exp() / felt).ln();
-                let noise = taxel.sigma.unwrap_or(0.0) / taxel.pressure;
-                let weight = 1.0 / (noise * noise + MODEL * MODEL) * (2.0 * MODEL / off.abs()).min(1.0);
-                weights[index] += weight;
-                sums[index] += weight * off;
-                squares += off * off;
-                of_noise += noise * noise;
-                counted += 1.0;
-                pressed[index] += 1;
-            }
-        }
+        let Round { pressed: counts, weights, sums, mut widths_m, squares, of_noise, counted } =
+            Round::of(touches, explained, &gains);
+        (pressed, used) = (counts, widths_m.len());
         if used < LEAST {
             return Err(failed!("{LEAST} touches must be explained as contacts, and {used} can be"));
         }
@@ -325,8 +355,8 @@ fn estimate(
         let others = known().count().saturating_sub(taken_off).max(1) as f64;
         unknowable =
             known().map(|gain| gain * gain).sum::<f64>() / others * (taken_off as f64 / (others + taken_off as f64));
-        widths.sort_by(f64::total_cmp);
-        width_m = widths[widths.len() / 2];
+        widths_m.sort_by(f64::total_cmp);
+        width_m = widths_m[widths_m.len() / 2];
         if round < WIDTH_ROUNDS {
             sigma_m = width_m / USUAL_WIDTH;
         }
@@ -340,7 +370,8 @@ fn estimate(
     Ok((GainsEstimate { gains, pressed, width_m, sigma_m, left, gain_spread, touches: used }, unexplained))
 }
 
-/// Takes off the logarithms of `gains` of the taxels `known`, which are at `spots`, what touches cannot tell: so many shapes.
+/// Takes off the logarithms of `gains` of the taxels `known`, which are at `spots`, what touches cannot tell. Returns how many shapes
+/// that was.
 fn take_off(gains: &mut [f64], spots: &[Spot], known: &[usize]) -> usize {
     let count = known.len();
     let mean =

@@ -179,7 +179,7 @@ impl Shape {
         frames.iter_mut().for_each(|frame| frame.t_s += self.frames as f64 * STEP_S);
     }
 
-    /// An engine on `body`, which is [`Shape::body`], for calls of so many frames.
+    /// An engine on `body`, which is [`Shape::body`], for calls of the shape's number of frames.
     pub fn engine(&self, body: &Body, backend: BackendKind, outputs: Outputs) -> Result<Engine> {
         // Its frames repeat, and what repeats is not to be left out of a measurement.
         let scene = Scene::default().outputs(outputs).knobs(Knobs::default().coverage(Coverage::All));

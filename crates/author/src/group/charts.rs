@@ -42,6 +42,15 @@ type Fitted = std::result::Result<FieldSpec, NoChart>;
 /// it is whole.
 type PartsOnLeft = BTreeMap<Vec<usize>, Vec<Vec<usize>>>;
 
+/// Fields that have been through it, so far.
+struct Charted {
+    fields: Vec<FieldSpec>,
+    notes: ChartNotes,
+    parts_on_left: PartsOnLeft,
+    /// The body whose fields have plane charts alone; see [`Grouper::bare`].
+    bare: Body,
+}
+
 impl Grouper<'_> {
     /// Computes all charts.
     ///
@@ -56,20 +65,21 @@ impl Grouper<'_> {
     pub(crate) fn finish_while(mut self, progress: Progress<'_>) -> Result<Grouping, (usize, Error)> {
         let specs: Vec<FieldSpec> = self.made.iter().map(|made| made.spec.clone()).collect();
         let members = unions(&specs);
-        let mut bare = self.bare(&specs);
+        let bare = self.bare(&specs);
         let planes: Vec<_> =
             FieldSet::new(&bare).map_err(|e| (0, e))?.fields.into_iter().map(|field| field.chart).collect();
         let parents: BTreeSet<&str> = specs.iter().filter_map(|spec| spec.parent.as_deref()).collect();
-        let has_children = |name: &str| parents.contains(name);
-        let mut fields = Vec::with_capacity(specs.len());
-        let mut notes = ChartNotes::default();
+        let mut charted = Charted {
+            fields: Vec::with_capacity(specs.len()),
+            notes: ChartNotes::default(),
+            parts_on_left: PartsOnLeft::new(),
+            bare,
+        };
         let made = std::mem::take(&mut self.made);
         let count = made.len();
         let (mut pool, mut bounded) = (MAX_WINDOWS - 1, 0);
-        let mut parts_on_left = PartsOnLeft::new();
         for (index, ((made, plane), ids)) in made.into_iter().zip(planes).zip(members).enumerate() {
             report_progress(progress, index as f64 / count as f64).map_err(|e| (made.rule, e))?;
-            let name = made.spec.name.clone();
             // What a field leaves, the next ones may use.
             if let Some(left) = *self.unroller.windows_left() {
                 bounded += usize::from(left == 0);
@@ -78,69 +88,83 @@ impl Grouper<'_> {
             pool = (pool + WINDOWS_OF_FIELD).min(MAX_WINDOWS - 1);
             *self.unroller.windows_left() = (made.chart != ChartWish::Geodesic).then_some(pool);
             let whole = made.spec.clone().with_members(ids);
-            let none = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
-            // A field that could have a plane chart by default must state that it has none.
-            let uncharted = FieldSpec { chart: plane.is_ok().then_some(none), ..made.spec.clone() };
-            let on_left = self.on_left(&whole);
-            let image_parts = on_left.as_ref().and_then(|taxels| parts_on_left.get(taxels));
-            if let Some(parts) = image_parts.filter(|parts| !parts.is_empty()) {
-                let parts = self.parts_like(&made, &whole, &mut bare, parts);
-                notes.split.push((name, parts.len(), "its mirror image is".to_owned()));
-                fields.push(uncharted);
-                fields.extend(parts);
-                continue;
-            }
-            let image_is_whole = image_parts.is_some();
-            let why = match self.fit(&made, &whole, plane.clone()) {
-                Ok(spec) => {
-                    parts_on_left.extend(on_left.map(|taxels| (taxels, Vec::new())));
-                    // With a plane chart, a parent needs no members of its own.
-                    let unrolled = spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
-                    fields.push(if unrolled { spec } else { FieldSpec { chart: spec.chart, ..made.spec } });
-                    continue;
-                }
-                Err(why) => why,
-            };
-            let parent = has_children(&name);
-            match made.wrap {
-                Wrap::Refuse => {
-                    let parts = if parent { None } else { self.split(&made, &whole, &mut bare, MAX_PROPOSED_PARTS) };
-                    let advice = chart_notes::advice(&why, parts.map(|parts| parts.len()), parent, MAX_PROPOSED_PARTS);
-                    let why = chart_notes::plain(&why);
-                    let what = format!("field `{name}` cannot have the chart it asks for: {why}{advice}");
-                    return Err((made.rule, Error::failed(what)));
-                }
-                Wrap::Split if !parent && !image_is_whole => {
-                    fields.push(uncharted);
-                    match self.split(&made, &whole, &mut bare, MAX_PARTS) {
-                        Some(parts) => {
-                            let why = chart_notes::plain(&why);
-                            let of_left = parts.iter().filter_map(|part| self.on_left(part)).collect();
-                            parts_on_left.extend(on_left.map(|taxels| (taxels, of_left)));
-                            notes.split.push((name, parts.len(), why));
-                            fields.extend(parts);
-                        }
-                        None => self.notes.push(format!(
-                            "field `{name}` has no chart: {}; no {MAX_PARTS} parts or fewer have one: choose fewer \
-                             taxels",
-                            chart_notes::plain(&why)
-                        )),
-                    }
-                }
-                _ => {
-                    // A parent without a requested chart is not reported.
-                    if !parent || made.chart != ChartWish::Auto {
-                        notes.bare.push((name, why, parent));
-                    }
-                    fields.push(uncharted);
-                }
-            }
+            let is_parent = parents.contains(made.spec.name.as_str());
+            self.chart(made, &whole, plane, is_parent, &mut charted)?;
         }
         bounded += usize::from(*self.unroller.windows_left() == Some(0));
         self.notes.extend((bounded > 0).then(|| chart_notes::bounded(bounded)));
-        notes.poor = std::mem::take(&mut self.poor);
-        self.notes.extend(notes.lines());
-        Ok(Grouping { fields, notes: self.notes })
+        charted.notes.poor = std::mem::take(&mut self.poor);
+        self.notes.extend(charted.notes.lines());
+        Ok(Grouping { fields: charted.fields, notes: self.notes })
+    }
+
+    /// Adds field `made` to `charted`, with its chart or in parts with theirs. With all its members it is `whole`, and in the plane it
+    /// has chart `plane`.
+    fn chart(
+        &mut self,
+        made: FieldDraft,
+        whole: &FieldSpec,
+        plane: std::result::Result<Chart, NoChart>,
+        is_parent: bool,
+        charted: &mut Charted,
+    ) -> Result<(), (usize, Error)> {
+        let Charted { fields, notes, parts_on_left, bare } = charted;
+        let name = made.spec.name.clone();
+        let none = ChartSpec { kind: ChartKind::None, origin_in_anchor: None, u_in_anchor: None };
+        // A field that could have a plane chart by default must state that it has none.
+        let uncharted = FieldSpec { chart: plane.is_ok().then_some(none), ..made.spec.clone() };
+        let on_left = self.on_left(whole);
+        let image_parts = on_left.as_ref().and_then(|taxels| parts_on_left.get(taxels));
+        if let Some(parts) = image_parts.filter(|parts| !parts.is_empty()) {
+            let parts = self.parts_like(&made, whole, bare, parts);
+            notes.split.push((name, parts.len(), "its mirror image is".to_owned()));
+            fields.push(uncharted);
+            fields.extend(parts);
+            return Ok(());
+        }
+        let image_is_whole = image_parts.is_some();
+        let why = match self.fit(&made, whole, plane) {
+            Ok(spec) => {
+                parts_on_left.extend(on_left.map(|taxels| (taxels, Vec::new())));
+                // With a plane chart, a parent needs no members of its own.
+                let unrolled = spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
+                fields.push(if unrolled { spec } else { FieldSpec { chart: spec.chart, ..made.spec } });
+                return Ok(());
+            }
+            Err(why) => why,
+        };
+        match made.wrap {
+            Wrap::Refuse => {
+                let parts = if is_parent { None } else { self.split(&made, whole, bare, MAX_PROPOSED_PARTS) };
+                let advice = chart_notes::advice(&why, parts.map(|parts| parts.len()), is_parent, MAX_PROPOSED_PARTS);
+                let why = chart_notes::plain(&why);
+                let what = format!("field `{name}` cannot have the chart it asks for: {why}{advice}");
+                return Err((made.rule, Error::failed(what)));
+            }
+            Wrap::Split if !is_parent && !image_is_whole => {
+                fields.push(uncharted);
+                match self.split(&made, whole, bare, MAX_PARTS) {
+                    Some(parts) => {
+                        let of_left = parts.iter().filter_map(|part| self.on_left(part)).collect();
+                        parts_on_left.extend(on_left.map(|taxels| (taxels, of_left)));
+                        notes.split.push((name, parts.len(), chart_notes::plain(&why)));
+                        fields.extend(parts);
+                    }
+                    None => self.notes.push(format!(
+                        "field `{name}` has no chart: {}; no {MAX_PARTS} parts or fewer have one: choose fewer taxels",
+                        chart_notes::plain(&why)
+                    )),
+                }
+            }
+            _ => {
+                // A parent without a requested chart is not reported.
+                if !is_parent || made.chart != ChartWish::Auto {
+                    notes.bare.push((name, why, is_parent));
+                }
+                fields.push(uncharted);
+            }
+        }
+        Ok(())
     }
 
     /// The body with fields `specs`, each with a plane chart, and without a surface: only the origin of a plane chart depends on that,

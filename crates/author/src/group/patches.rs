@@ -26,7 +26,7 @@ impl Seeding {
 
     /// Adds the farthest taxel as a seed; on a surface part without seeds, one at its rim.
     ///
-    /// The seed is a taxel whose distance is over 0, if any is, and becomes 0: so many taxels, so many seeds at most.
+    /// The seed is a taxel whose distance is over 0, if any is, and becomes 0: there are never more seeds than taxels.
     fn add(&mut self, distances: &mut LinkDistances) {
         let (mut seed, limit_m) = self.farthest();
         let is_first = limit_m == f64::INFINITY;

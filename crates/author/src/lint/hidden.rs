@@ -22,14 +22,14 @@ const MAX_CHECKED: usize = 10_000;
 /// A start is inside a surface if the mean over the rays of ways out less ways in is over this.
 const INSIDE: f64 = 0.5;
 
-/// Every so many directions for whether a taxel is inside another link.
+/// One direction in this many is tried for whether a taxel is inside another link.
 const COARSE: usize = 8;
 
 /// Taxels that a thread takes at a time, and how often it does between two reports of progress.
 const PER_TASK: usize = 16;
 const TASKS_PER_THREAD: usize = 4;
 
-/// Links run into each other at rest if this share of one's taxels is inside the other, and at least so many.
+/// Links run into each other at rest if this share of one's taxels is inside the other, and at least this number.
 const RUNS_INTO_SHARE: f64 = 0.05;
 const RUNS_INTO_TAXELS: usize = 3;
 

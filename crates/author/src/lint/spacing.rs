@@ -25,7 +25,8 @@ const CROWDED_SHARE: f64 = 0.2 * (1.0 + 1e-3);
 /// A taxel is isolated if its nearest neighbour is over this many times what is usual in its region away.
 const ISOLATED_RATIO: f64 = 5.0;
 
-/// It is not if so many others, within so many times that distance, are over half as far from their nearest: a coarse part begins there.
+/// It is not if at least `AS_FAR` others within `AS_FAR_WITHIN` times that distance are over `AS_FAR_SHARE` as far from their nearest:
+/// a coarse part begins there.
 const AS_FAR: usize = 3;
 const AS_FAR_WITHIN: f64 = 3.0;
 const AS_FAR_SHARE: f64 = 0.5;

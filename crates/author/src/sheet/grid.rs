@@ -32,7 +32,7 @@ pub struct SheetGrid {
     pub first_id: u32,
     /// Whether each cell is there, row by row; `None` for all.
     pub present: Option<Vec<bool>>,
-    /// Fields of regions: so many from top to bottom, and from left to right.
+    /// Fields of regions: how many from top to bottom, and from left to right.
     pub regions: Option<[u32; 2]>,
 }
 

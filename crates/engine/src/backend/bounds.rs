@@ -18,11 +18,11 @@ use crate::stage::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CellBound {
     pub(crate) in_doubt: Flags,
-    /// By output, as its bit counts; of vectors as distances.
+    /// One for each output, at the number of its bit; for vectors the limit of a distance.
     pub(super) limits: [Limit; Outputs::all().bits().ilog2() as usize + 1],
     /// Per coordinate, m.
     pub(crate) centroid: Limit<[f64; 2]>,
-    /// What the other may remember otherwise from now on.
+    /// What of the state that the backend keeps may differ from the reference's from now on.
     pub(crate) may_remember: MayRemember,
 }
 

@@ -92,7 +92,7 @@ mod tests {
     use crate::scene::Scene;
     use crate::signal::{Calibration, Letter, RawValue, Receptor};
 
-    /// The CPU, until it is lost after so many calls.
+    /// The CPU, until it is lost after `calls` calls.
     struct Lost {
         cpu: cpu::Cpu,
         calls: usize,

@@ -150,7 +150,7 @@ pub(crate) enum Rows<'a> {
 pub(crate) enum Delivered<'a> {
     /// Each frame has its own.
     Frames(&'a [Frame]),
-    /// In one slice, frame by frame, so many a frame.
+    /// In one slice, frame by frame, `width` values each.
     Flat { values: &'a [RawValue], width: usize },
 }
 

@@ -175,28 +175,9 @@ impl Beside<'_> {
             let torque = Some(bound.share * right.torques_newton_m);
             self.place("touches.wrench", wrench.torque_newton_m, right.torque_newton_m, torque);
         }
-        let known = |off: f64| (!right.base_in_doubt && off.is_finite()).then_some(off);
         let is_oriented = touches.options().outputs.contains(TouchOutputs::ORIENTATION);
-        let doubts = [
-            (!is_oriented, TouchFlags::TIE | TouchFlags::COINCIDENT),
-            (!is_certain, TouchFlags::MERGED | TouchFlags::YOUNG),
-            (bound.tie_in_doubt, TouchFlags::TIE | TouchFlags::COINCIDENT),
-            (bound.isotropic_in_doubt, TouchFlags::ISOTROPIC),
-            (
-                right.base_in_doubt,
-                TouchFlags::WRAPPED | TouchFlags::TIE | TouchFlags::COINCIDENT | TouchFlags::ISOTROPIC,
-            ),
-        ];
-        let in_doubt = doubts.into_iter().filter(|(is_so, _)| *is_so).fold(NOT_COMPARED, |all, (_, flags)| all | flags);
-        if (found.flags ^ right.flags).intersects(in_doubt.complement()) {
-            let names = |flags: TouchFlags| (flags - in_doubt).names().collect::<Vec<_>>().join(" ");
-            self.fails(
-                "touches.flags",
-                format!("touch {} has flags [{}], not [{}]", right.id, names(found.flags), names(right.flags)),
-            );
-        } else {
-            self.agrees("touches.flags");
-        }
+        self.flags(right, found.flags, is_certain, is_oriented);
+        let known = |off: f64| (!right.base_in_doubt && off.is_finite()).then_some(off);
         self.number("touches.anisotropy", found.anisotropy, right.anisotropy, known(bound.anisotropy));
         let spread = |spread: Option<[f64; 2]>, k: usize| spread.map(|spread| spread[k]);
         for k in 0..2 {
@@ -213,6 +194,30 @@ impl Beside<'_> {
         let orientation = bound.orientation_rad.filter(|_| !bound.tie_in_doubt).and_then(known);
         if found.orientation.is_some() {
             self.line("touches.orientation", found.orientation, turned(right.orientation), orientation);
+        }
+    }
+
+    /// Compares the flags `found`, but for those that a doubt may change.
+    fn flags(&mut self, right: &RightTouch, found: TouchFlags, is_certain: bool, is_oriented: bool) {
+        let doubts = [
+            (!is_oriented, TouchFlags::TIE | TouchFlags::COINCIDENT),
+            (!is_certain, TouchFlags::MERGED | TouchFlags::YOUNG),
+            (right.bound.tie_in_doubt, TouchFlags::TIE | TouchFlags::COINCIDENT),
+            (right.bound.isotropic_in_doubt, TouchFlags::ISOTROPIC),
+            (
+                right.base_in_doubt,
+                TouchFlags::WRAPPED | TouchFlags::TIE | TouchFlags::COINCIDENT | TouchFlags::ISOTROPIC,
+            ),
+        ];
+        let in_doubt = doubts.into_iter().filter(|(is_so, _)| *is_so).fold(NOT_COMPARED, |all, (_, flags)| all | flags);
+        if (found ^ right.flags).intersects(in_doubt.complement()) {
+            let names = |flags: TouchFlags| (flags - in_doubt).names().collect::<Vec<_>>().join(" ");
+            self.fails(
+                "touches.flags",
+                format!("touch {} has flags [{}], not [{}]", right.id, names(found), names(right.flags)),
+            );
+        } else {
+            self.agrees("touches.flags");
         }
     }
 

@@ -100,7 +100,7 @@ impl Still {
         Self { least: (1e-6 * radius) as f32, rounding: (roundings * U) as f32, per_taxel: (per_taxel * U) as f32 }
     }
 
-    /// The distance, where the two frames have so many pressed taxels together.
+    /// The distance, if the two frames together have this number of pressed taxels.
     pub(crate) fn within(&self, pressed: u32) -> f64 {
         let rounding = f64::from(self.rounding) + f64::from(self.per_taxel) * f64::from(pressed);
         rounding.max(f64::from(self.least))

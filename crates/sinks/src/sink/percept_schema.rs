@@ -47,7 +47,7 @@ fn numbers_by_name(what: &str) -> Value {
     json!({"type": "object", "additionalProperties": {"type": "number"}, "description": what})
 }
 
-/// A quantity of so many numbers.
+/// A quantity of `components` numbers.
 fn quantity(unit: Unit, is_count: bool, components: usize, help: &str) -> Value {
     let kind = match unit {
         Unit::Kind => "string",

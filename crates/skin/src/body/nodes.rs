@@ -199,3 +199,13 @@ fn holds_taxels(document: &Document, node: &json::Node) -> bool {
         !primitives.is_empty() && primitives.iter().all(is_taxels)
     })
 }
+
+/// Refuses vertices that are beyond [`MAX_COORDINATE_M`] from the origin of their link.
+pub(super) fn refuse_far(mut vertices_in_links: impl Iterator<Item = DVec3>) -> Result<()> {
+    match vertices_in_links.position(|vertex| vertex.abs().max_element() > MAX_COORDINATE_M) {
+        Some(vertex) => Err(failed!(
+            "vertex {vertex} lies over {MAX_COORDINATE_M:e} m away; check the scene's units and export it again"
+        )),
+        None => Ok(()),
+    }
+}

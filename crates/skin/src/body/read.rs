@@ -11,8 +11,8 @@ use json::validation::Checked;
 use super::document::{Document, refuse_other_formats};
 use super::layout::{AREA, FieldSpec, MAX_TAXEL_ID, MODALITY, NORMAL, TAXEL_ID};
 use super::model::{Body, Home, Link, Modality, Surface, Taxel};
-use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range};
-use super::primitives::{attribute, custom, has_mode, is_taxels};
+use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range, refuse_far};
+use super::primitives::{attribute, custom, finite_positions, has_mode, is_taxels};
 use super::repair;
 use super::skin_weights::skinned_vertices;
 use super::stored_edges::StoredEdges;
@@ -218,13 +218,7 @@ fn read_meshes(
         .or_else(|| joints.as_ref()?.first().map(|(link, _)| *link))
         .ok_or_else(|| in_place(Error::failed("nothing carries it: put it under a link, or give its skin joints")))?;
     for (index, primitive) in document.root.meshes[mesh.value()].primitives.iter().enumerate() {
-        let Some(positions) = attribute(primitive, &Semantic::Positions) else { continue };
-        let positions = document.floats::<3>(positions).map_err(in_place)?;
-        if let Some(bad) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(in_place(failed!(
-                "vertex {bad} has a position that is not a finite number; repair the mesh and export it again"
-            )));
-        }
+        let Some(positions) = finite_positions(document, primitive).map_err(in_place)? else { continue };
         let heaviest = match &joints {
             Some(joints) if !joints.is_empty() => {
                 heaviest_joints(document, primitive, positions.len(), joints.len()).map_err(in_place)?
@@ -237,15 +231,9 @@ fn read_meshes(
             (Some(joints), Some(&joint)) => joints[joint],
             _ => (carrier, link_from_node),
         };
-        let far = positions.iter().enumerate().find(|&(point, p)| {
-            let position = of_point(point).1.transform_point3(DVec3::from_array(p.map(f64::from)));
-            position.abs().max_element() > MAX_COORDINATE_M
-        });
-        if let Some((vertex, _)) = far {
-            return Err(in_place(failed!(
-                "vertex {vertex} lies over {MAX_COORDINATE_M:e} m away; check the scene's units and export it again"
-            )));
-        }
+        let in_link =
+            |(point, p): (usize, &[f32; 3])| of_point(point).1.transform_point3(DVec3::from_array(p.map(f64::from)));
+        refuse_far(positions.iter().enumerate().map(in_link)).map_err(in_place)?;
         if is_taxels(primitive) {
             let taxels = read_taxels(document, primitive, &positions, of_point).map_err(in_place)?;
             let source = |(point, taxel): (usize, &Taxel)| TaxelSource {

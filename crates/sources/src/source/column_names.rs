@@ -32,7 +32,7 @@ pub(super) fn is_beside_sensors(word: &str) -> bool {
     NO_SENSORS.contains(&word.as_str())
 }
 
-/// Rows and columns in which so many sensors may stand, as `--grid` takes them: a square if they make one.
+/// Rows and columns in which this number of sensors may stand, as `--grid` takes them: a square if they make one.
 pub(super) fn grid_of(sensors: usize) -> String {
     let side = sensors.isqrt();
     if side > 1 && side * side == sensors { format!("{side}x{side}") } else { format!("1x{sensors}") }

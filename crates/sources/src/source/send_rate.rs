@@ -9,7 +9,7 @@ const MIN_MAX_AGE_S: f64 = 0.05;
 pub const DEFAULT_PERIOD_S: f64 = 0.1;
 /// What sends takes over the pace if its period is below this share of the leader's.
 pub(crate) const TAKEOVER_SHARE: f64 = 0.8;
-/// A step of so many periods is a pause, not a period.
+/// A step of this many periods is a pause, not a period.
 const PAUSE_PERIODS: f64 = 8.0;
 /// Share of a new step in the measured period.
 const STEP_SHARE: f64 = 0.1;

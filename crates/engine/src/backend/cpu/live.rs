@@ -204,8 +204,8 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    /// Fields alone and in groups, so many of these together, those of them that are stale, by as many threads as have
-    /// something to work in.
+    /// Answers the fields that are stale: wide ones one by one, narrow ones in sets of `together` groups. There are as many threads
+    /// as `own` and `others`, which they work in.
     #[inline(never)]
     fn shared(
         &self,

@@ -24,7 +24,7 @@ pub(super) struct OneFrame<'a> {
 }
 
 impl<'a> OneFrame<'a> {
-    /// Frame `frame` of `raw`, of which so many slots are calibrated.
+    /// Frame `frame` of `raw`; its first `calibrated` slots are calibrated.
     #[inline(always)]
     pub(super) fn new(raw: Rows<'a>, frame: usize, calibrated: usize) -> Self {
         let picked = match raw {
@@ -205,7 +205,7 @@ pub(crate) const FRAMES: usize = LANES;
 
 /// Where a tile's values go.
 struct ByChannel<'a> {
-    /// By channel, so many words each.
+    /// By channel, `words_a_channel` each.
     words: &'a mut [u32],
     words_a_channel: usize,
     /// The first of the frames.

@@ -130,8 +130,8 @@ impl Rest {
     }
 }
 
-/// As many fields in a stretch as have room in a window of so many tiles together, where each sixteen of all `fields` have
-/// their `needs`. At most half of a window is read at a time, so that what is read next has room in a cache beside it. None
+/// Cuts `fields` into stretches, each with as many fields as fit together into a window of `room` tiles. `needs` are the tiles of
+/// each sixteen fields. At most half of a window is read at a time, so that a cache has room for what is read next beside it. None
 /// where sixteen fields do not fit alone.
 fn cut(needs: &[Range<usize>], room: usize, fields: usize) -> Option<Vec<Stretch>> {
     let (mut stretches, mut there, mut start) = (Vec::new(), 0..0, 0);
@@ -172,7 +172,7 @@ fn around(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
     }
 }
 
-/// Makes what is needed be there, where `there` is so far, with room for so many tiles: which are to be read.
+/// Moves the window `there`, which has room for `room` tiles, so that it holds `need`. Returns the tiles to read for that.
 fn slide(there: &mut Range<usize>, need: Range<usize>, room: usize) -> [Range<usize>; 2] {
     let apart = need.end < there.start || there.end < need.start;
     if need.is_empty() {
@@ -206,7 +206,7 @@ mod tests {
         ) {
             const ROOM: usize = 8;
             let needs: Vec<Range<usize>> = starts.iter().map(|&(start, length)| start..start + length).collect();
-            // Which tile each place has, as a ring of so many keeps them.
+            // Which tile each place of a ring of `ROOM` has.
             let mut kept = [usize::MAX; ROOM];
             let mut next = 0;
             for Stretch { fields, reads } in cut(&needs, ROOM, needs.len() * LANES).unwrap() {

@@ -11,6 +11,7 @@ pub(crate) mod adapter;
 mod bus;
 mod calibrating;
 mod capacity;
+mod chain;
 mod columns;
 mod members;
 mod over_fields;
@@ -33,17 +34,14 @@ use bytemuck::cast_slice;
 use glam::DVec2;
 pub use report::{Bandwidth, DeviceTime, EmptyCall, bandwidth, device_time};
 
-use self::across::{Cells, across_frames};
 use self::adapter::Device;
-use self::calibrating::{Calibrated, Calibrating};
 use self::capacity::FRAMES_A_BLOCK;
+use self::chain::{Buffers, Chain};
 use self::columns::Columns;
-use self::over_fields::{Bound, OverFields};
 use self::pack::{Form, HEADER, Packer, STEP, header};
 use self::ring::{SETS, Set};
-use self::shaders::Values;
 use self::shares::Shares;
-use self::stage::{Stage, UNIFORM, WORKING, table};
+use self::stage::Stage;
 use super::{Backend, BackendState, FieldState, RawBatch};
 use crate::error::Result;
 use crate::percept::Percepts;
@@ -67,7 +65,7 @@ pub(crate) struct Gpu {
     before: Option<wgpu::Buffer>,
     taxels: wgpu::Buffer,
     stages: Vec<Stage>,
-    /// Stages that take the place of the first ones, so many, should the plan cease to be plain.
+    /// If the plan ceases to be plain: how many of the first stages are replaced, and the stages that replace them.
     fallback: (usize, Vec<Stage>),
     packer: Packer,
     columns: Columns,
@@ -96,16 +94,16 @@ impl Gpu {
         Self::in_shares(device, plan, batch, cut)
     }
 
-    /// With so many members in a part of a wide field, and at most so many in one table on the device.
-    fn in_shares(device: Device, plan: &Plan, batch: usize, (of_part, most): (usize, usize)) -> Result<Self> {
+    /// With at most `most_of_part` members in a part of a wide field, and `most_of_share` in one table on the device.
+    fn in_shares(
+        device: Device,
+        plan: &Plan,
+        batch: usize,
+        (most_of_part, most_of_share): (usize, usize),
+    ) -> Result<Self> {
         let columns = Columns::new(plan);
         let capacity = capacity::of(&device, plan, &columns, batch)?;
-        let shares = Shares::new(plan, of_part, most);
-        let (slots, fields) = (plan.slots() as u64, plan.fields.len() as u64);
-        let frames = capacity as u64;
-        let working = |name: &str, size: u64| device.buffer(name, size, WORKING);
-        let batch = device.buffer("batch", HEADER, UNIFORM);
-        let steps = working("steps", frames * STEP);
+        let shares = Shares::new(plan, most_of_part, most_of_share);
         let plain = is_plain(plan);
         let direct = plain && !plan.has_changes() && !plan.stages().pressures && plan.calibrated() == plan.channels();
         let form = match (direct, capacity) {
@@ -116,54 +114,15 @@ impl Gpu {
         // Should the plan cease to be plain, they go up in rows.
         let up = [Form::Rows, form].map(|form| form.bytes(plan.channels(), capacity));
         let up = up[0].max(up[1]) as u64;
-        let raw = working("raw", up);
-        let taxels = table(&device, "taxels", &plan.taxels);
-        let quads = layout::padded_quads(capacity) as u64;
-        let pressures = working("pressures", quads * slots * 16);
-        let statuses = working("statuses", quads * slots * 4);
-        let results = working("results", frames * fields * 4 * columns.count() as u64);
-        // What the frame before left; buffers begin as zeros, and zero is not a contact.
-        let (touched, last) = (working("touched", fields * 4), working("last", fields * 16));
+        let buffers = Buffers::new(&device, plan, &columns, capacity, up);
+        let Chain { stages, fallback, before } =
+            Chain::new(&device, plan, (plain, direct), &shares, &columns, capacity, &buffers);
+        let Buffers { batch, steps, raw, taxels, pressures, results, touched, last, .. } = buffers;
 
-        let wanted = plan.stages();
-        let (curves, knots) =
-            (table(&device, "curves", &plan.curves.curves), table(&device, "knots", &plan.curves.knots));
-        let over = Calibrated {
-            batch: &batch,
-            steps: &steps,
-            taxels: &taxels,
-            raw: &raw,
-            curves: [&curves, &knots],
-            to: [&pressures, &statuses],
-        };
-        let Calibrating { mut stages, mut fallback, before } = Calibrating::new(&device, plan, (plain, direct), &over);
-        let tables = OverFields::new(&device, plan, &shares, &columns, capacity);
-        let over_fields = |direct: bool| {
-            let (values, at) = match direct {
-                true => (Values::Raw, (raw.as_entire_binding(), None)),
-                false => (Values::Pressures, (pressures.as_entire_binding(), Some(statuses.as_entire_binding()))),
-            };
-            let (batch, taxels, results) = (&batch, &taxels, &results);
-            tables.stages(&device, &Bound { batch, taxels, results, values, at })
-        };
-        let replaced = match direct {
-            true => {
-                fallback.extend(over_fields(false));
-                fallback.len() - 1
-            }
-            false => fallback.len(),
-        };
-        let fallback = (replaced, fallback);
-        stages.extend(over_fields(direct));
-        stages.extend(across_frames(
-            &device,
-            plan,
-            &columns,
-            &Cells { batch: &batch, steps: &steps, results: &results, touched: &touched, last: &last },
-        ));
-
-        let back = frames * fields * 4 * columns.read().len() as u64;
-        let back = back + if wanted.pressures { quads * slots * 16 } else { 0 };
+        let reads_pressures = plan.stages().pressures;
+        let [frames, fields, read] = [capacity, plan.fields.len(), columns.read().len()].map(|count| count as u64);
+        let back = frames * fields * 4 * read;
+        let back = back + if reads_pressures { pressures.size() } else { 0 };
         // Calls that fit into one submission never have another on its way.
         let sets = if capacity < FRAMES_A_BLOCK { 1 } else { SETS };
         let ring = (0..sets).map(|_| Set::new(&device, pack::values_at(capacity) + up, back)).collect();
@@ -184,7 +143,7 @@ impl Gpu {
             packer: Packer::new(form, plan.channels(), capacity),
             columns,
             results,
-            pressures: wanted.pressures.then_some(pressures),
+            pressures: reads_pressures.then_some(pressures),
             units_m: plan.fields.iter().map(|field| field.unit_m).collect(),
             memory: [touched, last],
         })

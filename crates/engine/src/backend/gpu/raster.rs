@@ -13,7 +13,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Samples a pixel, which every device has for these formats.
 const SAMPLES: u32 = 4;
-/// Rows of a texture start at multiples of so many bytes where they are copied out.
+/// Where a texture is copied out, its rows start at multiples of this, bytes.
 const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 /// Longest side of a picture, pixels, that every device can draw.
 pub const LONGEST_SIDE: u32 = 8192;

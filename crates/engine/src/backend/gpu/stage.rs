@@ -40,11 +40,11 @@ pub(super) enum Over {
     CalibratedOnce,
     /// One invocation a slot that is a change and a quad.
     Changes,
-    /// One invocation each of so many fields and quad.
+    /// One invocation per quad and field; the number of fields.
     Quads(u32),
     /// The same for one frame, in larger groups.
     OneFrame(u32),
-    /// One group each of so many wide fields, or parts of them, and quad.
+    /// One group per quad and wide field, or part of one; the number of these.
     Wide(u32),
     /// One invocation a field and frame.
     Cells,
@@ -103,7 +103,7 @@ impl Stage {
         Self::with(self.pipeline.clone(), self.name, device, over, &numbered(buffers))
     }
 
-    /// Adds it to `pass`, over so many groups.
+    /// Adds it to `pass`, with this number of groups along x, y and z.
     pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, [wide, tall, deep]: [u32; 3]) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bound, &[]);

@@ -41,7 +41,7 @@ mod real;
 mod shape;
 mod touch;
 
-pub(crate) use choice::{Fit, Fits, fit, fit_alone};
+pub(crate) use choice::{Explained, Fit, Fits, fit, fit_alone};
 pub(crate) use descent::STEPS;
 pub(crate) use objective::{Sensor, USUAL_WIDTH};
 pub(crate) use real::Real;

@@ -19,7 +19,7 @@ pub(in crate::source) enum Pace {
     Fastest,
     /// At each frame of any board.
     Arrival,
-    /// Every so many seconds.
+    /// At regular times, this far apart, s.
     Every(f64),
 }
 

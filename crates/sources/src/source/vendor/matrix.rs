@@ -28,7 +28,7 @@ pub(super) struct Matrix {
 
 #[derive(Clone, Copy, PartialEq)]
 enum Shape {
-    /// A line for each frame, with so many columns after the sensors that are none.
+    /// A line for each frame, whose last `left_out` columns are no sensors.
     Line { has_time: bool, left_out: usize },
     /// A block of rows for each frame.
     Block,
