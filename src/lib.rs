@@ -327,8 +327,8 @@ pub mod field {
     pub use somatic_skin::field::{Chart, Field, FieldSet, Member, NoChart, TaxelGraph, WORLD};
     #[doc(hidden)]
     pub use somatic_skin::field::{
-        ContactTolerance, Distortion, Lift, RestOverlap, Unroller, geodesic, mean_normals, neighbours, rest_overlaps,
-        unions,
+        ContactTolerance, Distortion, Lattice, Lift, RestOverlap, Unroller, geodesic, mean_normals, neighbours,
+        rest_overlaps, unions,
     };
 }
 

@@ -179,7 +179,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
         let lines = source.lines();
         (Box::new(source), Some(lines))
     };
-    let mut survey = Survey::new(&in_body(&body, &*source)?);
+    let mut survey = Survey::new(&in_body(&body, &*source)?).on(&body)?;
     let first = first_of(&arguments.sources);
     let is_live = lines.is_some() || first.is_ok_and(|spec| spec.is_stdin() || matches!(spec, SourceSpec::Text(_)));
     let gathered = gather(&mut survey, source, arguments, lines.as_ref(), is_live);
@@ -379,6 +379,9 @@ fn json_of(findings: &Findings) -> String {
     });
     let json = json!({
         "invert": findings.invert, "raw_range": findings.raw_range, "sensors": sensors.collect::<Vec<_>>(),
+        "crosstalk": findings.crosstalk.map(|found| json!({
+            "share": found.share, "frames": found.frames, "frames_with_touches_by_it": found.split, "dead_band": found.dead_band,
+        })),
         "remarks": findings.remarks(),
     });
     format!("{json:#}\n")

@@ -210,7 +210,7 @@ impl Mark {
             let axis = body_from_link.transform_vector3(axis);
             [ELLIPSE_SIGMAS * along * axis, ELLIPSE_SIGMAS * across * normal.cross(axis).normalize_or_zero()]
         });
-        let place = body_from_link.transform_point3(touch.position);
+        let place = body_from_link.transform_point3(touch.best_place());
         let were = trail.iter().map(|&(link, place)| body_from(link).transform_point3(place));
         Self {
             place,

@@ -143,7 +143,14 @@ mod tests {
         let mut sensors = vec![found(4, Some(250.0)), found(5, Some(250.0)), found(6, Some(243.0)), found(7, None)];
         (sensors[2].gain, sensors[2].dead_band, sensors[2].sigma) = (1.25, 5.0, Some(0.75));
         let missing = vec![-1.0, 30_000.0];
-        let findings = Findings { sensors, invert: true, raw_range: Some([0.0, 255.0]), missing, unit: UnitOfP::COUNT };
+        let findings = Findings {
+            sensors,
+            invert: true,
+            raw_range: Some([0.0, 255.0]),
+            missing,
+            unit: UnitOfP::COUNT,
+            crosstalk: None,
+        };
         let text = findings.calibration("the \"left\" hand");
         let read = Calibration::parse(&text, &[4, 5, 6, 7]).unwrap();
         assert_eq!(read.body.as_deref(), Some("the \"left\" hand"));

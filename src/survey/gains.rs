@@ -29,18 +29,22 @@ pub fn with_gains(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<S
     let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
     let number =
         |item: Option<&Item>| item.and_then(|item| item.as_float().or_else(|| item.as_integer().map(|n| n as f64)));
+    let untold = untold_spread(estimate);
     for (id, gain) in ids.iter().zip(&estimate.gains) {
-        let Some(gain) = gain else { continue };
         let id = id.to_string();
         let of = |document: &DocumentMut, key: &str| {
             let own = document.get("taxel").and_then(|taxels| taxels.get(&id)).and_then(|taxel| taxel.get(key));
             number(own).or_else(|| number(document.get("all").and_then(|all| all.get(key))))
         };
-        let new = [
-            ("gain", Some(of(&document, "gain").unwrap_or(1.0) / gain)),
-            ("dead_band", of(&document, "dead_band").map(|band| band / gain)),
-            ("p_max", of(&document, "p_max").map(|most| most / gain)),
-        ];
+        let new = match gain {
+            Some(gain) => [
+                ("gain", Some(of(&document, "gain").unwrap_or(1.0) / gain)),
+                ("dead_band", of(&document, "dead_band").map(|band| band / gain)),
+                ("p_max", of(&document, "p_max").map(|most| most / gain)),
+                ("gain_spread", None),
+            ],
+            None => [("gain", None), ("dead_band", None), ("p_max", None), ("gain_spread", Some(untold))],
+        };
         let taxels = document.entry("taxel").or_insert_with(|| {
             let mut table = Table::new();
             table.set_implicit(true);
@@ -52,8 +56,11 @@ pub fn with_gains(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<S
             return Err(Error::failed(format!("`taxel.{id}` is not a table")));
         };
         for (key, number) in new {
-            if let Some(number) = number {
-                taxel.insert(key, value(rounded(number)));
+            match number {
+                Some(number) => _ = taxel.insert(key, value(rounded(number))),
+                // One that is told now has the layer's.
+                None if key == "gain_spread" => _ = taxel.remove(key),
+                None => {}
             }
         }
     }
@@ -69,9 +76,23 @@ fn rounded(number: f64) -> f64 {
     format!("{number:.4e}").parse().unwrap_or(number)
 }
 
+/// The root mean square of the gains' logarithms: by what share they differ.
+#[must_use]
+pub fn spread(estimate: &GainsEstimate) -> f64 {
+    let logarithms = || estimate.gains.iter().flatten().map(|gain| gain.ln());
+    (logarithms().map(|x| x * x).sum::<f64>() / logarithms().count().max(1) as f64).sqrt()
+}
+
+/// What gains that no touch told may be off by: as much as the others were.
+#[must_use]
+pub fn untold_spread(estimate: &GainsEstimate) -> f64 {
+    spread(estimate).max(estimate.gain_spread)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::Calibration;
 
     fn estimate(gains: &[Option<f64>]) -> GainsEstimate {
         let mut estimate = GainsEstimate::default();
@@ -93,9 +114,16 @@ mod tests {
         }
         assert_eq!(after.taxels[1].p_max, 640.0);
         assert_eq!(after.layer.unwrap().sigma_m, 0.002_345_7);
+        // What no touch told may be off by what the others were, and one that is told later no more than they.
+        assert_eq!(
+            after.taxels.iter().map(|taxel| taxel.gain_spread.is_some()).collect::<Vec<_>>(),
+            [false, false, true]
+        );
+        assert!((after.taxels[2].gain_spread.unwrap() / 0.223 - 1.0).abs() < 1e-2, "{:?}", after.taxels[2]);
         // Again with other gains: a layer that was there is replaced.
-        let again = with_gains(&written, &[3, 7, 9], &estimate(&[None; 3])).unwrap();
-        assert_eq!(again, written);
+        let again = with_gains(&written, &[3, 7, 9], &estimate(&[Some(1.0); 3])).unwrap();
+        let again = Calibration::parse(&again, &[3, 7, 9]).unwrap();
+        assert_eq!((again.layer, again.taxels[2].gain_spread), (after.layer, None));
     }
 
     #[test]

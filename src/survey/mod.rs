@@ -10,6 +10,7 @@
 //! its way.
 
 mod at_rest;
+pub mod crosstalk;
 mod figure;
 mod file;
 pub mod gains;
@@ -17,10 +18,12 @@ pub mod known;
 pub mod tuning;
 mod which_way;
 
+use crate::Body;
 use crate::error::{Error, Result};
 use crate::signal::{RawValue, UnitOfP};
 
 use self::at_rest::{chance_of, median, middle, movement_of, rest_of, sigma_of};
+use self::crosstalk::{Crosstalk, Leaks};
 
 /// Maximum number of values kept per sensor; a longer rest is decimated by powers of two.
 const MAX_REST_VALUES: usize = 4096;
@@ -50,6 +53,9 @@ pub struct Survey {
     rest_frames: usize,
     stride: usize,
     pressed: Vec<Pressed>,
+    leaks: Leaks,
+    /// Baselines and dead bands, from the first press on.
+    before_press: Vec<Option<(f64, f64)>>,
     whole_numbers: bool,
 }
 
@@ -131,6 +137,8 @@ pub struct Findings {
     pub missing: Vec<f64>,
     /// What the raw values are in.
     pub unit: UnitOfP,
+    /// What presses show on the rows and columns of sensors, if anything.
+    pub crosstalk: Option<Crosstalk>,
 }
 
 impl Survey {
@@ -142,8 +150,18 @@ impl Survey {
             rest_frames: 0,
             stride: 1,
             pressed: vec![Pressed::default(); ids.len()],
+            leaks: Leaks::default(),
+            before_press: Vec::new(),
             whole_numbers: true,
         }
+    }
+
+    /// Looks also for crosstalk along the rows and columns of the sensors of `body`.
+    ///
+    /// # Errors
+    /// As [`crate::field::FieldSet::new`].
+    pub fn on(self, body: &Body) -> Result<Self> {
+        Ok(Self { leaks: Leaks::new(body, &self.ids)?, ..self })
     }
 
     /// Takes the values of a frame in which nothing touches the robot. Missing and faulty ones are left out.
@@ -175,6 +193,11 @@ impl Survey {
 
     /// Takes the values of a frame in which sensors are being pressed.
     pub fn press(&mut self, values: &[RawValue]) {
+        if self.before_press.is_empty() {
+            let rest = |kept: &Vec<f32>| rest_of(kept, self.step()).map(|(at, noise)| (at, self.dead_band(noise)));
+            self.before_press = self.rest.iter().map(rest).collect();
+        }
+        self.leaks.see(values, &self.before_press);
         for (pressed, value) in self.pressed.iter_mut().zip(values) {
             if let Some(value) = value.number() {
                 pressed.see(value as f32);
@@ -259,7 +282,10 @@ impl Survey {
                 went_other_way: goes(sensor, 1 - side),
             }
         });
-        Ok(Findings { sensors: sensors.collect(), invert, raw_range, missing: Vec::new(), unit: UnitOfP::COUNT })
+        let sensors: Vec<Found> = sensors.collect();
+        let mut bands: Vec<f64> = sensors.iter().map(|found| found.dead_band).collect();
+        let crosstalk = self.leaks.found(median(&mut bands).unwrap_or(0.0));
+        Ok(Findings { sensors, invert, raw_range, missing: Vec::new(), unit: UnitOfP::COUNT, crosstalk })
     }
 
     /// The step between raw values: 1 for whole numbers.
@@ -367,6 +393,7 @@ impl Findings {
             .into_iter()
             .filter(|(_, ids)| !ids.is_empty())
             .map(|(what, ids)| format!("{} of {} sensors {what}: {}", ids.len(), self.sensors.len(), several(&ids)))
+            .chain(self.crosstalk.map(|found| found.to_string()))
             .collect()
     }
 

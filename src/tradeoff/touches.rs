@@ -61,10 +61,17 @@ const INDENTERS: [Indenter; 5] = [
     Indenter { keys: "indenter = \"flat\"\nradius_m = 0.006", newtons: [4.0, 12.0], length_m: 0.0, is_long: false },
 ];
 
+/// Kernels of the layers, with σ of a point force's pressure in thicknesses. Fits know the first.
+const LAYERS: [(&str, f64); 4] = [
+    ("gaussian", 0.577_350_269_189_625_8),
+    ("boussinesq", 0.577_350_269_189_625_8),
+    ("exponential", 0.577_350_269_189_625_8),
+    ("bonded", 0.460_634_846_4),
+];
+
 impl SimulatedTouches {
     /// Up to `most` touches on the fields of `body` that `options` name and that have charts: fingertips, rods, balls, edges and
-    /// stamps in turn, at random places between taxels. One half presses through a Gaussian layer, the other half through
-    /// Boussinesq's, with Hertz's profiles. The layer's σ and the spread of gains are those of the calibration where it has them.
+    /// stamps in turn, at random places between taxels. They press through each of four layers, of which fits know the Gaussian one. The layer's σ and the spread of gains are those of the calibration where it has them.
     ///
     /// # Errors
     /// No field has a chart, no taxel an area, or the body no surface.
@@ -82,15 +89,16 @@ impl SimulatedTouches {
         let LayerResponse { sigma_m, gain_spread } =
             known.unwrap_or(LayerResponse { sigma_m: SIGMA_M, gain_spread: LayerResponse::GAIN_SPREAD });
         let sensors = Sensors::new(body, options, sigma_m, gain_spread);
-        let touches = touches(&fields, most.div_ceil(2));
+        let touches = touches(&fields, most.div_ceil(LAYERS.len()));
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let mut frames = TestFrames { source: "touches simulated on it".to_owned(), ..TestFrames::default() };
         let mut calibration = None;
-        let thickness_m = sigma_m * 3.0_f64.sqrt();
-        for layer in ["", "kernel = \"boussinesq\"\n"] {
+        for (kernel, spread) in LAYERS {
             let text = format!(
-                "rate_hz = {RATE_HZ}\nduration_s = {}\nseed = {SEED}\n\n[layer]\nthickness_m = {thickness_m}\n{layer}\n{}\n{touches}",
-                (most.div_ceil(2) + 1) as f64 / RATE_HZ,
+                "rate_hz = {RATE_HZ}\nduration_s = {}\nseed = {SEED}\n\n[layer]\nthickness_m = {}\nkernel = \"{kernel}\"\n\n{}\n\
+                 {touches}",
+                (most.div_ceil(LAYERS.len()) + 1) as f64 / RATE_HZ,
+                sigma_m / spread,
                 sensors.keys,
             );
             let mut source = SimulatedSource::on_body_where_possible("touches", &text, body.clone())?;
@@ -103,7 +111,7 @@ impl SimulatedTouches {
                 frames.frames.push(frame);
                 frames.truth.push(source.truth().to_vec());
             }
-            if layer.is_empty() {
+            if kernel == LAYERS[0].0 {
                 calibration = Some(Calibration::parse(&source.calibration(), &ids)?);
             }
         }
@@ -113,8 +121,8 @@ impl SimulatedTouches {
         }
         let from = if known.is_some() { "the calibration's" } else { "assumed" };
         let description = format!(
-            "{count} touches simulated on it by fingertips, balls, stamps, rods and edges, half of them through a layer that fits \
-             do not know; layer σ {:.2} mm ({from}), gains ±{:.0} %, {}",
+            "{count} touches simulated on it by fingertips, balls, stamps, rods and edges, through four layers of which fits \
+             know one; layer σ {:.2} mm ({from}), gains ±{:.0} %, {}",
             sigma_m * 1e3,
             gain_spread * 100.0,
             sensors.description

@@ -162,3 +162,49 @@ fn gains_from_a_wandering_finger_are_written_into_the_calibration() {
     );
     assert!(!folder.path().join("no").exists());
 }
+
+#[test]
+fn a_press_that_shows_its_row_and_its_column_is_named_with_its_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (body, simulation, csv, toml) = (at("grid.glb"), at("press.toml"), at("press.csv"), at("grid.toml"));
+    done(&["author", "--grid", "13x13", "--pitch", "5mm", "-o", &body]);
+    let found = |crosstalk: f64| -> Value {
+        let text = format!(
+            "body = \"grid.glb\"\nrate_hz = 25\nduration_s = 16\nseed = 3\n[layer]\nthickness_m = 0.004\nkernel = \"boussinesq\"\n\
+             [sensor]\nkind = \"linear\"\ngain = 600\noffset = 100\nbits = 12\nnoise_sigma = 1.5\ncrosstalk = {crosstalk}\n\
+             [[touch]]\non = \"grid\"\nindenter = \"fingertip\"\npath = [[-0.02, -0.02], [0.02, -0.01], [0, 0.01]]\n\
+             times_s = [4, 9, 15]\nforce_newton = [[4, 0], [4.5, 6], [10, 3], [15, 8], [15.5, 0]]\n"
+        );
+        std::fs::write(&simulation, text).unwrap();
+        done(&["simulate", &simulation, "-o", &csv, "--force"]);
+        let calibrate =
+            ["calibrate", "--body", &body, "--source", &csv, "--bits", "12", "-o", &toml, "--force", "--json"];
+        serde_json::from_str(&done(&calibrate)).unwrap()
+    };
+    let with = found(0.01);
+    let [share, pressed, split, band] = ["share", "frames", "frames_with_touches_by_it", "dead_band"]
+        .map(|key| with["crosstalk"][key].as_f64().unwrap_or_else(|| panic!("{with:#}")));
+    assert!((share - 0.01).abs() < 0.001, "{share}");
+    assert!(split > 0.5 * pressed && pressed > 100.0, "{split} of {pressed}");
+    let remark = with["remarks"].as_array().unwrap().last().unwrap().as_str().unwrap();
+    assert!(remark.contains("crosstalk: a press shows 0.9 % on the other sensors of its rows and columns"), "{remark}");
+
+    // With the dead band that it names, what nothing touches is not touched.
+    let touches = |arguments: &[&str]| {
+        let run =
+            ["run", "--body", &body, "--source", &csv, "--outputs", "touches", "--backend", "cpu", "--calibration"];
+        let frames = frames(&done(&[&run, arguments].concat()));
+        frames.iter().map(|frame| frame["touches"].as_array().map_or(0, Vec::len)).max().unwrap()
+    };
+    let wide = at("wide.toml");
+    std::fs::write(
+        &wide,
+        std::fs::read_to_string(&toml).unwrap().replace("dead_band = ", &format!("dead_band = {band} # ")),
+    )
+    .unwrap();
+    let counts = [touches(&[&toml]), touches(&[&wide])];
+    assert!(counts[0] > 3 && counts[1] == 1, "{counts:?}");
+
+    assert!(found(0.0)["crosstalk"].is_null());
+}

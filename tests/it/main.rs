@@ -47,6 +47,7 @@ mod scene_runs;
 mod drift;
 mod simulated;
 mod skipped;
+mod slow;
 mod state;
 mod sure;
 mod sure_on_skin;

@@ -9,7 +9,7 @@ use somatic::limits::{self, MAX_TOML_BYTES};
 use somatic::run::left_out;
 use somatic::setup::bodies::in_body;
 use somatic::source::{SourceSpec, VendorOptions};
-use somatic::survey::gains::{layer_under, with_gains};
+use somatic::survey::gains::{layer_under, spread, untold_spread, with_gains};
 use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 
 use crate::cli::bar::Bar;
@@ -104,12 +104,6 @@ fn untold(ids: &[u32], estimate: &GainsEstimate) -> Vec<u32> {
     ids.iter().zip(&estimate.gains).filter(|(_, gain)| gain.is_none()).map(|(id, _)| *id).collect()
 }
 
-/// The root mean square of the gains' logarithms: by what share they differ.
-fn spread(estimate: &GainsEstimate) -> f64 {
-    let logarithms = || estimate.gains.iter().flatten().map(|gain| gain.ln());
-    (logarithms().map(|x| x * x).sum::<f64>() / logarithms().count().max(1) as f64).sqrt()
-}
-
 fn table_of(ids: &[u32], estimate: &GainsEstimate, from: &Path) -> String {
     let told = estimate.gains.iter().flatten().count();
     let mut table = plain(["", "found"], 0..0);
@@ -137,7 +131,10 @@ fn table_of(ids: &[u32], estimate: &GainsEstimate, from: &Path) -> String {
     if !untold.is_empty() {
         let listed = untold.iter().take(12).map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let more = if untold.len() > 12 { ", …" } else { "" };
-        let what = format!("taxels {listed}{more} were pressed too seldom and keep their gains: touch there, too");
+        let what = format!(
+            "taxels {listed}{more} were pressed too seldom: they keep their gains, each with a gain_spread of {}; touch there, too",
+            percent(untold_spread(estimate))
+        );
         text += &format!("{}\n", bullet(&what));
     }
     text

@@ -71,7 +71,7 @@ impl TouchTable {
     }
 
     fn line(&self, touch: &Touch, width: usize) -> String {
-        let [x, y, z] = touch.position.to_array().map(millimetres);
+        let [x, y, z] = touch.best_place().to_array().map(millimetres);
         let speed = touch.velocity.map_or("–".to_owned(), |velocity| millimetres(velocity.length()));
         let flags = touch.flags - TouchFlags::YOUNG - TouchFlags::NO_UNIT;
         let frame = if touch.in_world { format!(" in {}", self.world) } else { String::new() };

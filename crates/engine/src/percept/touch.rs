@@ -131,6 +131,14 @@ pub struct Touch {
     pub(crate) taxels: [u32; 2],
 }
 
+impl Touch {
+    /// Where it is as well as is known: its [`place`](Self::place) where that was asked for, else its position, m.
+    #[must_use]
+    pub fn best_place(&self) -> DVec3 {
+        self.place.unwrap_or(self.position)
+    }
+}
+
 /// The contact that explains best what the taxels of a touch and those beside them feel, as `docs/explanation/fit.md` has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchFit {

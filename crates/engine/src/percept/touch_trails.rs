@@ -48,7 +48,7 @@ impl TouchTrails {
     /// Takes the touches of the frame at `t_s`, and forgets what is older than a second. After a jump back it forgets what came later.
     pub fn follow(&mut self, t_s: f64, found: &TouchFrame) {
         let link = |touch: &Touch| (!touch.in_world).then_some(touch.link);
-        self.add(t_s, found.touches.iter().map(|touch| (touch.id, link(touch), touch.position)));
+        self.add(t_s, found.touches.iter().map(|touch| (touch.id, link(touch), touch.best_place())));
     }
 
     fn add(&mut self, t_s: f64, touches: impl Iterator<Item = (u64, Option<u32>, DVec3)>) {

@@ -64,6 +64,7 @@ impl Plan {
             pressure: if pressure > 0.0 { by * (pressure + taken_off) } else { 0.0 },
             threshold: by * (feels_from + taken_off),
             sigma: sigma.map(|sigma| by * sigma),
+            gain_spread: calibration.gain_spread,
             pull: Pull { weight: if by > 0.0 { 1.0 / by } else { 0.0 }, less: by * taken_off },
         })
     }

@@ -32,7 +32,7 @@ impl TouchMark {
         let by_area = || touch.area_m2.map(|area_m2| [2.0 * (area_m2 / std::f64::consts::PI).sqrt(); 2]);
         let [length_m, width_m] = by_spread.or_else(by_area).unwrap_or([USUAL_M; 2]).map(|m| m.max(LEAST_M));
         Self {
-            position: touch.position,
+            position: touch.best_place(),
             normal,
             turn: DQuat::from_mat3(&DMat3::from_cols(along, normal.cross(along), normal)).normalize(),
             diameters_m: DVec3::new(length_m, width_m, LEAST_M),
@@ -60,6 +60,10 @@ mod tests {
         for touch in &found.touches {
             let mark = TouchMark::of(touch);
             assert_eq!(mark.position, touch.position);
+            let beside = touch.position + DVec3::X;
+            let mut placed = touch.clone();
+            placed.place = Some(beside);
+            assert_eq!(TouchMark::of(&placed).position, beside);
             assert!((mark.turn * DVec3::Z).distance(touch.normal) < 1e-9, "{mark:?}");
             assert!(mark.diameters_m.min_element() >= LEAST_M && mark.diameters_m.max_element() < 0.3, "{mark:?}");
             let Some((axis, [along_m, across_m])) = touch.principal_axis.zip(touch.spread_m) else { continue };

@@ -55,6 +55,8 @@ pub struct TaxelCalibration {
     pub raw_range: [f32; 2],
     /// Standard deviation of a raw value, quantisation included, raw units; `None` where it is not known.
     pub noise: Option<f64>,
+    /// Relative standard deviation of this taxel's gain, where it is more than [`LayerResponse::gain_spread`].
+    pub gain_spread: Option<f64>,
     /// Ignore this taxel.
     pub mask: bool,
     /// The conversion from raw value to pressure.
@@ -75,6 +77,7 @@ impl Default for TaxelCalibration {
             p_max: f32::MAX.into(),
             raw_range: [-f32::MAX, f32::MAX],
             noise: None,
+            gain_spread: None,
             mask: false,
             response: Response::Linear,
             quantity: Quantity::Count,

@@ -19,7 +19,7 @@ pub(crate) fn touches(layer: Layer) -> Vec<Touch> {
             let pressure = (-0.5 * (x * x / (long * long) + y * y / (wide * wide))).exp();
             let pressure = if pressure > 0.02 { pressure } else { 0.0 };
             let pull = Pull { weight: 1.0, less: 0.0 };
-            Taxel { place_m, area_m2: 2.5e-5, pressure, threshold: 0.02, sigma: Some(2e-3), pull }
+            Taxel { place_m, area_m2: 2.5e-5, pressure, threshold: 0.02, sigma: Some(2e-3), gain_spread: None, pull }
         };
         let taxels: Vec<Taxel> = (-5..=5).flat_map(|i| (-5..=5).map(move |j| taxel(i, j))).collect();
         Touch::new(&taxels, &layer)

@@ -125,7 +125,7 @@ mod tests {
             let place_m = DVec2::new(f64::from(i), f64::from(j)) * 5e-3;
             let pressure = if felt(place_m) > 0.02 { felt(place_m) } else { 0.0 };
             let pull = Pull { weight: 1.0, less: 0.0 };
-            Taxel { place_m, area_m2: 2.5e-5, pressure, threshold: 0.02, sigma: noise, pull }
+            Taxel { place_m, area_m2: 2.5e-5, pressure, threshold: 0.02, sigma: noise, gain_spread: None, pull }
         };
         let taxels: Vec<Taxel> = (cut..=4).flat_map(|i| (-4..=4).map(move |j| taxel(i, j))).collect();
         let peak = taxels.iter().map(|taxel| taxel.pressure).fold(0.0, f64::max);

@@ -33,6 +33,8 @@ pub(crate) struct Taxel {
     pub(crate) threshold: f64,
     /// Standard deviation of P for noise, if that is known.
     pub(crate) sigma: Option<f64>,
+    /// Relative standard deviation of its gain, where it is more than the layer's.
+    pub(crate) gain_spread: Option<f64>,
     /// How it counts in the mean of the touch.
     pub(crate) pull: Pull,
 }
@@ -122,11 +124,14 @@ impl Touch {
         let sensor = |taxel: &Taxel| {
             let is_pressed = taxel.pressure > 0.0;
             let sigma = taxel.sigma.map_or(UNKNOWN_NOISE, |sigma| sigma / peak).max(LEAST_NOISE);
+            let pressure = if is_pressed { taxel.pressure } else { taxel.threshold } / peak;
+            // The layer's spread goes with what a contact makes a taxel feel; a wider one of its own with what it reads.
+            let wider = taxel.gain_spread.map_or(0.0, |own| (own * own - layer.gain_spread.powi(2)).max(0.0));
             Sensor {
                 at: ((taxel.place_m - origin) / unit_m).to_array(),
                 margin: 0.5 * taxel.area_m2.sqrt() / unit_m,
-                pressure: if is_pressed { taxel.pressure } else { taxel.threshold } / peak,
-                variance: sigma * sigma,
+                pressure,
+                variance: sigma * sigma + wider * pressure * pressure,
                 pressed: if is_pressed { 1.0 } else { 0.0 },
             }
         };

@@ -27,6 +27,7 @@ pub(super) struct Keys {
     p_max: Option<Spanned<f64>>,
     raw_range: Option<Spanned<[f64; 2]>>,
     noise: Option<Spanned<f64>>,
+    gain_spread: Option<Spanned<f64>>,
     missing: Option<Spanned<Vec<Spanned<f64>>>>,
     mask: Option<bool>,
     curve: Option<Spanned<String>>,
@@ -157,6 +158,9 @@ impl Draft {
         }
         if let Some(x) = number("noise", &keys.noise, &|x| (0.0..=MAX_MAGNITUDE).contains(&x), "0 or more raw units")? {
             taxel.noise = Some(x);
+        }
+        if let Some(x) = number("gain_spread", &keys.gain_spread, &|x| (0.0..=1.0).contains(&x), "between 0 and 1")? {
+            taxel.gain_spread = Some(x);
         }
         if let Some(range) = &keys.raw_range {
             let [low, high] = *range.get_ref();

@@ -102,6 +102,8 @@ pub(super) struct SensorKeys {
     pub(super) gain_seed: u64,
     pub(super) threshold_newton: Option<Spanned<f64>>,
     pub(super) drift_per_minute: Option<Spanned<f64>>,
+    pub(super) crosstalk: Option<Spanned<f64>>,
+    pub(super) hysteresis: Option<Spanned<f64>>,
     #[serde(default)]
     pub(super) dead: Vec<Spanned<i64>>,
     #[serde(default)]

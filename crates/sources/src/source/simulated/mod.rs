@@ -4,6 +4,7 @@
 
 mod calibration;
 mod contact;
+mod disturbed;
 mod file;
 mod layer;
 mod noise;
@@ -26,12 +27,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
+use toml::Spanned;
 
 pub use record::{write_recording, write_recording_with_progress};
 pub use truth::Truth;
 pub use whole::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 
 use self::contact::{Footprint, Layer};
+use self::disturbed::{Disturbed, Wires};
 use self::file::File;
 use self::sensor::{Reading, Sensor};
 use self::setup::{Setup, Touch};
@@ -42,7 +45,7 @@ use super::Source;
 use crate::body::{Body, Modality, Taxel};
 use crate::bundled;
 use crate::error::{Error, ErrorKind, Result, failed};
-use crate::field::FieldSet;
+use crate::field::{FieldSet, Lattice};
 use crate::keys::Text;
 use crate::limits::{self, MAX_TOML_BYTES};
 use crate::signal::{Frame, RawValue, Sensors};
@@ -55,6 +58,7 @@ pub struct SimulatedSource {
     frames: u64,
     layer: Layer,
     sensor: Sensor,
+    disturbed: Disturbed,
     /// What the sensors cover.
     sensors: Sensors,
     /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
@@ -178,6 +182,7 @@ impl SimulatedSource {
         let mut setup = Setup { text, body: &body, fields: &fields, surfaces: BTreeMap::new(), duration_s };
         let layer = setup.layer(file.layer.as_ref())?;
         let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
+        let disturbed = disturbed(text, file, &fields, &taxels)?;
         let mut touches = Vec::with_capacity(file.touch.len());
         let mut places = BTreeMap::new();
         let mut body_skin = None;
@@ -218,6 +223,7 @@ impl SimulatedSource {
             frames: frames as u64,
             layer,
             sensor,
+            disturbed,
             sensors,
             forces_newton: vec![0.0; ids.len()],
             ids,
@@ -280,11 +286,12 @@ impl SimulatedSource {
     /// Goes back to the first frame, with the noise of another seed.
     pub fn reseed(&mut self, seed: u64) {
         self.sensor.seed = seed;
-        self.next = 0;
+        self.seek(0);
     }
 
-    /// Makes `frame` (counted from 0) the one that is read next.
+    /// Makes `frame` (counted from 0) the one that is read next. Hysteresis knows nothing of what was before it.
     pub fn seek(&mut self, frame: u64) {
+        self.disturbed.rest();
         self.next = frame.min(self.frames);
     }
 
@@ -366,7 +373,8 @@ impl Source for SimulatedSource {
         frame.clear();
         frame.t_s = self.time(number);
         frame.values.clear();
-        let readings = self.ids.iter().zip(&self.forces_newton).enumerate().map(|(index, (&id, &force_newton))| {
+        let felt = self.disturbed.felt(&self.forces_newton);
+        let readings = self.ids.iter().zip(felt).enumerate().map(|(index, (&id, &force_newton))| {
             let reading = Reading { index, id, frame: number, t_s: frame.t_s, force_newton };
             RawValue::new(self.sensor.read(&reading))
         });
@@ -377,6 +385,34 @@ impl Source for SimulatedSource {
     fn progress(&self) -> Option<f64> {
         Some(self.next as f64 / self.frames as f64)
     }
+}
+
+/// What sensors of the file feel beside the force on them.
+fn disturbed(text: Text<'_>, file: &File, fields: &FieldSet, taxels: &[(usize, f64)]) -> Result<Disturbed> {
+    let share = |name: &str, key: Option<&Spanned<f64>>| {
+        let Some(key) = key else { return Ok(0.0) };
+        match text.not_negative(name, key)? {
+            share if share < 1.0 => Ok(share),
+            share => Err(text.wrong(key.span(), format!("`{name}` is {share}; it is a share, from 0 to under 1"))),
+        }
+    };
+    let keys = &file.sensor;
+    let (crosstalk, hysteresis) =
+        (share("crosstalk", keys.crosstalk.as_ref())?, share("hysteresis", keys.hysteresis.as_ref())?);
+    let wires = match &keys.crosstalk {
+        Some(key) if crosstalk > 0.0 => {
+            let indices: Vec<usize> = taxels.iter().map(|(taxel, _)| *taxel).collect();
+            let wires = Wires::new(&Lattice::all(fields), &indices);
+            Some(wires.ok_or_else(|| {
+                text.wrong(
+                    key.span(),
+                    "`crosstalk` goes along rows and columns, and no field of this body has taxels in such".to_owned(),
+                )
+            })?)
+        }
+        _ => None,
+    };
+    Ok(Disturbed::new(taxels.len(), crosstalk, wires, hysteresis))
 }
 
 /// What sensors that feel squares with these sides cover: sides that are all one are of sensors of one size, others are those of cells.
