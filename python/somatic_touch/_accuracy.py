@@ -133,7 +133,7 @@ class Calibrated(Table):
     """What follows from it, for engines; `calibration.save(path)` writes it."""
 
     report: dict[str, Any]
-    """The rest: `invert`, `raw_range`, `remarks` and `losses`; of `gains_from` `touches`, `width_m`, `sigma_m`, `left`, `gain_spread` and `losses`."""
+    """The rest: `invert`, `raw_range`, `crosstalk`, `remarks` and `losses`; of `gains_from` `touches`, `width_m`, `sigma_m`, `left`, `gain_spread` and `losses`."""
 
     def __init__(self, report: dict[str, Any], calibration: _native.Calibration) -> None:
         super().__init__(report.pop("rows"))

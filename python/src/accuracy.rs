@@ -267,7 +267,8 @@ pub(crate) fn calibrate(
     let options = asked.options().or_raise(py)?;
     let ids = body.ids();
     let opened = OpenSource::new(py, source, &ids, &asked.lines(), &options)?;
-    let survey = Survey::new(&in_body(&body.inner, &*opened.source).or_raise(py)?).on(&body.inner).or_raise(py)?;
+    let channels = in_body(&body.inner, &*opened.source).or_raise(py)?;
+    let survey = Survey::new(&channels).on(&body.inner).or_raise(py)?;
     let unit = if opened.is_live { UnitOfP::COUNT } else { unit_of(source, &options).or_raise(py)? };
     let mut taking = Taking { survey, asked: &asked, begin_s: None, is_pressing: false };
     let losses = gather(py, &mut taking, opened, say)?;
@@ -289,13 +290,11 @@ pub(crate) fn calibrate(
             "travel": found.travel, "full": found.full, "gain": found.gain,
         })
     });
-    let crosstalk = findings.crosstalk.map(|found| {
-        json!({
-            "share": found.share, "frames": found.frames, "frames_with_touches_by_it": found.split, "dead_band": found.dead_band,
-        })
-    });
     let about = json!({
-        "invert": findings.invert, "crosstalk": crosstalk, "raw_range": findings.raw_range, "remarks": findings.remarks(), "losses": losses,
+        "invert": findings.invert, "raw_range": findings.raw_range, "remarks": findings.remarks(), "losses": losses,
+        "crosstalk": findings.crosstalk.map(|found| json!({
+            "share": found.share, "frames": found.frames, "frames_with_touches_by_it": found.split, "dead_band": found.dead_band,
+        })),
         "rows": sensors.collect::<Vec<_>>(),
     });
     Ok((about.to_string(), text))

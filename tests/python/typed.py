@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from typing import assert_type
+from typing import Any, assert_type
 
 import numpy as np
 import numpy.typing as npt
@@ -32,3 +32,14 @@ engine.process([datetime.datetime.now(datetime.UTC)], [{4: 512.0}], joints={"elb
 assert_type(body == st.Body.from_arrays([[0, 0, 0]], [[0, 0, 1]], surface=([[0, 0, 0]], [[0, 0, 0]])), bool)
 engine.step("now", [0.0] * 40)  # type: ignore[arg-type]
 st.Engine(body, backend="gpus")  # type: ignore[arg-type]
+with st.live(source="serial:/dev/ttyUSB0", body=body) as live:
+    assert_type([p.t for p in live], list[npt.NDArray[np.float64]])
+    assert_type(live.stop(), None)
+assert_type(st.tradeoff(body, within="3 mm").pick, dict[str, Any] | None)
+assert_type(st.calibrate(body, "a.csv", rest=5).calibration, st.Calibration)
+assert_type(st.author(urdf_skin="a.urdf", package={"a": "b"}, geometry="none"), st.Body)
+assert_type(st.convert(body, "a.csv"), int)
+assert_type(st.outputs()["name"], npt.NDArray[Any])
+with st.view(body, open=False) as shown:
+    assert_type(shown.url, str)
+st.author("a.stl", up="x")  # type: ignore[arg-type]
