@@ -159,7 +159,7 @@ impl Survey {
     /// Looks also for crosstalk along the rows and columns of the sensors of `body`.
     ///
     /// # Errors
-    /// As [`crate::FieldSet::new`].
+    /// As [`crate::field::FieldSet::new`].
     pub fn on(self, body: &Body) -> Result<Self> {
         Ok(Self { leaks: Leaks::new(body, &self.ids)?, ..self })
     }
