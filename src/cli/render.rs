@@ -9,7 +9,7 @@ use clap::Args;
 use somatic::Error;
 use somatic::error::Result;
 use somatic::field::FieldSet;
-use somatic::picture::{self, Options, View};
+use somatic::picture::{self, ChartPicture, Options, View};
 use somatic::scene::choose_fields;
 use somatic::setup::FilesRead;
 use somatic::setup::bodies::load_body;
@@ -66,7 +66,7 @@ pub(super) struct Arguments {
     look_at: Option<String>,
 
     /// Label taxels with their ids.
-    #[arg(long, conflicts_with_all = ["uv", "fields"])]
+    #[arg(long, conflicts_with = "fields")]
     ids: bool,
 
     /// Connect taxels that are neighbours on the skin.
@@ -125,19 +125,22 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
     let fields = if arguments.fields.is_empty() { Vec::new() } else { named(&arguments.fields)? };
     let (look_at, edges) = (arguments.look_at.clone(), arguments.edges);
     let options = Options { size: arguments.size.0, views, fields, look_at, edges };
-    let picture = match &arguments.uv {
-        None if !asked.sources.is_empty() || arguments.ids => {
-            arguments.touched.draw(&asked, &body, &set.fields, &options, arguments.ids)?
+    let charted = match &arguments.uv {
+        None => None,
+        Some(name) => match set.fields.iter().position(|field| field.name == *name) {
+            Some(index) => Some(index),
+            // A glob will do where it names one, and what is wrong with it is said the same way.
+            None => Some(named(std::slice::from_ref(name))?[0]),
+        },
+    };
+    let ids = arguments.ids;
+    let picture = match charted {
+        _ if !asked.sources.is_empty() => {
+            arguments.touched.draw(&asked, &body, (&set.fields, charted), &options, ids)?
         }
+        Some(index) => ChartPicture::new(&body, &set.fields, index, &options, ids)?.of_fields(&set.fields)?.png()?,
+        None if ids => touched::without(&body, &set.fields, &options)?,
         None => picture::of_body(&body, &set.fields, &options)?.png()?,
-        Some(name) => {
-            let charted = match set.fields.iter().position(|field| field.name == *name) {
-                Some(index) => index,
-                // A glob will do where it names one, and what is wrong with it is said the same way.
-                None => named(std::slice::from_ref(name))?[0],
-            };
-            picture::of_chart(&body, &set.fields, charted, &options)?.png()?
-        }
     };
     output.write(&picture)?;
     Ok(DONE)

@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::colour::PAPER;
+use super::colour::{PAPER, linear};
 use crate::colours::pressure_colours;
 use crate::error::Result;
 use crate::ink::{self, FAMILY, cannot};
@@ -219,6 +219,37 @@ impl Labels {
         }
         area.present().map_err(cannot)
     }
+}
+
+/// Height of the ids of taxels, pixels.
+const ID_SIZE: u32 = 13;
+/// Relative luminance below which white is read better than ink.
+const DARK: f64 = 0.2;
+
+/// Half the width and the height of an id, pixels.
+pub(super) fn half_of_id(id: &str) -> [f64; 2] {
+    [ink::width(id, ID_SIZE).unwrap_or_default(), ID_SIZE].map(|side| f64::from(side) / 2.0)
+}
+
+/// An id of a taxel in a picture: the pixel that it is about, right and down, and the colour that it stands on.
+pub(super) struct PlacedId<'a> {
+    pub(super) id: &'a str,
+    pub(super) at: [f64; 2],
+    pub(super) on: [u8; 3],
+}
+
+/// Writes `ids` on a picture of `size`, light on dark colours.
+pub(super) fn write_ids(pixels: &mut [u8], [width, height]: [u32; 2], ids: &[PlacedId<'_>]) -> Result<()> {
+    ink::font()?;
+    let area = BitMapBackend::with_buffer(pixels, (width, height)).into_drawing_area();
+    for &PlacedId { id, at, on } in ids {
+        let [r, g, b] = linear(on);
+        let ink = if 0.2126 * r + 0.7152 * g + 0.0722 * b < DARK { WHITE } else { INK };
+        let style = (FAMILY, ID_SIZE).into_font().color(&ink).pos(Pos::new(HPos::Center, VPos::Center));
+        let [x, y] = at.map(|pixel| pixel.round() as i32);
+        area.draw_text(id, &style, (x, y)).map_err(cannot)?;
+    }
+    area.present().map_err(cannot)
 }
 
 /// A number with three digits, or all of a larger one.

@@ -1,6 +1,7 @@
 //! Pictures of bodies: from several sides at one scale, each taxel a disc in its field's colour. Drawn on a GPU or a
 //! software adapter, without a window.
 
+mod chart;
 mod colour;
 mod drawn;
 mod edges;
@@ -14,6 +15,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
+#[doc(hidden)]
+pub use chart::ChartPicture;
+pub use chart::of_chart;
 pub use drawn::Picture;
 pub use moments::{Moments, Times};
 pub use touch::{MarkedTouch, Moment, TouchPicture};
@@ -31,8 +35,6 @@ use crate::field::Field;
 
 /// Minimum width of a picture, pixels, for its title.
 const MIN_WIDTH: u32 = 240;
-/// Margin around the discs of a chart, in radii: about the distance to a neighbour.
-const CHART_MARGIN_RADII: f64 = 2.5;
 
 /// Options of a picture.
 #[derive(Clone, Debug, Default)]
@@ -168,75 +170,6 @@ fn look_at(body: &Body, fields: &[Field], name: &str) -> Result<Vec<usize>> {
     let names = fields.iter().map(|field| field.name.as_str()).chain(body.links.iter().map(|link| link.name.as_str()));
     let hint = nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(Error::usage(format!("there is no field or link `{name}` with taxels{hint}")).at(&body.name))
-}
-
-/// A picture of the chart of field `index` of `fields`: members at their (u, v), +u to the right.
-///
-/// Colours are those of its children, unless `options` has others.
-///
-/// # Errors
-/// As [`of_body`]; or the field has no chart.
-pub fn of_chart(body: &Body, fields: &[Field], index: usize, options: &Options) -> Result<Picture> {
-    let [width, height] = checked(options.size)?;
-    let field = &fields[index];
-    let chart = field
-        .chart
-        .as_ref()
-        .map_err(|why| Error::failed(format!("field `{}` has no chart to draw: {why}", field.name)).at(&body.name))?;
-    let mut places = vec![DVec3::NAN; body.taxels.len()];
-    field.members.iter().for_each(|member| places[member.taxel] = member.place.with_z(0.0));
-    let held: Vec<usize> = field.members.iter().map(|member| member.taxel).collect();
-    // A single taxel is drawn with its area.
-    let side = held.iter().map(|&taxel| body.taxels[taxel].area.sqrt()).fold(0.0, f64::max);
-    let extent = field.radius_m().max(10.0 * side);
-    let dots = Dots::at(held.iter().map(|&taxel| places[taxel]).collect(), vec![DVec3::Z; held.len()], extent);
-    // The fields with the chart's member indices.
-    let within: Vec<Field> = fields
-        .iter()
-        .map(|field| {
-            let mut field = field.clone();
-            field.members.retain_mut(|member| match held.binary_search(&member.taxel) {
-                Ok(place) => {
-                    member.taxel = place;
-                    true
-                }
-                Err(_) => false,
-            });
-            field
-        })
-        .collect();
-    let shown = FieldColours::of(&within, &options.fields, &dots);
-    let kind = format!("{:?}", chart.kind).to_lowercase();
-    let title = format!(
-        "{} · {}, {kind} chart, distortion {:.1} %",
-        field.name,
-        counted(field.members.len(), "taxel"),
-        100.0 * chart.distortion
-    );
-    let mut labels = Labels::new(&title, width);
-    let around = dots
-        .places
-        .iter()
-        .zip(&dots.radii)
-        .flat_map(|(&p, &r)| [p - CHART_MARGIN_RADII * r, p + CHART_MARGIN_RADII * r]);
-    let points: Vec<DVec3> = around.chain([DVec3::ZERO]).collect();
-    let views = [View::Front.axes()];
-    let (arrangement, size) = arranged(&mut labels, shown.key(&within), [width, height], &views, &points)?;
-    let usual = dots.mean_radius() * arrangement.scale;
-    let drawing = Drawing {
-        size,
-        background: linear(PAPER),
-        slices: dots.slices(&shown.coloured(&within), DVec3::ZERO, usual > 2.0),
-        fan: fan(usual),
-        eyes: arrangement.eyes(1.1 * points.iter().map(|p| p.length()).fold(1e-9, f64::max)),
-        ..Drawing::default()
-    };
-    let mut pixels = raster::draw(&drawing)?;
-    let origin = arrangement.pixel(0, DVec3::ZERO);
-    labels.axes(origin);
-    labels.bar(arrangement.scale);
-    labels.draw(&mut pixels, drawing.size)?;
-    Ok(Picture { size: drawing.size, pixels })
 }
 
 /// Views of `points` above a legend of `key` in a picture of at most `size`, and the picture's size.

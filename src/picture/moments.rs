@@ -1,6 +1,6 @@
 //! Pictures of recorded touches: which of its frames they show, and what is drawn of each.
 
-use super::{MarkedTouch, Moment, Options, Picture, TouchPicture, View};
+use super::{ChartPicture, MarkedTouch, Moment, Options, Picture, TouchPicture, View};
 use crate::body::{Body, Modality};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
@@ -151,10 +151,8 @@ impl Moments {
         fields: &[Field],
         options: &Options,
         ids: bool,
-        mut progress: impl FnMut(f64) -> bool,
+        progress: impl FnMut(f64) -> bool,
     ) -> Result<Vec<Picture>> {
-        let (factor, unit) = self.quantity.readable(self.max_pressure);
-        let max_pressure = Some(self.max_pressure * factor);
         let mut options = options.clone();
         if options.views.is_empty() {
             let pressed = |taxel: &usize| self.shown.iter().any(|shown| shown.pressures[*taxel] > Some(0.0));
@@ -166,16 +164,36 @@ impl Moments {
             options.views.truncate(MAX_SIDES);
         }
         let picture = TouchPicture::new(body, fields, &options, ids)?;
+        self.drawn(|moment| picture.draw(moment), progress)
+    }
+
+    /// Draws them on the chart of field `index` of `fields`; else as [`Moments::draw`].
+    ///
+    /// # Errors
+    /// As [`super::of_chart`]; or `progress` has ended it.
+    pub fn draw_chart(
+        &self,
+        body: &Body,
+        (fields, index): (&[Field], usize),
+        options: &Options,
+        ids: bool,
+        progress: impl FnMut(f64) -> bool,
+    ) -> Result<Vec<Picture>> {
+        let picture = ChartPicture::new(body, fields, index, options, ids)?;
+        self.drawn(|moment| picture.draw(moment), progress)
+    }
+
+    fn drawn(
+        &self,
+        draw: impl Fn(&Moment<'_>) -> Result<Picture>,
+        mut progress: impl FnMut(f64) -> bool,
+    ) -> Result<Vec<Picture>> {
+        let (factor, unit) = self.quantity.readable(self.max_pressure);
+        let max_pressure = Some(self.max_pressure * factor);
         let mut pictures = Vec::with_capacity(self.shown.len());
         for (index, Shown { t_s, pressures, touches }) in self.shown.iter().enumerate() {
             let pressures: Vec<Option<f64>> = pressures.iter().map(|p| p.map(|p| p * factor)).collect();
-            pictures.push(picture.draw(&Moment {
-                pressures: &pressures,
-                max_pressure,
-                unit,
-                touches,
-                t_s: Some(*t_s),
-            })?);
+            pictures.push(draw(&Moment { pressures: &pressures, max_pressure, unit, touches, t_s: Some(*t_s) })?);
             if !progress((index + 1) as f64 / self.shown.len() as f64) {
                 return Err(Error::failed("stopped before all was drawn"));
             }

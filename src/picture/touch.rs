@@ -6,7 +6,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colour::{PALETTE, PAPER, linear};
 use super::edges::{Lines, seen};
-use super::labels::{INK, Labels};
+use super::labels::{INK, Labels, PlacedId, half_of_id, write_ids};
 use super::{Options, Picture, Prepared, stem};
 use crate::backend::gpu::raster;
 use crate::body::Body;
@@ -88,13 +88,7 @@ impl<'a> TouchPicture<'a> {
     /// As [`super::of_body`].
     pub fn draw(&self, moment: &Moment<'_>) -> Result<Picture> {
         let Prepared { size, middle, arrangement, dots, views, .. } = &self.prepared;
-        let colours = pressure_colours();
-        let colour = |pressure: &Option<f64>| match pressure {
-            None => UNUSED,
-            Some(p) if *p <= 0.0 => IDLE,
-            Some(p) => colours[(p / moment.max_pressure.unwrap_or(1.0) * 255.0).round().clamp(0.0, 255.0) as usize],
-        };
-        let taxels: Vec<[u8; 3]> = moment.pressures.iter().map(colour).collect();
+        let taxels = colours_of(moment);
         let usual = self.prepared.usual_radius();
         let mut drawing = self.prepared.drawing(linear(PAPER));
         let mut touched = vec![None; taxels.len()];
@@ -118,11 +112,28 @@ impl<'a> TouchPicture<'a> {
             labels.pressures(max, moment.unit);
         }
         labels.draw(&mut pixels, *size)?;
+        self.write_ids(&taxels, &mut pixels)?;
         self.mark(moment, &mut pixels)?;
         Ok(Picture { size: *size, pixels })
     }
 
-    /// Draws the marks of the touches, and ids of taxels.
+    /// Writes the ids of the taxels that a view sees, as far as they fit into its part of the picture.
+    fn write_ids(&self, colours: &[[u8; 3]], pixels: &mut [u8]) -> Result<()> {
+        let Prepared { size, middle, arrangement, dots, .. } = &self.prepared;
+        let ids: Vec<String> = self.body.taxels.iter().map(|taxel| taxel.id.to_string()).collect();
+        let mut placed = Vec::new();
+        for (index, labelled) in self.labelled.iter().enumerate() {
+            for taxel in (0..ids.len()).filter(|&taxel| labelled[taxel]) {
+                let at = arrangement.pixel(index, dots.places[taxel] - *middle);
+                if arrangement.views[index].holds_all(at, half_of_id(&ids[taxel])) {
+                    placed.push(PlacedId { id: &ids[taxel], at, on: colours[taxel] });
+                }
+            }
+        }
+        write_ids(pixels, *size, &placed)
+    }
+
+    /// Draws the marks of the touches.
     fn mark(&self, moment: &Moment<'_>, pixels: &mut [u8]) -> Result<()> {
         ink::font()?;
         let Prepared { size: [width, height], middle, arrangement, dots, views, .. } = &self.prepared;
@@ -134,16 +145,6 @@ impl<'a> TouchPicture<'a> {
                 (x.round() as i32, y.round() as i32)
             };
             let is_inside = |at: (i32, i32)| arrangement.views[index].holds(at);
-            if let Some(labelled) = self.labelled.get(index) {
-                let style = (FAMILY, 13).into_font().color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
-                let seen = dots.places.iter().zip(&self.body.taxels).zip(labelled).filter(|(_, seen)| **seen);
-                for ((place, taxel), _) in seen {
-                    let at = pixel(*place);
-                    if is_inside(at) {
-                        area.draw_text(&taxel.id.to_string(), &style, at).map_err(cannot)?;
-                    }
-                }
-            }
             for marked in moment.touches {
                 let [r, g, b] = own_colour(&marked.touch);
                 let colour = RGBColor(r, g, b);
@@ -182,8 +183,19 @@ fn title(body: &Body) -> String {
     stem(&body.name).to_owned()
 }
 
+/// By the body's taxels, the colours of their pressures.
+pub(super) fn colours_of(moment: &Moment<'_>) -> Vec<[u8; 3]> {
+    let colours = pressure_colours();
+    let colour = |pressure: &Option<f64>| match pressure {
+        None => UNUSED,
+        Some(p) if *p <= 0.0 => IDLE,
+        Some(p) => colours[(p / moment.max_pressure.unwrap_or(1.0) * 255.0).round().clamp(0.0, 255.0) as usize],
+    };
+    moment.pressures.iter().map(colour).collect()
+}
+
 /// A touch keeps its colour as long as it lasts.
-fn own_colour(touch: &Touch) -> [u8; 3] {
+pub(super) fn own_colour(touch: &Touch) -> [u8; 3] {
     PALETTE[(touch.id % PALETTE.len() as u64) as usize]
 }
 

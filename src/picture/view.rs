@@ -81,6 +81,13 @@ impl PlacedView {
         let [left, top, width, height] = self.part.map(|pixels| pixels as i32);
         (left..left + width).contains(&x) && (top..top + height).contains(&y)
     }
+
+    /// Whether what reaches `half` to both sides of a pixel is in its part.
+    pub(super) fn holds_all(&self, [x, y]: [f64; 2], half: [f64; 2]) -> bool {
+        [-1.0, 1.0]
+            .into_iter()
+            .all(|side| self.holds(((x + side * half[0]).round() as i32, (y + side * half[1]).round() as i32)))
+    }
 }
 
 /// Views at one scale.
@@ -122,15 +129,16 @@ impl Arrangement {
         let (scale, widths, heights) = best.unwrap_or((1.0, Vec::new(), Vec::new()));
         let scale = if scale.is_finite() { scale } else { 1.0 };
         let used: f64 = widths.iter().map(|w| w * scale + 2.0 * MARGIN).sum();
-        let left = ((f64::from(width) - used) / 2.0).max(0.0);
+        // What is left over goes to all columns: views fill the picture, and show more of a body of which they show a part.
+        let spare = ((f64::from(width) - used) / widths.len().max(1) as f64).max(0.0);
         let mut placed = Vec::with_capacity(views.len());
         let mut y = f64::from(top);
         for (row, &tall) in heights.iter().enumerate() {
-            let mut x = left;
+            let mut x = 0.0;
             for (column, &wide) in widths.iter().enumerate() {
                 let Some(axes) = views.get(row * widths.len() + column) else { break };
                 let [across, up] = spans[row * widths.len() + column];
-                let size = [wide * scale + 2.0 * MARGIN, tall * scale + 2.0 * MARGIN];
+                let size = [wide * scale + 2.0 * MARGIN + spare, tall * scale + 2.0 * MARGIN];
                 placed.push(PlacedView {
                     axes: *axes,
                     part: [x, y + caption, size[0], size[1]].map(|pixels| pixels.round().max(1.0) as u32),

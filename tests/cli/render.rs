@@ -98,6 +98,17 @@ fn a_chart_is_drawn_flat() {
     for colour in [BLUE, ORANGE, [0x00, 0x9E, 0x73], [0xCC, 0x79, 0xA7]] {
         assert!(chart.of_colour(colour) > 2000, "{colour:?}");
     }
+    // With the pressures of a touch, and with ids.
+    let source = concat!("csv:", env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
+    let of = |more: &[&str]| {
+        let wanted = ["hand", "--size", "500", "--uv", "hand/back", "--source", source, "--at"];
+        render(&[&wanted[..], more].concat()).unwrap()
+    };
+    let (rest, touched, named) = (of(&["0"]), of(&["2.9"]), of(&["2.9", "--ids"]));
+    let (before, after) = (rest.of_colour(SKY), touched.of_colour(SKY));
+    assert!(after > before + 1000, "rims of the touch: {before} and {after} pixels");
+    let white = |picture: &Picture| picture.pixels.chunks_exact(3).filter(|pixel| **pixel == [0xFF; 3]).count();
+    assert!(white(&named) > white(&touched), "ids are light on dark taxels");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
     let why = fails(1, &["render", "hand", "--uv", "hand", "-o", text_of(&path)]);

@@ -20,7 +20,7 @@ const RECORDINGS: [&str; 7] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv"]
 #[derive(Args)]
 pub(super) struct Flags {
     /// Show the pressures and touches of this recording: csv:FILE, mcap:FILE or sim:FILE.toml.
-    #[arg(long, value_name = "SOURCE", conflicts_with_all = ["uv", "fields"])]
+    #[arg(long, value_name = "SOURCE", conflicts_with = "fields")]
     source: Option<String>,
 
     /// The calibration of the sensors, a TOML file [default: the source's own, if it has one].
@@ -80,12 +80,12 @@ impl Flags {
         Ok(crate::cli::scene::set_up(scene))
     }
 
-    /// A PNG of `body` with the touch that is `asked` for.
+    /// A PNG of `body` with the touch that is `asked` for; of the chart of one of the `fields` where there is one.
     pub(super) fn draw(
         &self,
         asked: &Setup,
         body: &Body,
-        fields: &[Field],
+        (fields, chart): (&[Field], Option<usize>),
         options: &Options,
         ids: bool,
     ) -> Result<Vec<u8>> {
@@ -99,11 +99,6 @@ impl Flags {
             },
         };
         times.check().map_err(|e| e.at("--rate"))?;
-        if asked.sources.is_empty() {
-            let pressures = vec![Some(0.0); body.taxels.len()];
-            let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", touches: &[], t_s: None };
-            return TouchPicture::new(body, fields, options, ids)?.draw(&moment)?.png();
-        }
         let channels: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let input = crate::cli::scene::input(asked)?;
         if !input.is_recording() {
@@ -127,10 +122,21 @@ impl Flags {
         let moments = Moments::of(&mut engine, body, times, &input.name, frames)?;
         source.notices().iter().for_each(|notice| say(notice));
         let mut bar = Bar::new("drawing");
-        let pictures = moments.draw(body, fields, options, ids, |share| {
+        let progress = |share| {
             bar.show_with_time_left(share);
             true
-        })?;
-        Picture::animation(&pictures, times.picture_s())
+        };
+        let pictures = match chart {
+            Some(index) => moments.draw_chart(body, (fields, index), options, ids, progress),
+            None => moments.draw(body, fields, options, ids, progress),
+        };
+        Picture::animation(&pictures?, times.picture_s())
     }
+}
+
+/// A PNG of `body` without a touch, its taxels labelled with their ids.
+pub(super) fn without(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u8>> {
+    let pressures = vec![Some(0.0); body.taxels.len()];
+    let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", touches: &[], t_s: None };
+    TouchPicture::new(body, fields, options, true)?.draw(&moment)?.png()
 }
