@@ -44,7 +44,7 @@ impl Lattice {
     fn of(field: &Field) -> Option<Self> {
         let spacing_m = field.spacing_m();
         let along = |axis: fn(glam::DVec3) -> f64| {
-            lines(field.members.iter().map(|member| axis(member.place)).collect(), ACROSS * spacing_m)
+            lines(&field.members.iter().map(|member| axis(member.place)).collect::<Vec<f64>>(), ACROSS * spacing_m)
         };
         let (rows, columns) = (along(|place| place.y)?, along(|place| place.x)?);
         let count = |lines: &[usize]| lines.iter().max().map_or(0, |last| last + 1);
@@ -57,7 +57,7 @@ impl Lattice {
 }
 
 /// The line of each coordinate; `None` where a line would be wider than `across_m`.
-fn lines(at_m: Vec<f64>, across_m: f64) -> Option<Vec<usize>> {
+fn lines(at_m: &[f64], across_m: f64) -> Option<Vec<usize>> {
     let mut order: Vec<usize> = (0..at_m.len()).collect();
     order.sort_by(|&a, &b| at_m[a].total_cmp(&at_m[b]));
     let mut line_of = vec![0; at_m.len()];
@@ -80,9 +80,9 @@ mod tests {
 
     #[test]
     fn lines_are_told_apart_and_a_slope_has_none() {
-        assert_eq!(lines(vec![0.0, 1.0, 0.01, 2.0, 0.99], 0.1), Some(vec![0, 1, 0, 2, 1]));
-        assert_eq!(lines((0..9).map(f64::from).collect(), 1.0), None);
-        assert_eq!(lines(Vec::new(), 1.0), None);
+        assert_eq!(lines(&[0.0, 1.0, 0.01, 2.0, 0.99], 0.1), Some(vec![0, 1, 0, 2, 1]));
+        assert_eq!(lines(&(0..9).map(f64::from).collect::<Vec<_>>(), 1.0), None);
+        assert_eq!(lines(&[], 1.0), None);
     }
 
     #[test]
