@@ -14,12 +14,7 @@ use somatic::{Frame, Outputs, Result};
 
 use crate::body::PyBody;
 use crate::error::{OrRaise, interrupted};
-use crate::threads::free;
-
-fn heard(raised: &mut Option<PyErr>) -> bool {
-    *raised = Python::attach(|py| py.check_signals()).err();
-    raised.is_none()
-}
+use crate::threads::{free, goes_on};
 
 /// Frames that are read until Ctrl-C is heard.
 const FRAMES_BETWEEN: u64 = 1 << 10;
@@ -30,7 +25,7 @@ fn of_frames(source: &mut dyn Source, raised: &mut Option<PyErr>) -> Result<Opti
     let mut frame = Frame::missing(0.0, source.taxels().len());
     while source.next_frame(&mut frame)? {
         rhythm.see(frame.t_s);
-        if rhythm.frames.is_multiple_of(FRAMES_BETWEEN) && !heard(raised) {
+        if rhythm.frames.is_multiple_of(FRAMES_BETWEEN) && !goes_on(raised) {
             return Ok(None);
         }
     }

@@ -238,7 +238,7 @@ fn gather(
 
 /// What an export's values are in, as it says itself.
 fn unit_of(source: &Bound<'_, PyAny>, options: &VendorOptions) -> somatic::Result<UnitOfP> {
-    let text = source.cast::<PyString>().map_or_else(|_| String::new(), |text| text.to_string());
+    let text = source.cast::<PyString>().map_or_else(|_| String::new(), ToString::to_string);
     let spec = text.parse::<SourceSpec>().map(|spec| spec.with_content(options));
     match spec {
         Ok(SourceSpec::Vendor(path)) => Ok(VendorSource::open(path, options)?.layout().unit),

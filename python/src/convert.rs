@@ -80,7 +80,7 @@ impl Copied {
             frames += 1;
             posed += u64::from(!frame.pose.is_empty());
             if frames.is_multiple_of(FRAMES_BETWEEN as u64) {
-                *raised = Python::attach(|py| py.check_signals()).err();
+                *raised = Python::attach(|py| py.check_signals().err());
                 if raised.is_some() {
                     return Ok(None);
                 }

@@ -10,7 +10,7 @@ use crate::arrays::{array, values};
 use crate::error::{OrRaise, interrupted};
 use crate::picture::{PyPicture, Wish};
 use crate::recording::PyRecording;
-use crate::threads::free;
+use crate::threads::{free, goes_on};
 
 /// Frames that are computed until Ctrl-C is heard.
 const FRAMES_BETWEEN: usize = 1 << 8;
@@ -73,12 +73,6 @@ impl Read {
             Ok(Frame { t_s, values: self.values[index * width..][..width].to_vec(), ..Frame::default() })
         })
     }
-}
-
-/// Whether to go on: what Python raises for a signal is kept.
-fn goes_on(raised: &mut Option<PyErr>) -> bool {
-    *raised = Python::attach(|py| py.check_signals().err());
-    raised.is_none()
 }
 
 impl Wish<'_> {

@@ -55,7 +55,7 @@ impl Plotted {
             if frames.is_empty() {
                 return Ok(Some(gatherer.finish()));
             }
-            *raised = Python::attach(|py| py.check_signals()).err();
+            *raised = Python::attach(|py| py.check_signals().err());
             if raised.is_some() {
                 return Ok(None);
             }

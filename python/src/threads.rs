@@ -37,3 +37,9 @@ pub(crate) fn free<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> 
         None => work(),
     })
 }
+
+/// Whether to go on: what Python raises for a signal is kept.
+pub(crate) fn goes_on(raised: &mut Option<PyErr>) -> bool {
+    *raised = Python::attach(|py| py.check_signals().err());
+    raised.is_none()
+}
