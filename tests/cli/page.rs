@@ -15,6 +15,9 @@ use tungstenite::{Message, WebSocket};
 
 use super::{code_of, fails, somatic};
 
+/// The version of the protocol of the page.
+const VERSION: u8 = 4;
+
 /// A run with a page.
 pub(super) struct Run {
     child: Child,
@@ -87,7 +90,7 @@ impl Run {
 
     pub(super) fn viewer(&self) -> Viewer {
         let mut socket = self.own_socket();
-        say(&mut socket, &json!({"type": "hello", "version": 4, "token": self.token, "after_event": null}));
+        say(&mut socket, &json!({"type": "hello", "version": VERSION, "token": self.token, "after_event": null}));
         Viewer { socket, texts: Vec::new() }
     }
 
@@ -148,7 +151,7 @@ impl Viewer {
     /// The next frame, said to be drawn.
     pub(super) fn frame(&mut self) -> Vec<u8> {
         let frame = self.binary();
-        assert_eq!((frame[0], frame[1]), (2, 3));
+        assert_eq!((frame[0], frame[1]), (2, VERSION));
         say(&mut self.socket, &json!({"type": "drawn", "seq": u32_at(&frame, 4)}));
         frame
     }
@@ -171,7 +174,7 @@ fn a_page_gets_the_scene_and_then_every_frame_that_it_draws() {
     let mut run = Run::start(&["--outputs", "total,centroid,position,touches"]);
     let mut viewer = run.viewer();
     let mesh = viewer.binary();
-    assert_eq!((mesh[0], mesh[1]), (1, 3));
+    assert_eq!((mesh[0], mesh[1]), (1, VERSION));
     let [vertices, triangles, taxels, links] = [4, 8, 12, 16].map(|at| u32_at(&mesh, at) as usize);
     assert_eq!(mesh.len(), 20 + 28 * vertices + 12 * triangles + 40 * taxels + 28 * links);
     let welcome = viewer.text("welcome").unwrap().clone();
@@ -288,10 +291,12 @@ fn what_is_not_the_page_is_refused() {
 fn messages_are_the_pages_or_the_connection_ends() {
     let run = Run::start(&[]);
     let hello =
-        |token: &str, version: u32| json!({"type": "hello", "version": version, "token": token, "after_event": 0});
+        |token: &str, version: u8| json!({"type": "hello", "version": version, "token": token, "after_event": 0});
     let wrong = format!("{}0", &run.token[..31]);
     let wrong = if wrong == run.token { format!("{}1", &run.token[..31]) } else { wrong };
-    for first in [hello(&wrong, 3), hello("", 3), hello(&run.token, 2), json!({"type": "play"}), json!(7)] {
+    for first in
+        [hello(&wrong, VERSION), hello("", VERSION), hello(&run.token, VERSION - 1), json!({"type": "play"}), json!(7)]
+    {
         let mut socket = run.own_socket();
         say(&mut socket, &first);
         assert_eq!(closed(socket), 1008, "{first}");
@@ -303,7 +308,7 @@ fn messages_are_the_pages_or_the_connection_ends() {
     for (message, code) in [
         (Message::text("{\"type\":\"quit\"}"), 1008),
         (Message::text("{\"type\":\"taxel\",\"taxel\":40}"), 1008),
-        (Message::text(hello(&run.token, 3).to_string()), 1008),
+        (Message::text(hello(&run.token, VERSION).to_string()), 1008),
         (Message::text(" ".repeat((64 << 10) + 1)), 1009),
         (Message::binary(vec![0; 4]), 1003),
     ] {
