@@ -317,7 +317,7 @@ def test_commands_in_messages_stay_as_they_are_typed() -> None:
     for text in [
         "the body has no taxels: add some, as with `somatic author --taxels 500`",
         "this is a PNG, not a glTF; make one of it: somatic author a.png --taxels 500 -o body.glb",
-        "give --wiring a file that has it",
+        "give --label a name that it has",
         "nothing to say",
     ]:
         assert in_keywords(text) == text
