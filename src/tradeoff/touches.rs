@@ -71,7 +71,8 @@ const LAYERS: [(&str, f64); 4] = [
 
 impl SimulatedTouches {
     /// Up to `most` touches on the fields of `body` that `options` name and that have charts: fingertips, rods, balls, edges and
-    /// stamps in turn, at random places between taxels. They press through each of four layers, of which fits know the Gaussian one. The layer's σ and the spread of gains are those of the calibration where it has them.
+    /// stamps in turn, at random places between taxels. They press through each of four layers. Fits know the Gaussian one. The
+    /// layer's σ and the spread of gains are those of the calibration where it has them.
     ///
     /// # Errors
     /// No field has a chart, no taxel an area, or the body no surface.
