@@ -3,6 +3,7 @@
 //! A sensor far from a press, in a row or column of it, reads c · x where x is what the sensors of that line feel. What sensors
 //! off the press's rows and columns read meanwhile is the layer's tail or a drift, and is subtracted: c = Σ x (P − B) / Σ x².
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::field::{FieldSet, Lattice};
@@ -50,18 +51,11 @@ impl fmt::Display for Crosstalk {
     }
 }
 
-/// A lattice of sensors by their places in a frame.
-#[derive(Clone, Debug)]
-struct Wired {
-    sensors: Vec<usize>,
-    rows: Vec<usize>,
-    columns: Vec<usize>,
-}
-
 /// Sums over frames with a press.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Leaks {
-    lattices: Vec<Wired>,
+    /// Sensors by their places in a frame.
+    lattices: Vec<Lattice>,
     frames: usize,
     split: usize,
     highest_line: f64,
@@ -72,19 +66,11 @@ pub(super) struct Leaks {
 impl Leaks {
     /// For frames of the sensors `ids` of `body`.
     pub(super) fn new(body: &Body, ids: &[u32]) -> Result<Self> {
-        let place = |taxel: &usize| ids.iter().position(|id| *id == body.taxels[*taxel].id);
-        let wired = |lattice: Lattice| {
-            let (mut sensors, mut rows, mut columns) = (Vec::new(), Vec::new(), Vec::new());
-            for ((taxel, row), column) in lattice.taxels.iter().zip(lattice.rows).zip(lattice.columns) {
-                if let Some(place) = place(taxel) {
-                    sensors.push(place);
-                    rows.push(row);
-                    columns.push(column);
-                }
-            }
-            Wired { sensors, rows, columns }
-        };
-        let lattices = Lattice::all(&FieldSet::new(body)?).into_iter().map(wired).collect();
+        let index_of: BTreeMap<u32, usize> =
+            body.taxels.iter().enumerate().map(|(index, taxel)| (taxel.id, index)).collect();
+        // Ids that are not the body's keep their place, and are on no line.
+        let taxels: Vec<usize> = ids.iter().map(|id| index_of.get(id).copied().unwrap_or(usize::MAX)).collect();
+        let lattices = Lattice::all(&FieldSet::new(body)?).iter().map(|lattice| lattice.among(&taxels)).collect();
         Ok(Self { lattices, ..Self::default() })
     }
 
@@ -93,11 +79,11 @@ impl Leaks {
         let away = |sensor: usize| Some(values[sensor].number()? - rest[sensor]?.0);
         for at in 0..self.lattices.len() {
             let lattice = &self.lattices[at];
-            let away: Vec<Option<f64>> = lattice.sensors.iter().map(|&sensor| away(sensor)).collect();
+            let away: Vec<Option<f64>> = lattice.taxels.iter().map(|&sensor| away(sensor)).collect();
             let highest = away.iter().enumerate().filter_map(|(k, away)| Some((k, (*away)?)));
             let Some((peak, highest)) = highest.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) else { continue };
             let bands: Vec<f64> =
-                lattice.sensors.iter().map(|&sensor| rest[sensor].map_or(f64::INFINITY, |rest| rest.1)).collect();
+                lattice.taxels.iter().map(|&sensor| rest[sensor].map_or(f64::INFINITY, |rest| rest.1)).collect();
             if highest.abs() > MIN_PRESS_BANDS * bands[peak] {
                 let pressed: Vec<f64> =
                     away.iter().map(|away| away.map_or(f64::NAN, |away| away * highest.signum())).collect();
@@ -108,7 +94,7 @@ impl Leaks {
 
     /// Adds the frame's pressures of one lattice, NaN where a sensor has none, the highest `highest`.
     fn add(&mut self, at: usize, pressed: &[f64], bands: &[f64], highest: f64) {
-        let Wired { rows, columns, .. } = &self.lattices[at];
+        let Lattice { rows, columns, .. } = &self.lattices[at];
         let reach = |lines: &[usize]| {
             let pressed = || lines.iter().zip(pressed).filter(|(_, p)| **p > PRESSED * highest).map(|(line, _)| *line);
             let (first, last) = (pressed().min().unwrap_or(0), pressed().max().unwrap_or(0));
@@ -122,8 +108,7 @@ impl Leaks {
             return;
         }
         let beside = off.iter().sum::<f64>() / off.len() as f64;
-        let mut felt =
-            [vec![0.0; 1 + rows.iter().max().unwrap_or(&0)], vec![0.0; 1 + columns.iter().max().unwrap_or(&0)]];
+        let mut felt = self.lattices[at].size().map(|lines| vec![0.0; lines]);
         for k in given().filter(|&k| is_near(k) == (true, true)) {
             felt[0][rows[k]] += pressed[k];
             felt[1][columns[k]] += pressed[k];
@@ -146,13 +131,13 @@ impl Leaks {
         self.split += usize::from(is_split);
     }
 
-    /// What the frames tell; `None` where no leak is seen. `band` is the sensors' usual dead band.
-    pub(super) fn found(&self, band: f64) -> Option<Crosstalk> {
+    /// What the frames tell; `None` where no leak is seen. `band` is the sensors' usual dead band, `round` makes one of a number.
+    pub(super) fn found(&self, band: f64, round: impl Fn(f64) -> f64) -> Option<Crosstalk> {
         let [xx, xe, xxee, xxxe, xxxx] = self.sums;
         let share = xe / xx;
         let sigma = (xxee - 2.0 * share * xxxe + share * share * xxxx).max(0.0).sqrt() / xx;
         let is_seen = self.frames >= MIN_FRAMES && share >= MIN_SHARE && share >= MIN_SIGMAS * sigma;
-        let dead_band = (share * self.highest_line + band).ceil();
+        let dead_band = round(share * self.highest_line + band);
         is_seen.then_some(Crosstalk { share, frames: self.frames, split: self.split, dead_band })
     }
 }
@@ -165,7 +150,7 @@ mod tests {
     fn sensors_off_the_lines_tell_a_leak_from_a_tail() {
         // A press on one sensor of 8 x 8 leaks 2 %; all read a tail of 3 beside it.
         let lines = |line: fn(usize) -> usize| (0..64).map(line).collect::<Vec<usize>>();
-        let lattice = Wired { sensors: (0..64).collect(), rows: lines(|k| k / 8), columns: lines(|k| k % 8) };
+        let lattice = Lattice { taxels: (0..64).collect(), rows: lines(|k| k / 8), columns: lines(|k| k % 8) };
         let frame = |leak: f64| -> Vec<RawValue> {
             let value = |k: usize| match (k / 8 == 3, k % 8 == 4) {
                 (true, true) => 900.0,
@@ -177,7 +162,7 @@ mod tests {
         let found = |leak: f64, frames: usize| {
             let mut leaks = Leaks { lattices: vec![lattice.clone()], ..Leaks::default() };
             (0..frames).for_each(|_| leaks.see(&frame(leak), &[Some((100.0, 5.0)); 64]));
-            leaks.found(5.0)
+            leaks.found(5.0, f64::ceil)
         };
         let Crosstalk { share, frames, split, dead_band } = found(0.02, 12).unwrap();
         // The press's own line holds what leaked to the sensors beside it, too.

@@ -284,7 +284,7 @@ impl Survey {
         });
         let sensors: Vec<Found> = sensors.collect();
         let mut bands: Vec<f64> = sensors.iter().map(|found| found.dead_band).collect();
-        let crosstalk = self.leaks.found(median(&mut bands).unwrap_or(0.0));
+        let crosstalk = self.leaks.found(median(&mut bands).unwrap_or(0.0), |band| self.rounded_band(band));
         Ok(Findings { sensors, invert, raw_range, missing: Vec::new(), unit: UnitOfP::COUNT, crosstalk })
     }
 
@@ -295,7 +295,11 @@ impl Survey {
 
     /// The dead band for sensors that stray by `noise` at rest.
     fn dead_band(&self, noise: f64) -> f64 {
-        let band = DEAD_BAND_MARGIN * noise;
+        self.rounded_band(DEAD_BAND_MARGIN * noise)
+    }
+
+    /// `band` as a calibration gives it: whole if raw values are.
+    fn rounded_band(&self, band: f64) -> f64 {
         if self.whole_numbers { band.ceil() } else { rounded(band) }
     }
 

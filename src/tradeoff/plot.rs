@@ -57,7 +57,7 @@ struct Panel<'a> {
 fn panels(report: &Report) -> Vec<Panel<'_>> {
     let mut panels = Vec::new();
     for way in CallMode::ALL {
-        for (index, what, unit) in [(0, "place", "mm"), (1, "orientation", "degrees")] {
+        for (index, what, unit) in [(0, "place", "mm"), (1, "angle", "degrees")] {
             // What rounding changes cannot be seen beside what a rung is off by.
             let rows = if report.truth { report.rungs(way) } else { report.of(way) };
             let points = rows.into_iter().map(|row| (row, row.judged()[index]));
@@ -73,7 +73,7 @@ fn panels(report: &Report) -> Vec<Panel<'_>> {
 
 /// Panels side by side, and above each other.
 fn shape(panels: &[Panel<'_>]) -> (usize, usize) {
-    let wide = if panels.iter().any(|panel| panel.what == "orientation") { 2 } else { 1 };
+    let wide = if panels.iter().any(|panel| panel.what == "angle") { 2 } else { 1 };
     (panels.len().div_ceil(wide).max(1), wide)
 }
 

@@ -42,7 +42,7 @@ pub(super) fn in_words(row: &Measurement) -> String {
         words.push(format!("95 % of places within {} mm of {from}", number(place.p95)));
     }
     if orientation.compared > 0 {
-        words.push(format!("95 % of orientations within {}°", number(orientation.p95)));
+        words.push(format!("95 % of angles within {}°", number(orientation.p95)));
     }
     if let Some(truth) = row.truth.filter(|truth| truth.given < 1.0) {
         words.push(format!("given for {:.0} % of the touches, absent for the others", 100.0 * truth.given));

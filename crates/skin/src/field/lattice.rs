@@ -1,5 +1,7 @@
 //! Rows and columns of sensors, as matrices are wired.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::set::{Field, FieldSet};
 
 /// A row holds sensors that lie within this share of a spacing across it.
@@ -12,7 +14,7 @@ const MIN_FILLED: f64 = 0.5;
 /// Taxels that lie in rows and columns along the axes of a chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
-    /// Indices into the body's taxels.
+    /// Indices into the body's taxels, or whatever they are counted in after [`Lattice::among`].
     pub taxels: Vec<usize>,
     /// The row of each, counted along +v.
     pub rows: Vec<usize>,
@@ -27,7 +29,7 @@ impl Lattice {
         let mut by_size: Vec<&Field> = fields.fields.iter().filter(|field| field.chart.is_ok()).collect();
         by_size.sort_by_key(|field| std::cmp::Reverse(field.members.len()));
         let mut lattices: Vec<Self> = Vec::new();
-        let mut taken = std::collections::BTreeSet::new();
+        let mut taken = BTreeSet::new();
         for field in by_size {
             if field.members.iter().any(|member| taken.contains(&member.taxel)) {
                 continue;
@@ -40,6 +42,27 @@ impl Lattice {
         lattices
     }
 
+    /// The same of the `taxels` alone, indices into the body's taxels: by their places among these.
+    #[must_use]
+    pub fn among(&self, taxels: &[usize]) -> Self {
+        let place_of: BTreeMap<usize, usize> =
+            taxels.iter().enumerate().map(|(place, &taxel)| (taxel, place)).collect();
+        let mut among = Self { taxels: Vec::new(), rows: Vec::new(), columns: Vec::new() };
+        for ((taxel, &row), &column) in self.taxels.iter().zip(&self.rows).zip(&self.columns) {
+            let Some(&place) = place_of.get(taxel) else { continue };
+            among.taxels.push(place);
+            among.rows.push(row);
+            among.columns.push(column);
+        }
+        among
+    }
+
+    /// How many rows and columns there are.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        [&self.rows, &self.columns].map(|lines| lines.iter().max().map_or(0, |last| last + 1))
+    }
+
     /// The members of a field with a chart as a lattice; `None` where they do not lie in rows and columns.
     fn of(field: &Field) -> Option<Self> {
         let spacing_m = field.spacing_m();
@@ -47,12 +70,11 @@ impl Lattice {
             lines(&field.members.iter().map(|member| axis(member.place)).collect::<Vec<f64>>(), ACROSS * spacing_m)
         };
         let (rows, columns) = (along(|place| place.y)?, along(|place| place.x)?);
-        let count = |lines: &[usize]| lines.iter().max().map_or(0, |last| last + 1);
-        let (count, crossings) = (field.members.len(), [count(&rows), count(&columns)]);
-        let is_lattice = crossings.iter().all(|&lines| lines > 1 && count >= MIN_PER_LINE * lines)
-            && count as f64 >= MIN_FILLED * (crossings[0] * crossings[1]) as f64;
-        let taxels = field.members.iter().map(|member| member.taxel).collect();
-        is_lattice.then_some(Self { taxels, rows, columns })
+        let lattice = Self { taxels: field.members.iter().map(|member| member.taxel).collect(), rows, columns };
+        let (count, size) = (field.members.len(), lattice.size());
+        let is_lattice = size.iter().all(|&lines| lines > 1 && count >= MIN_PER_LINE * lines)
+            && count as f64 >= MIN_FILLED * (size[0] * size[1]) as f64;
+        is_lattice.then_some(lattice)
     }
 }
 
@@ -93,6 +115,14 @@ mod tests {
         };
         let (count, mat) = of(somatic_bodies::MAT);
         assert_eq!(mat.iter().map(|lattice| lattice.taxels.len()).sum::<usize>(), count, "each once");
+        // Only every other taxel, the last one first.
+        let (whole, some) = (&mat[0], (0..count).rev().step_by(2).collect::<Vec<_>>());
+        let among = whole.among(&some);
+        assert!(among.taxels.len() * 2 + 2 > whole.taxels.len() && among.taxels.len() < whole.taxels.len());
+        for ((place, row), column) in among.taxels.iter().zip(&among.rows).zip(&among.columns) {
+            let at = whole.taxels.iter().position(|taxel| *taxel == some[*place]).unwrap();
+            assert_eq!((whole.rows[at], whole.columns[at]), (*row, *column));
+        }
         let (_, humanoid) = of(somatic_bodies::HUMANOID);
         assert_eq!(humanoid, []);
     }

@@ -17,14 +17,12 @@ impl Wires {
         let mut lines_of = vec![None; taxels.len()];
         let mut first = 0;
         for lattice in lattices {
-            let count = |lines: &[usize]| lines.iter().max().map_or(0, |last| last + 1);
-            let rows = count(&lattice.rows);
-            for ((taxel, row), column) in lattice.taxels.iter().zip(&lattice.rows).zip(&lattice.columns) {
-                if let Some(index) = taxels.iter().position(|own| own == taxel) {
-                    lines_of[index] = Some([first + row, first + rows + column]);
-                }
+            let [rows, columns] = lattice.size();
+            let among = lattice.among(taxels);
+            for ((&index, row), column) in among.taxels.iter().zip(&among.rows).zip(&among.columns) {
+                lines_of[index] = Some([first + row, first + rows + column]);
             }
-            first += rows + count(&lattice.columns);
+            first += rows + columns;
         }
         (first > 0).then(|| Self { lines_of, on_line_newton: vec![0.0; first] })
     }
