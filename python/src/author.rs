@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use somatic::author::Recipe;
 use somatic::author::mesh::MeshOptions;
-use somatic::author::{Recipe, mesh};
-use somatic::body::Original;
+use somatic::internal::author::mesh;
+use somatic::internal::body::Original;
 use somatic::{Body, Error, bundled};
 
 use crate::body::PyBody;
@@ -83,7 +84,7 @@ pub(crate) fn author(
             raised = heard.err();
             raised.is_none()
         };
-        let authored = somatic::author::author_while(file, &made, shown)?;
+        let authored = somatic::internal::author::author_while(file, &made, shown)?;
         let name = shape
             .with_extension("glb")
             .file_name()

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use somatic::recording::{BODY, CALIBRATION, Reader};
-use somatic::signal::{Pose, UnitOfP};
+use somatic::internal::recording::{BODY, CALIBRATION};
+use somatic::internal::signal::UnitOfP;
+use somatic::recording::Reader;
+use somatic::signal::Pose;
 use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec, VendorFormat, VendorOptions, VendorSource};
 use somatic::{Calibration, Error, Frame, RawValue, bundled};
 

@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use crate::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use clap::Args;
-use somatic::scene::file::seconds;
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
+use somatic::internal::scene_file::seconds;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::bodies::load_body;
 use somatic::signal::{FsrCircuit, Wiring};
 use somatic::{Error, Result};
 

@@ -2,7 +2,7 @@
 
 use super::{Findings, Found};
 use somatic::error::Result;
-use somatic::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel};
+use somatic::internal::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel};
 
 const TRAVEL: Colour = [120, 170, 220];
 const DEAD: Colour = [225, 150, 60];
@@ -89,7 +89,7 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use somatic::signal::UnitOfP;
+    use somatic::internal::signal::UnitOfP;
 
     #[test]
     fn ticks_are_round_and_within() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use somatic::error::{Error, Result};
-use somatic::signal::UnitOfP;
+use somatic::internal::signal::UnitOfP;
 
 use super::known::{KnownForce, PressedOn};
 use super::{Findings, Found, median, rounded};
@@ -119,7 +119,8 @@ fn commonest(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use somatic::signal::{Calibration, UnitOfP};
+    use somatic::internal::signal::UnitOfP;
+    use somatic::signal::Calibration;
 
     fn found(id: u32, baseline: Option<f64>) -> Found {
         let full = baseline.map(|baseline| baseline - 0.5);

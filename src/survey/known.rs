@@ -3,7 +3,8 @@
 use std::str::FromStr;
 
 use somatic::error::{Error, Result};
-use somatic::signal::{Quantity, UnitOfP};
+use somatic::internal::signal::UnitOfP;
+use somatic::signal::Quantity;
 
 /// A force in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,11 +13,13 @@ mod at_rest;
 mod figure;
 mod file;
 pub mod known;
+#[cfg(feature = "tune")]
 pub mod tuning;
 mod which_way;
 
 use somatic::error::{Error, Result};
-use somatic::signal::{RawValue, UnitOfP};
+use somatic::internal::signal::UnitOfP;
+use somatic::signal::RawValue;
 
 use self::at_rest::{chance_of, median, middle, movement_of, rest_of, sigma_of};
 

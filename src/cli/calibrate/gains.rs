@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use serde_json::json;
-use somatic::gains::{GainsEstimate, GainsSurvey};
-use somatic::limits::{self, MAX_TOML_BYTES};
-use somatic::run::left_out;
-use somatic::setup::bodies::in_body;
+use somatic::internal::gains::{GainsEstimate, GainsSurvey};
+use somatic::internal::limits::{self, MAX_TOML_BYTES};
+use somatic::internal::run::left_out;
+use somatic::internal::setup::bodies::in_body;
 use somatic::source::{SourceSpec, VendorOptions};
 use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};

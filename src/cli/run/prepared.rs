@@ -2,9 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use somatic::internal::run::{Opened, Pace, RunOptions};
+use somatic::internal::setup::{Input, Setup};
 use somatic::output::OutputPath;
-use somatic::run::{Opened, Pace, Run, RunOptions};
-use somatic::setup::{Input, Setup};
+use somatic::run::Run;
 use somatic::sink::Sink;
 #[cfg(feature = "page")]
 use somatic::sink::SinkSpec;

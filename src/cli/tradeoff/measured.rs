@@ -1,12 +1,12 @@
 //! What is measured, on which frames, and how a measurement is described.
 
-use somatic::setup::Setup;
-use somatic::setup::{Input, RECORDED_BATCH};
-use somatic::signal::Frame;
-use somatic::source::{SimulatedSource, Source, SourceSpec};
-use somatic::tradeoff::{
+use somatic::internal::setup::Setup;
+use somatic::internal::setup::{Input, RECORDED_BATCH};
+use somatic::internal::tradeoff::{
     CallMode, MeasureOptions, Measurement, Pick, Report, SimulatedTouches, Store, Target, TestFrames, measure,
 };
+use somatic::signal::Frame;
+use somatic::source::{SimulatedSource, Source, SourceSpec};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
 use crate::cli::plan::pressed;
@@ -22,7 +22,7 @@ pub(super) fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {
 pub(super) fn software() -> Option<String> {
     #[cfg(feature = "gpu")]
     {
-        let adapters = somatic::backend::gpu::adapters();
+        let adapters = somatic::internal::backend::gpu::adapters();
         let names: Vec<&str> = adapters.iter().map(|adapter| &adapter.name[..]).collect();
         let is_software = !adapters.is_empty() && adapters.iter().all(|adapter| adapter.kind == "software");
         is_software

@@ -66,6 +66,7 @@ impl TouchFlags {
 
 /// A touch of the whole body in one frame. Its place and directions are in the frame of its link, or in the world: [`Touch::in_world`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Touch {
     /// Lasts from onset to release, and is never used again.
     pub id: u64,
@@ -133,6 +134,7 @@ pub struct Touch {
 
 /// The contact that explains best what the taxels of a touch and those beside them feel, as `docs/explanation/fit.md` has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TouchFit {
     /// Its kind.
     pub kind: ContactKind,
@@ -172,6 +174,7 @@ pub struct FitSigma {
 
 /// The part of a touch on one of its links.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LinkShare {
     /// Index of the link.
     pub link: u32,
@@ -192,6 +195,7 @@ pub struct Wrench {
 
 /// The part of a touch in one field.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FieldShare {
     /// Index of the field.
     pub field: u32,
@@ -201,6 +205,7 @@ pub struct FieldShare {
 
 /// The touches of a frame.
 #[derive(Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct TouchFrame {
     /// The oldest first.
     pub touches: Vec<Touch>,
