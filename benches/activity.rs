@@ -9,9 +9,9 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use somatic::body::MemberSpec;
+use somatic::internal::shape::Shape;
 use somatic::scene::{Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, Outputs, RawValue, Scene};
-use somatic_engine::shape::Shape;
 
 const SENSORS: usize = 100_000;
 const MEMBERS: usize = 16;

@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use glam::DVec3;
 use rstar::RTree;
-use somatic::author::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
-use somatic::body::Topology;
-use somatic::field::geodesic::{LogMap, SurfacePlace};
+use somatic::internal::author::{Placed, place_apart, place_by_density, place_evenly, widest_radius};
+use somatic::internal::body::Topology;
+use somatic::internal::field::geodesic::{LogMap, SurfacePlace};
 
 /// A unit sphere of 20·4ⁿ triangles.
 fn icosphere(cuts: u32) -> Topology {

@@ -9,8 +9,8 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use somatic::internal::shape::Shape;
 use somatic::{BackendKind, Body, Outputs};
-use somatic_engine::shape::Shape;
 
 fn main() {
     divan::main();
@@ -50,7 +50,7 @@ fn paper() -> Outputs {
 /// Whether there is an adapter, and whether it is hardware.
 fn gpu() -> (bool, bool) {
     #[cfg(feature = "gpu")]
-    let kinds: Vec<&str> = somatic::backend::gpu::adapters().iter().map(|adapter| adapter.kind).collect();
+    let kinds: Vec<&str> = somatic::internal::backend::gpu::adapters().iter().map(|adapter| adapter.kind).collect();
     #[cfg(not(feature = "gpu"))]
     let kinds: Vec<&str> = Vec::new();
     (!kinds.is_empty(), kinds.iter().any(|kind| *kind != "software"))

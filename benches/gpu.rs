@@ -12,9 +12,10 @@
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use somatic::backend::gpu::{Bandwidth, EmptyCall, adapters, bandwidth, device_time};
+use somatic::internal::backend::gpu::adapters;
+use somatic::internal::backend::gpu::{Bandwidth, EmptyCall, bandwidth, device_time};
+use somatic::internal::shape::Shape;
 use somatic::{BackendKind, Body, Outputs, Result};
-use somatic_engine::shape::Shape;
 
 /// Sensors, fields, members, and of one field more.
 const SKINS: [(usize, usize, usize, usize); 5] = [

@@ -13,13 +13,14 @@ use std::net::UdpSocket;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
+use somatic::internal::robot::messages::{Header, Marker, MarkerArray, Message as _, PointCloud2, PointField};
+use somatic::internal::sink::LimbSends;
 use somatic::robot::Ros2Source;
-use somatic::robot::messages::{Header, Marker, MarkerArray, Message as _, PointCloud2, PointField};
-use somatic::sink::{FieldNames, InputFrames, LimbSends, Ros2Sink, Session, Sink, ZenohSink};
+use somatic::sink::{FieldNames, InputFrames, Ros2Sink, Session, Sink, ZenohSink};
 use somatic::source::{LimbOptions, LimbSource, Source as _};
 use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue, Scene, touch};
 
-use somatic_engine::shape::Shape;
+use somatic::internal::shape::Shape;
 
 const TAXELS: usize = 1000;
 const FIELDS: usize = 80;

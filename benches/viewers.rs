@@ -15,12 +15,13 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use somatic::page::{Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
+use somatic::internal::page::{Mode, PageInfo, PageInput, PageScene, Publisher};
+use somatic::page::{Listen, Server};
 use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue, Scene};
 use tungstenite::http::Request;
 use tungstenite::{Message, WebSocket};
 
-use somatic_engine::shape::Shape;
+use somatic::internal::shape::Shape;
 
 const TAXELS: usize = 7560;
 const FIELDS: usize = 600;

@@ -7,10 +7,10 @@ use std::io::{Seek as _, SeekFrom};
 
 use divan::Bencher;
 use divan::counter::BytesCount;
+use somatic::internal::shape::Shape;
 use somatic::sink::{FieldNames, NdjsonSink, Sink};
 use somatic::source::{CsvSource, Source as _};
 use somatic::{BackendKind, Frame, Outputs};
-use somatic_engine::shape::Shape;
 
 fn main() {
     divan::main();

@@ -8,7 +8,8 @@ fn main() -> somatic::Result<()> {
     // Your robot would be `Body::load("robot.glb")?`. The default options ask for everything, on whatever is fastest.
     let body = Body::from_bytes("hand", somatic::bundled::HAND)?;
     let mut engine = Engine::new(&body, Options::default())?;
-    let fields: Vec<String> = engine.plan().fields().map(|(name, link)| format!("{name}, from {link}")).collect();
+    let fields: Vec<String> =
+        engine.plan().fields().map(|field| format!("{}, from {}", field.name, field.link)).collect();
 
     // One frame to fill again and again. What your driver leaves missing stays missing: it is never taken for zero.
     let mut frame = engine.frame(0.0);

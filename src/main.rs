@@ -1,6 +1,7 @@
 //! The command `somatic`: parse, call, exit code.
 
 mod cli;
+#[cfg(feature = "paper")]
 mod experiments;
 
 use std::process::ExitCode;

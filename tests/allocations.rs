@@ -69,9 +69,11 @@ impl somatic::source::Source for Emptied {
 #[cfg(feature = "meshes")]
 #[test]
 fn positions_of_joints_in_a_frame_allocate_nothing() {
-    use somatic::author::mesh::Up;
-    use somatic::robot::{JointOptions, JointedSource, Kinematics};
-    use somatic::source::{JointStates, Source as _};
+    use somatic::internal::author::mesh::Up;
+    use somatic::internal::robot::{JointOptions, JointedSource};
+    use somatic::internal::source::JointStates;
+    use somatic::robot::Kinematics;
+    use somatic::source::Source as _;
     let body = Body::from_bytes("hand", bundled::HAND).unwrap();
     // What hangs on the grip is no link of the body.
     let urdf = r#"<robot name="r"><link name="arm"/><link name="hand"/><link name="tool"/>
@@ -98,7 +100,7 @@ fn positions_of_joints_in_a_frame_allocate_nothing() {
 #[cfg(feature = "cli")]
 #[test]
 fn a_frame_that_is_shared_allocates_its_tasks_alone() {
-    use somatic_engine::shape::Shape;
+    use somatic::internal::shape::Shape;
     let shape = Shape { sensors: 5000, fields: 4400, members: 16, wide: 0, local: true, frames: 1, seed: 1 };
     let made = allocations(&shape.body(), Outputs::CENTROID | Outputs::ORIENTATION, None);
     let others = rayon::current_num_threads() as u64 - 1;

@@ -20,7 +20,8 @@ use common::data;
 use draft::{Draft, FLOAT};
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
-use somatic::body::{FieldSpec, Glb, MemberSpec, MeshData, Modality, Skinning, Taxel};
+use somatic::body::{FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::{Glb, MeshData, Skinning};
 use somatic::{Body, Result};
 
 /// What `work` gives, if it does so within `seconds` and without a panic.

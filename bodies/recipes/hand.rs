@@ -7,7 +7,8 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+use somatic::body::{ChartKind, ChartSpec, FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::{Glb, MeshData};
 
 use super::solid::{Solid, Taper, exit_point, mesh, smooth_min};
 

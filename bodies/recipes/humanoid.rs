@@ -8,8 +8,9 @@ use std::path::Path;
 
 use glam::{DMat4, DVec3};
 use somatic::Result;
-use somatic::author::{Recipe, author, heaviest_four};
-use somatic::body::{Glb, Original, Skinning};
+use somatic::author::{Recipe, author};
+use somatic::internal::author::heaviest_four;
+use somatic::internal::body::{Glb, Original, Skinning};
 
 use super::figure::{Figure, figure};
 use super::solid::{Solid, mesh};

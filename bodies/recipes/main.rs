@@ -11,8 +11,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use somatic::Result;
-use somatic::body::{Body, Glb};
-use somatic::field::TaxelGraph;
+use somatic::body::Body;
+use somatic::internal::body::Glb;
+use somatic::internal::field::TaxelGraph;
 
 /// Every file that the recipes make: its name in `bodies/`, and its bytes.
 pub(crate) fn files() -> Result<Vec<(&'static str, Vec<u8>)>> {

@@ -6,7 +6,8 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use somatic::body::{FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+use somatic::body::{FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::{Glb, MeshData};
 
 const ROWS: u32 = 64;
 const COLUMNS: u32 = 32;

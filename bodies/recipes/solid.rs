@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use fast_surface_nets::ndshape::{RuntimeShape, Shape};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use glam::DVec3;
-use somatic::body::MeshData;
+use somatic::internal::body::MeshData;
 
 /// A signed distance, at least near the surface: negative inside.
 pub(crate) trait Solid {

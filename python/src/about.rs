@@ -4,12 +4,16 @@ use std::path::Path;
 
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use somatic::author::{DrawnPoses, coverage, lint_with_progress};
-use somatic::field::{ContactTolerance, FieldSet, TaxelGraph, rest_overlaps};
+use somatic::author::coverage;
+use somatic::field::FieldSet;
+use somatic::internal::author::{DrawnPoses, lint_with_progress};
+use somatic::internal::field::{ContactTolerance, TaxelGraph, rest_overlaps};
+use somatic::internal::recording::{BagSurvey, Rhythm, Survey};
+use somatic::internal::setup::source_of;
+use somatic::internal::source::Layout;
 use somatic::percept::{COLUMNS, TOUCH_COLUMNS, TouchOutputs};
-use somatic::recording::{BagSurvey, Reader, Rhythm, Survey};
-use somatic::setup::source_of;
-use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorOptions, VendorSource};
+use somatic::recording::Reader;
+use somatic::source::{CsvSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Frame, Outputs, Result};
 
 use crate::body::PyBody;
@@ -38,7 +42,7 @@ fn size(path: &Path) -> u64 {
 }
 
 fn layout_of(layout: &Layout) -> Value {
-    let panel = |panel: &somatic::source::Panel| {
+    let panel = |panel: &somatic::internal::source::Panel| {
         json!({
             "name": panel.name, "taxels": panel.cells.len(), "placed": panel.is_placed,
             "area": panel.cells.iter().map(|cell| cell.area_m2).sum::<f64>(),
@@ -71,8 +75,8 @@ fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Res
         SourceSpec::Mcap(path) => {
             let mut reader = Reader::open(path)?;
             let survey = Survey::of(&mut reader, |_| {})?;
-            let topic = |t: &somatic::recording::Topic| json!({"topic": t.name, "encoding": t.encoding, "messages": t.messages, "bytes": t.bytes});
-            let attached = |a: &somatic::recording::Attached| json!({"name": a.name, "media_type": a.media_type, "bytes": a.bytes});
+            let topic = |t: &somatic::internal::recording::Topic| json!({"topic": t.name, "encoding": t.encoding, "messages": t.messages, "bytes": t.bytes});
+            let attached = |a: &somatic::internal::recording::Attached| json!({"name": a.name, "media_type": a.media_type, "bytes": a.bytes});
             let about = json!({
                 "kind": "MCAP", "bytes": size(path), "taxels": reader.taxels().len(), "posed_frames": survey.posed,
                 "topics": survey.topics.iter().map(topic).collect::<Vec<_>>(),

@@ -6,8 +6,9 @@ use glam::{DVec3, Vec3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use somatic::author::{Recipe, author};
-use somatic::body::{BODY_FROM_WORLD, Glb, MAX_TAXEL_ID, MeshData, Modality, Original, Taxel};
-use somatic::error::suggestion;
+use somatic::body::{MAX_TAXEL_ID, Modality, Taxel};
+use somatic::internal::body::{BODY_FROM_WORLD, Glb, MeshData, Original};
+use somatic::internal::error::suggestion;
 
 use crate::arrays::{doubles, shown, vectors};
 use crate::error::{unknown_name, usage};

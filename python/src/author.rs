@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use somatic::author::mesh::{Geometry, MeshOptions, author_mjcf_skin, author_urdf_skin};
-use somatic::author::{Authored, Recipe, author_csv_skin, author_icub, mesh};
+use somatic::author::{Authored, Recipe, author_csv_skin, author_icub};
 use somatic::body::{Original, Up};
+use somatic::internal::author::mesh;
 use somatic::{Body, Error, Result, bundled};
 
 use crate::body::PyBody;
@@ -270,7 +271,7 @@ fn on_shape(
             raised = heard.err();
             raised.is_none()
         };
-        named(shape, somatic::author::author_while(file, &recipe, shown)?)
+        named(shape, somatic::internal::author::author_while(file, &recipe, shown)?)
     });
     match raised {
         Some(error) => Err(interrupted(Some(error))),

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use somatic::author::{GridOrder, SheetGrid, author_sheets};
-use somatic::body::{LinkMotion, Original, WORLD_FROM_BODY};
-use somatic::error::suggestion;
 use somatic::field::FieldSet;
+use somatic::internal::author::{GridOrder, SheetGrid, author_sheets};
+use somatic::internal::body::{LinkMotion, Original, WORLD_FROM_BODY};
+use somatic::internal::error::suggestion;
 use somatic::signal::Pose;
 use somatic::{Body, OutputPath, bundled};
 

@@ -3,11 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use somatic::author::mesh::urdf_of_skin;
-use somatic::body::taxel_table;
+use somatic::internal::author::mesh::urdf_of_skin;
+use somatic::internal::body::taxel_table;
+use somatic::internal::recording::{BODY, CALIBRATION};
+use somatic::internal::source::CsvFile;
 use somatic::output::OutputPaths;
-use somatic::recording::{BODY, CALIBRATION, Recorder};
-use somatic::source::{CsvFile, Cut, Source, SourceSpec, VendorOptions};
+use somatic::recording::Recorder;
+use somatic::source::{Cut, Source, SourceSpec, VendorOptions};
 use somatic::{Error, Frame, OutputPath, Result, bundled};
 
 use crate::body::PyBody;

@@ -2,8 +2,9 @@
 
 use pyo3::prelude::*;
 use somatic::field::FieldSet;
+use somatic::internal::scene::choose_fields;
 use somatic::picture::{self, Moment, Moments, Options, Picture, Times, TouchPicture, View};
-use somatic::scene::{Coordinates, choose_fields};
+use somatic::scene::Coordinates;
 use somatic::{BackendKind, Engine, Error, Frame, Outputs, Scene};
 
 use crate::arrays::{array, values};

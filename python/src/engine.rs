@@ -6,8 +6,9 @@ use std::time::Instant;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use somatic::internal::signal::FrameBlock;
 use somatic::page::Listen;
-use somatic::signal::{FrameBlock, Pose};
+use somatic::signal::Pose;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts};
 
 use crate::agreement::told;

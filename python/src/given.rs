@@ -3,9 +3,9 @@
 use std::vec::IntoIter;
 
 use pyo3::prelude::*;
+use somatic::internal::tradeoff::TestFrames;
 use somatic::scene::file::LineKeys;
 use somatic::source::{Lines, SimulatedSource, Source, SourceSpec, TextSource, VendorOptions};
-use somatic::tradeoff::TestFrames;
 use somatic::{Error, Frame, Result};
 
 use crate::body::PyBody;

@@ -2,7 +2,7 @@
 
 use globset::GlobBuilder;
 use pyo3::prelude::*;
-use somatic::error::suggestion;
+use somatic::internal::error::suggestion;
 
 use crate::error::{unknown_name, usage};
 

@@ -6,8 +6,9 @@ use glam::{DAffine3, DQuat};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use somatic::Body;
-use somatic::body::{Link, LinkMotion, WORLD_FROM_BODY};
-use somatic::error::suggestion;
+use somatic::body::Link;
+use somatic::internal::body::{LinkMotion, WORLD_FROM_BODY};
+use somatic::internal::error::suggestion;
 use somatic::signal::Pose;
 
 use crate::arrays::{doubles, shown};

@@ -7,11 +7,12 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use somatic::error::parse_toml;
-use somatic::recording::{BODY, CALIBRATION};
-use somatic::run::{Arrival, Feed, Opened, Pace, ReadMode, Tell};
+use somatic::internal::error::parse_toml;
+use somatic::internal::recording::{BODY, CALIBRATION};
+use somatic::internal::run::{Arrival, Feed, Opened, Pace, ReadMode};
+use somatic::internal::setup::{Input, Setup, attachments};
+use somatic::run::Tell;
 use somatic::scene::file::SceneFile;
-use somatic::setup::{Input, Setup, attachments};
 use somatic::source::Lines;
 use somatic::{Engine, Error, Percepts};
 

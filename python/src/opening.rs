@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use somatic::recording::{BODY, CALIBRATION, Reader};
-use somatic::robot::BagSource;
-use somatic::signal::UnitOfP;
+use somatic::internal::recording::{BODY, CALIBRATION};
+use somatic::internal::robot::BagSource;
+use somatic::internal::signal::UnitOfP;
+use somatic::recording::Reader;
 use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec, VendorFormat, VendorOptions, VendorSource};
 use somatic::{Calibration, Error, bundled};
 

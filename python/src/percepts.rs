@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PySlice};
-use somatic::error::{suggestion, unknown};
+use somatic::internal::error::{suggestion, unknown};
+use somatic::internal::renamed::new_name;
+use somatic::internal::scene::AskedOutputs;
 use somatic::percept::ColumnValues;
-use somatic::renamed::new_name;
-use somatic::scene::AskedOutputs;
 use somatic::sink::TableKind;
 use somatic::{COLUMNS, Column, Flags, Outputs, Percepts};
 

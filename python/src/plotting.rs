@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
+use somatic::internal::plot::{Gathered, Gatherer, outputs_for, png, svg};
 use somatic::output::OutputPaths;
 use somatic::percept::Unit;
-use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
 use somatic::signal::Quantity;
 use somatic::source::Source;
 use somatic::{BackendKind, Engine, Error, Frame, Options, Outputs, Result, Scene};
@@ -80,7 +80,7 @@ pub(crate) fn plot(
     }
     let named = |name: &String| {
         Outputs::named(name).ok_or_else(|| {
-            let near = somatic::error::suggestion(name, somatic::COLUMNS.iter().map(|column| column.name));
+            let near = somatic::internal::error::suggestion(name, somatic::COLUMNS.iter().map(|column| column.name));
             Error::usage(format!("there is no output `{name}`; {near}"))
         })
     };

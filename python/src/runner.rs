@@ -7,8 +7,9 @@ use std::time::Instant;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use somatic::internal::run::{Feed, ReadMode, RunOptions};
 use somatic::output::OutputPaths;
-use somatic::run::{Feed, FrameInfo, Observer, ReadMode, Remark, Run as Running, RunOptions};
+use somatic::run::{FrameInfo, Observer, Remark, Run as Running};
 use somatic::sink::SinkSpec;
 use somatic::source::{Cut, SourceSpec, VendorOptions};
 use somatic::{BackendKind, Engine, Error, Frame};

@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyDictMethods, PyFloat, PyInt, PyString};
-use somatic::error::parse_toml;
+use somatic::internal::error::parse_toml;
 use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Calibration, Error, Options};
 

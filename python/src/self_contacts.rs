@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
-use somatic::error::suggestion;
+use somatic::internal::error::suggestion;
 use somatic::sink::TableKind;
 use somatic::{Percepts, SelfContact};
 

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use somatic::recording::CALIBRATION;
+use somatic::internal::recording::CALIBRATION;
+use somatic::internal::sink::{RecordPart, TableWish};
 use somatic::signal::Quantity;
-use somatic::sink::{FieldNames, RecordPart, Session, TableWish};
+use somatic::sink::{FieldNames, Session};
 use somatic::{Body, Engine, Outputs, Plan, Precision};
 
 /// The run that percepts are of.
@@ -36,14 +37,14 @@ impl Run {
         calibration: Option<&str>,
     ) -> Self {
         let plan = engine.plan().clone();
-        let (name, what, why) = engine.backend();
+        let chosen = engine.backend();
         let labels = (0..plan.fields().len()).map(|field| plan.label(field)).collect();
         Self {
             names: FieldNames::all_of(&plan),
             labels,
             outputs: engine.percepts().outputs(),
             precision: engine.percepts().precision(),
-            backend: [name.to_owned(), what, why.to_owned()],
+            backend: [chosen.name.to_owned(), chosen.device, chosen.reason.to_owned()],
             ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
             plan,
             body: Arc::clone(body),
@@ -64,7 +65,11 @@ impl Run {
         if attached {
             let text =
                 |name: &str, text: &str| (name.to_owned(), "application/toml".to_owned(), text.as_bytes().to_vec());
-            files.push((self.body.name.clone(), somatic::recording::BODY.to_owned(), self.body_bytes.to_vec()));
+            files.push((
+                self.body.name.clone(),
+                somatic::internal::recording::BODY.to_owned(),
+                self.body_bytes.to_vec(),
+            ));
             files.push(text("scene.toml", &self.scene));
             files.extend(self.calibration.as_deref().map(|calibration| text(CALIBRATION, calibration)));
         }

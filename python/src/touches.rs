@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
-use somatic::error::{nearest, suggestion};
+use somatic::internal::error::{nearest, suggestion};
+use somatic::internal::renamed::new_name;
 use somatic::percept::Unit;
-use somatic::renamed::new_name;
 use somatic::sink::TableKind;
 use somatic::{Percepts, TOUCH_COLUMNS, Touch, TouchColumn};
 

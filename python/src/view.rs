@@ -5,8 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use pyo3::prelude::*;
-use somatic::page::{Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
-use somatic::signal::FrameBlock;
+use somatic::internal::page::{Mode, PageInfo, PageInput, PageScene, Publisher};
+use somatic::internal::signal::FrameBlock;
+use somatic::page::{Listen, Server};
 use somatic::{Body, Engine, Frame};
 
 /// A page that is served.
@@ -26,11 +27,11 @@ pub(crate) struct Page {
 impl Page {
     /// Serves a page of `engine`, which has `body` and frames with the values of `channels`.
     pub(crate) fn start(listen: &Listen, engine: &Engine, body: &Body, channels: &[u32]) -> somatic::Result<Self> {
-        let (name, what, why) = engine.backend();
+        let chosen = engine.backend();
         let info = PageInfo {
             source: "Python",
             mode: Mode::Live,
-            backend: [name, &what, why],
+            backend: [chosen.name, &chosen.device, chosen.reason],
             taxels: channels,
             wiring: None,
             recorded_max: None,

@@ -1,18 +1,20 @@
 //! `somatic bench`: how fast a backend is on a made-up skin of any size.
 
+mod dump;
+mod npy;
+
 use std::hint::black_box;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::experiments::dump;
 use clap::Args;
 use serde_json::json;
-use somatic::limits::{self, MAX_SYSTEM_BYTES};
-use somatic::output::OutputFolder;
-use somatic::setup::FilesRead;
-use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result};
-use somatic_engine::shape::Shape;
+use somatic::internal::limits::{self, MAX_SYSTEM_BYTES};
+use somatic::internal::output::OutputFolder;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::shape::Shape;
+use somatic::{BackendKind, Body, ChosenBackend, Engine, Error, Frame, Outputs, Result};
 
 use super::bar::Bar;
 use super::interrupt::stop_soon_on_signal;
@@ -31,7 +33,7 @@ A rate counts each sensor of each field in each frame: memberships per second.";
 
 /// Nothing is measured before this long, and one call at least: memory is at hand then, and the clock has settled.
 const WARM_UP: Duration = Duration::from_millis(100);
-/// Unless calls are counted, no more are begun after this long or so many, but for the fewest.
+/// Unless their number is asked for, calls end after this time or this number, but not before the least number.
 const LONG_ENOUGH: Duration = Duration::from_secs(2);
 const ENOUGH: usize = 20_000;
 const FEWEST: usize = 3;
@@ -118,14 +120,14 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
         write_first_call(folder, &shape, &body, &frames, &mut engine)?;
     }
     let times = measure(&mut engine, &shape, &mut frames, arguments.calls, &stop)?;
-    let (name, adapter, _) = engine.backend();
+    let ChosenBackend { name, device, .. } = engine.backend();
     let rate = shape.memberships() as f64 / times.median_s;
     print(&match arguments.json {
         true => {
             let us = |seconds: f64| (seconds * 1e9).round() / 1e3;
             let (median, p99) = (us(times.median_s), us(times.p99_s));
             let line = json!({
-                "backend": name, "adapter": adapter, "us_median": median, "us_p99": p99, "rate": rate.round(),
+                "backend": name, "adapter": device, "us_median": median, "us_p99": p99, "rate": rate.round(),
             });
             format!("{line}\n")
         }
@@ -134,7 +136,7 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
             let (median, p99) = (time(times.median_s), time(times.p99_s));
             let each_ns = 1e9 / rate;
             format!(
-                "{}\n{name}: {adapter}\nmedian {median}, 99 % within {p99}, of {calls}\n{} memberships/s, {each_ns:.3} ns each\n",
+                "{}\n{name}: {device}\nmedian {median}, 99 % within {p99}, of {calls}\n{} memberships/s, {each_ns:.3} ns each\n",
                 words(&shape),
                 short(rate),
             )
@@ -184,7 +186,7 @@ fn write_first_call(
     frames: &[Frame],
     engine: &mut Engine,
 ) -> Result<()> {
-    let backend = engine.backend().0;
+    let backend = engine.backend().name;
     let percepts = engine.process(frames)?;
     dump::write(folder, shape, body, frames, percepts, backend)
 }

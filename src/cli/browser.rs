@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-use somatic::output::PrivateFile;
+use somatic::internal::output::PrivateFile;
 use somatic::{Error, Result};
 
 /// What opens a file with the program that people have chosen for it.

@@ -8,13 +8,14 @@ use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
-use somatic::scene::file::{hertz, length, seconds};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::{in_body, load_body};
-use somatic::signal::{RawValue, UnitOfP};
+use somatic::internal::scene_file::{hertz, length, seconds};
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::bodies::{in_body, load_body};
+use somatic::internal::signal::UnitOfP;
+use somatic::internal::survey::known::{KnownForce, PressedOn};
+use somatic::internal::survey::{Findings, Found, Survey, Wishes};
+use somatic::signal::RawValue;
 use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, VendorSource};
-use somatic::survey::known::{KnownForce, PressedOn};
-use somatic::survey::{Findings, Found, Survey, Wishes};
 use somatic::{Body, Calibration, Error, Result};
 
 use super::interrupt::stop_on_signal;
@@ -25,7 +26,7 @@ use super::stdio::{print, say, tell_losses};
 use super::table::{more, plain, shown};
 use super::text_flags::TextFlags;
 use super::words::{bullet, count};
-use somatic::run::{Arrival, Feed, ReadMode, left_out};
+use somatic::internal::run::{Arrival, Feed, ReadMode, left_out};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -7,14 +7,16 @@ use std::slice;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
-use somatic::limits::{self, MAX_TOML_BYTES};
-use somatic::recording::{BODY, CALIBRATION, Reader, Recorder};
-use somatic::run::left_out;
-use somatic::setup::FilesRead;
-use somatic::setup::attached::{self, body_bytes, file_name};
-use somatic::setup::overlaid::{How, overlaid};
-use somatic::setup::source_of;
-use somatic::source::{CsvFile, SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
+use somatic::internal::limits::{self, MAX_TOML_BYTES};
+use somatic::internal::recording::{BODY, CALIBRATION};
+use somatic::internal::run::left_out;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::attached::{self, body_bytes, file_name};
+use somatic::internal::setup::overlaid::{How, overlaid};
+use somatic::internal::setup::source_of;
+use somatic::internal::source::CsvFile;
+use somatic::recording::{Reader, Recorder};
+use somatic::source::{SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Frame, Result};
 
 use super::bar::Bar;
@@ -138,8 +140,7 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
             Target::Mcap(recorder) => recorder.finish_early()?,
         };
         let mut losses = source.losses();
-        let absent: Vec<String> = absent.into_iter().collect();
-        losses.push(left_out(&arguments.from, frames, last_s, source.progress(), &absent));
+        losses.push(left_out(&arguments.from, frames, last_s, source.progress(), absent.as_slice()));
         return Ok(tell_losses(&losses));
     }
     match target {

@@ -1,7 +1,8 @@
 //! `run --describe`: the columns of the tables that sinks write.
 
 use comfy_table::Cell;
-use somatic::sink::{Session, SinkSpec, TableColumn, percept_columns, self_contact_columns, touch_columns};
+use somatic::internal::sink::{TableColumn, percept_columns, self_contact_columns, touch_columns};
+use somatic::sink::{Session, SinkSpec};
 use somatic::{Error, Outputs, Result};
 
 use super::table::{plain, shown};

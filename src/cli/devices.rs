@@ -29,7 +29,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn devices(arguments: &Arguments) -> Result<u8> {
-    let found = Devices { cpu: somatic::backend::processor(), gpus: gpus(), ports: serial_ports()? };
+    let found = Devices { cpu: somatic::internal::backend::processor(), gpus: gpus(), ports: serial_ports()? };
     print(&if arguments.json { format!("{:#}\n", found.json()) } else { found.text() })?;
     Ok(DONE)
 }
@@ -52,7 +52,8 @@ struct Gpus {
 
 #[cfg(feature = "gpu")]
 fn gpus() -> Gpus {
-    use somatic::backend::gpu::{adapters, silent_gpus};
+    use somatic::internal::backend::gpu::adapters;
+    use somatic::internal::backend::gpu::silent_gpus;
 
     let adapters = adapters();
     let mut missing: Vec<String> = silent_gpus(&adapters)

@@ -1,7 +1,7 @@
 //! Errors that are to be expected on a layout, in words and as JSON.
 
 use serde_json::{Value, json};
-use somatic::expected::{LayoutErrors, Percentiles, TestTouches, expected_and_ideal_errors};
+use somatic::internal::expected::{LayoutErrors, Percentiles, TestTouches, expected_and_ideal_errors};
 use somatic::{Body, Result};
 
 /// The errors of usual touches on `body`, and on an ideal skin that is as dense.
@@ -87,7 +87,7 @@ pub(super) fn json(errors: &LayoutErrors) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use somatic::expected::TouchError;
+    use somatic::internal::expected::TouchError;
 
     use super::*;
 

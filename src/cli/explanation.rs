@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Sender, channel};
 
 use serde_json::{Value, json};
-use somatic::sink::Question;
+use somatic::internal::sink::Question;
 use somatic::{Body, Engine, EngineState, Frame, Options, Result, Verdict};
 
 /// The message that says how `field` came about in the last of `frames`, which `engine` processes beside the reference, from the
@@ -58,7 +58,7 @@ pub(super) fn explanation(
         "field": field,
         "frame": number,
         "t_s": frame.t_s,
-        "backend": engine.backend().0,
+        "backend": engine.backend().name,
         "flags": flags,
         "members": members.collect::<Vec<Value>>(),
         "columns": columns,

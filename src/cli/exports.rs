@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use somatic::Result;
-use somatic::scene::file::{SceneFile, hertz};
+use somatic::internal::scene_file::hertz;
+use somatic::scene::file::SceneFile;
 use somatic::source::{VendorFormat, VendorOptions};
 
 use super::scene::{in_flags, one_of};

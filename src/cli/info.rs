@@ -5,10 +5,12 @@ mod contacts;
 
 use clap::Args;
 use serde_json::{Value, json};
-use somatic::recording::{Attached, BagSurvey, Reader, Rhythm, Survey};
-use somatic::setup::attached;
-use somatic::setup::source_of;
-use somatic::source::{CsvSource, Layout, Source, SourceSpec, VendorSource};
+use somatic::internal::recording::{Attached, BagSurvey, Rhythm, Survey};
+use somatic::internal::setup::attached;
+use somatic::internal::setup::source_of;
+use somatic::internal::source::Layout;
+use somatic::recording::Reader;
+use somatic::source::{CsvSource, Source, SourceSpec, VendorSource};
 use somatic::{Body, Calibration, Error, Frame, Result};
 
 use self::contacts::Contacts;

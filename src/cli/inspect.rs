@@ -8,13 +8,16 @@ mod report;
 use std::path::PathBuf;
 
 use clap::Args;
-use somatic::author::mesh::Up;
-use somatic::author::{DrawnPoses, coverage, lint_with_progress};
+use somatic::author::coverage;
 use somatic::error::{Error, Result};
-use somatic::field::{ContactTolerance, FieldSet, TaxelGraph, rest_overlaps};
-use somatic::robot::{Kinematics, drawn_poses};
-use somatic::scene::file::metres;
-use somatic::setup::bodies::load_body;
+use somatic::field::FieldSet;
+use somatic::internal::author::mesh::Up;
+use somatic::internal::author::{DrawnPoses, lint_with_progress};
+use somatic::internal::field::{ContactTolerance, TaxelGraph, rest_overlaps};
+use somatic::internal::robot::drawn_poses;
+use somatic::internal::scene_file::metres;
+use somatic::internal::setup::bodies::load_body;
+use somatic::robot::Kinematics;
 
 use self::graph::SkinGraph;
 use self::inspection::Inspection;

@@ -8,7 +8,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use console::Term;
-use somatic::output::abandon_outputs;
+use somatic::internal::output::abandon_outputs;
 use somatic::{Error, Result};
 
 #[cfg(unix)]

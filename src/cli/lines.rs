@@ -5,11 +5,12 @@ use std::time::{Duration, Instant};
 
 use console::style;
 use serde_json::{Value, json};
+use somatic::internal::run::Repeats;
+use somatic::internal::signal::BoardHealth;
+use somatic::internal::sink::News;
+use somatic::internal::source::{BoardAccount, BoardState};
 use somatic::output::OutputPath;
-use somatic::run::Repeats;
-use somatic::signal::BoardHealth;
-use somatic::sink::News;
-use somatic::source::{BoardAccount, BoardState, Lines};
+use somatic::source::Lines;
 use somatic::{Error, Result};
 
 use super::latency::Latency;

@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use console::{Term, style};
-use somatic::{Body, Engine, Outputs, Percept, Percepts, plain};
+use somatic::internal::plain;
+use somatic::{Body, ChosenBackend, Engine, Outputs, Percept, Percepts};
 
 use super::screen::Screen;
 use super::words::{clipped, count, fitted, number, span};
@@ -220,7 +221,7 @@ struct Table {
 
 impl Table {
     fn new(about: &RunInfo<'_>) -> Self {
-        let (name, what, _) = about.engine.backend();
+        let ChosenBackend { name, device: what, .. } = about.engine.backend();
         let plan = about.engine.plan();
         let unit = plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::of);
         let row = |field: usize| FieldRow {

@@ -3,7 +3,7 @@
 mod author;
 mod bar;
 mod bench;
-#[cfg(unix)]
+#[cfg(all(feature = "board", unix))]
 mod board;
 #[cfg(feature = "page")]
 mod browser;
@@ -28,6 +28,7 @@ mod lines;
 mod live;
 mod old_names;
 mod outputs;
+#[cfg(feature = "paper")]
 mod paper;
 mod plan;
 mod plot;
@@ -43,6 +44,7 @@ mod stdio;
 mod table;
 mod text_flags;
 mod tradeoff;
+#[cfg(feature = "tune")]
 mod tune;
 mod verify;
 #[cfg(feature = "page")]
@@ -111,11 +113,13 @@ enum Command {
     Info(info::Arguments),
     Convert(convert::Arguments),
     Plot(Box<plot::Arguments>),
+    #[cfg(feature = "paper")]
     Paper(paper::Arguments),
-    #[cfg(unix)]
+    #[cfg(all(feature = "board", unix))]
     Board(Box<board::Arguments>),
     Bench(bench::Arguments),
     Calibrate(calibrate::Arguments),
+    #[cfg(feature = "tune")]
     Tune(tune::Arguments),
     Devices(devices::Arguments),
     Outputs(outputs::Arguments),
@@ -168,11 +172,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8> {
         Command::Info(arguments) => info::info(arguments),
         Command::Convert(arguments) => convert::convert(arguments),
         Command::Plot(arguments) => plot::plot(arguments).map_err(in_flags),
+        #[cfg(feature = "paper")]
         Command::Paper(arguments) => paper::paper(arguments),
-        #[cfg(unix)]
+        #[cfg(all(feature = "board", unix))]
         Command::Board(arguments) => board::run(arguments),
         Command::Bench(arguments) => bench::bench(arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(arguments),
+        #[cfg(feature = "tune")]
         Command::Tune(arguments) => tune::tune(arguments),
         Command::Devices(arguments) => devices::devices(arguments),
         Command::Completions(arguments) => completions::completions(arguments, &mut command()),

@@ -3,7 +3,7 @@
 use std::error::Error as _;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use somatic::renamed::new_name;
+use somatic::internal::renamed::new_name;
 
 /// In one line, what is given under an old name, if that is what `error` says of the arguments of `command`.
 pub(super) fn told(error: &clap::Error, command: &clap::Command) -> Option<String> {

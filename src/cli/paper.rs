@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use crate::experiments;
 use clap::Args;
 use somatic::error::Result;
-use somatic::setup::FilesRead;
+use somatic::internal::setup::FilesRead;
 
 use super::bar::Bar;
 use super::stdio::{DONE, print};

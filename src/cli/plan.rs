@@ -9,9 +9,9 @@ mod timed;
 use std::path::PathBuf;
 
 use clap::Args;
+use somatic::internal::setup::bodies::load_body;
+use somatic::internal::setup::{Input, Setup};
 use somatic::scene::file::SceneFile;
-use somatic::setup::bodies::load_body;
-use somatic::setup::{Input, Setup};
 use somatic::{Error, Result};
 
 use self::bill::Bill;

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
+use somatic::internal::plot::{Gathered, Gatherer, outputs_for, png, svg};
+use somatic::internal::run::left_out;
+use somatic::internal::scene::AskedOutputs;
+use somatic::internal::scene_file::seconds;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::RECORDED_BATCH;
+use somatic::internal::setup::Setup;
 use somatic::percept::Unit;
-use somatic::plot::{Gathered, Gatherer, outputs_for, png, svg};
-use somatic::run::left_out;
-use somatic::scene::AskedOutputs;
-use somatic::scene::file::seconds;
-use somatic::setup::FilesRead;
-use somatic::setup::RECORDED_BATCH;
-use somatic::setup::Setup;
 use somatic::signal::Quantity;
 use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
 

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use somatic::Result;
-use somatic::scene::file::{LineKeys, hertz};
+use somatic::internal::scene_file::hertz;
+use somatic::scene::file::LineKeys;
 use somatic::source::SourceSpec;
 
 use super::scene::in_flags;

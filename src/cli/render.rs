@@ -9,10 +9,10 @@ use clap::Args;
 use somatic::Error;
 use somatic::error::Result;
 use somatic::field::FieldSet;
+use somatic::internal::scene::choose_fields;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::bodies::load_body;
 use somatic::picture::{self, ChartPicture, Options, View};
-use somatic::scene::choose_fields;
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
 
 use super::stdio::DONE;
 

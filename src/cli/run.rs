@@ -7,11 +7,12 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::Setup;
+use somatic::internal::sink::TableName;
 use somatic::output::{OutputPath, OutputPaths};
 use somatic::run::Run;
-use somatic::setup::FilesRead;
-use somatic::setup::Setup;
-use somatic::sink::{SinkSpec, SinkTarget, TableName};
+use somatic::sink::{SinkSpec, SinkTarget};
 use somatic::{Error, Result};
 
 use self::console::Console;
@@ -184,7 +185,7 @@ fn finish(mut run: Run, mut console: Console, is_ended: impl Fn() -> bool) -> Re
     outcome.notices.iter().for_each(|notice| say(notice));
     let code = tell_losses(&outcome.losses);
     if let Some(agreement) = outcome.agreement {
-        say_lines(&format!("backend {} {agreement}", outcome.engine.backend().0));
+        say_lines(&format!("backend {} {agreement}", outcome.engine.backend().name));
         if !agreement.holds() {
             return Ok(FAILED);
         }

@@ -8,8 +8,8 @@ mod run_flags;
 use std::path::Path;
 
 use somatic::Result;
+use somatic::internal::setup::{Input, Setup, Tell};
 use somatic::scene::file::SceneFile;
-use somatic::setup::{Input, Setup, Tell};
 use somatic::source::SourceSpec;
 
 pub(super) use self::flags::{LIVE, first, grouped, one_of};

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use somatic::setup::FilesRead;
-use somatic::source::{SimulatedSource, write_recording_with_progress};
+use somatic::internal::setup::FilesRead;
+use somatic::internal::source::write_recording_with_progress;
+use somatic::source::SimulatedSource;
 use somatic::{Error, Result};
 
 use super::bar::Bar;

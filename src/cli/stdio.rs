@@ -5,8 +5,10 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-use somatic::output::{OutputPaths, refuse_standard_output};
-use somatic::{Error, Result, plain};
+use somatic::internal::output::refuse_standard_output;
+use somatic::internal::plain;
+use somatic::output::OutputPaths;
+use somatic::{Error, Result};
 
 /// Exit code: everything was done.
 pub(super) const DONE: u8 = 0;

@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table};
 use console::{Term, style};
-use somatic::plain;
+use somatic::internal::plain;
 
 /// A table whose cells are one line each, without what a terminal would obey.
 pub(super) struct TextTable(Table);

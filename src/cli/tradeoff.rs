@@ -9,10 +9,10 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use console::style;
-use somatic::scene::file::seconds;
-use somatic::setup::bodies::load_body;
-use somatic::setup::{FilesRead, Setup};
-use somatic::tradeoff::{
+use somatic::internal::scene_file::seconds;
+use somatic::internal::setup::bodies::load_body;
+use somatic::internal::setup::{FilesRead, Setup};
+use somatic::internal::tradeoff::{
     CallMode, Errors, Measurement, Pick, Report, Store, Tested, TrueErrors, plot_png, plot_svg, software, usual_frames,
 };
 use somatic::{BackendKind, Engine, Error, OutputPath, Result};

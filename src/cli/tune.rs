@@ -8,11 +8,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use somatic::scene::file::seconds;
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
+use somatic::internal::scene_file::seconds;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::bodies::load_body;
+use somatic::internal::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use somatic::signal::{FsrCircuit, Wiring};
-use somatic::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use somatic::{Error, Result};
 
 use self::session::{PhaseEnd, PhaseLimit, TuningSession};

@@ -7,7 +7,7 @@ use super::stdio::say;
 /// Whether there is another backend than the reference to compare with it: an error where the reference was asked for, and
 /// said where a measurement chose it.
 pub(super) fn has_another_to_compare(engine: &Engine, chosen: Option<&str>) -> Result<bool> {
-    if engine.backend().0 != "reference" {
+    if engine.backend().name != "reference" {
         return Ok(true);
     }
     if chosen.is_none() {

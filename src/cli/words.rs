@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use console::{Alignment, Term, measure_text_width, pad_str, style, truncate_str};
-use somatic::{Error, Result, plain};
+use somatic::internal::plain;
+use somatic::{Error, Result};
 
 /// `value` with four significant digits, in at most nine characters.
 pub(super) fn number(value: f64) -> String {

@@ -8,7 +8,7 @@
 //! deviations of it. Places are spread evenly over the surface near taxels. Touches that three taxels or more feel are counted.
 //!
 //! ```
-//! use somatic::expected::{TestTouches, expected_errors, ideal_errors};
+//! use somatic::internal::expected::{TestTouches, expected_errors, ideal_errors};
 //! use somatic::{Body, bundled};
 //!
 //! # fn main() -> somatic::Result<()> {

@@ -6,7 +6,7 @@ use super::trial::{self, Moment, Signal, Trial};
 use somatic::body::Body;
 use somatic::error::Result;
 use somatic::field::FieldSet;
-use somatic::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
+use somatic::internal::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
 use somatic::signal::FsrCircuit;
 
 /// Simulations that users can run, too.

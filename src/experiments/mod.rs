@@ -1,13 +1,10 @@
-//! Experiments: the paper's figures from simulation, with a table of errors (`docs/evidence/paper.md`), and speed on synthetic bodies
-//! (`docs/evidence/performance.md`).
+//! Experiments: the paper's figures from simulation, with a table of errors (`docs/evidence/paper.md`).
 
 mod chart_fit;
-pub mod dump;
 mod figures;
 mod kalman;
 mod metric;
 mod motion;
-mod npy;
 mod table;
 mod trial;
 
@@ -17,7 +14,7 @@ use self::table::Table;
 use somatic::body::Body;
 use somatic::bundled;
 use somatic::error::{Error, Result};
-use somatic::output::OutputFolder;
+use somatic::internal::output::OutputFolder;
 
 /// The files that [`write()`] writes.
 pub const FILES: [&str; 9] =

@@ -5,6 +5,7 @@ use crate::ink;
 
 /// A picture that was drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Picture {
     /// Width and height, pixels.
     pub size: [u32; 2],

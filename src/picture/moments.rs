@@ -67,6 +67,8 @@ pub struct Moments {
     quantity: Quantity,
 }
 
+somatic_skin::debug_by_name!(Moments);
+
 impl Moments {
     /// Runs all `frames` of the recording called `name` through `engine`, which looks for touches of `body` ([`crate::Scene::touches`])
     /// and leaves them in their links' frames, and keeps what is shown of `times`.

@@ -69,6 +69,8 @@ pub struct TouchPicture<'a> {
     edges: Option<Lines>,
 }
 
+somatic_skin::debug_by_name!(TouchPicture<'_>);
+
 impl<'a> TouchPicture<'a> {
     /// For touches of `body` with `fields`; with `ids`, taxels are labelled with their ids in the views that see them.
     ///

@@ -10,6 +10,7 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::field::FieldSet;
 use crate::percept::{COLUMNS, Column, Outputs, Percepts, Unit};
+use crate::scene::PlannedField;
 use crate::signal::Frame;
 
 /// Most fields that are gathered, and most that are shown.
@@ -102,8 +103,8 @@ impl Gatherer {
         let columns: Vec<&'static Column> = COLUMNS.iter().filter(|column| shown.contains(column.output)).collect();
         let index_of_name: HashMap<&str, usize> =
             set.fields.iter().enumerate().map(|(index, field)| (field.name.as_str(), index)).collect();
-        let followed = |(in_plan, (name, _)): (usize, (&str, &str))| {
-            let in_body = *index_of_name.get(name)?;
+        let followed = |(in_plan, field): (usize, PlannedField<'_>)| {
+            let in_body = *index_of_name.get(field.name)?;
             let series = columns.iter().map(|column| vec![Series::default(); column.components]).collect();
             Some(Followed { in_plan, in_body, series, path: Path::default(), most_load: 0.0, impulse: 0.0 })
         };

@@ -24,6 +24,7 @@ pub enum Arrival {
 
 /// What a source says at its end.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct Ending {
     /// What was never processed.
     pub losses: Vec<String>,
@@ -35,6 +36,7 @@ pub struct Ending {
 
 /// Information on frames.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct FrameInfo {
     /// The share of the source that has been read, if known.
     pub progress: Option<f64>,

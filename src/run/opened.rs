@@ -91,8 +91,8 @@ impl Opened {
         };
         let source = setup.jointed(source, &body)?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
-        let (name, device, own) = engine.backend();
-        let backend = [name.to_owned(), device, why.unwrap_or_else(|| own.to_owned())];
+        let chosen = engine.backend();
+        let backend = [chosen.name.to_owned(), chosen.device, why.unwrap_or_else(|| chosen.reason.to_owned())];
         Ok(Self { body, engine, backend, source, lines, wiring, pace })
     }
 

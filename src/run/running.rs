@@ -51,7 +51,11 @@ pub struct Run {
     pub(super) lines: Option<Lines>,
 }
 
+somatic_skin::debug_by_name!(Run);
+
 /// What became of a run.
+#[derive(Debug)]
+#[non_exhaustive]
 pub struct Outcome {
     /// The engine, after its last frame.
     pub engine: Engine,
@@ -218,9 +222,8 @@ impl Run {
     }
 }
 
-/// What is said of a recording that was left before its end: after so many frames, the last one at `t_s`; and of files that are not
-/// there for this reason.
-#[doc(hidden)]
+/// What is said of a recording that was left before its end, after `frames` frames, the last one at `t_s`; and of the files that
+/// are `absent` for this reason.
 #[must_use]
 pub fn left_out(recording: &str, frames: u64, t_s: f64, progress: Option<f64>, absent: &[String]) -> String {
     let mut text = match frames {

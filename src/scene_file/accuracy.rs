@@ -123,6 +123,7 @@ impl Accuracy {
     }
 
     /// What is wished for, if anything is.
+    #[doc(hidden)]
     #[must_use]
     pub fn target(&self) -> Target {
         Target { centroid_m: self.centroid_m, orientation_rad: self.orientation_rad, budget_s: self.budget_s }

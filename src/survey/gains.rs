@@ -3,7 +3,7 @@
 use toml_edit::{DocumentMut, Item, Table, value};
 
 use crate::error::{Error, Result};
-use crate::gains::GainsEstimate;
+use somatic_engine::gains::GainsEstimate;
 
 /// The layer's own σ where all touches were by the flat end of a stamp: an even disc has a variance of R²/4 each way.
 ///

@@ -25,7 +25,6 @@ pub use frames::TestFrames;
 pub use ladder::{Rung, ladder};
 pub use measure::{MeasureOptions, measure};
 pub use plot::{plot_png, plot_svg};
-#[doc(hidden)]
 pub use store::{Found, Store, Stored, day};
 pub use target::Pick;
 #[doc(hidden)]

@@ -92,15 +92,15 @@ fn what_the_sketches_print_is_read() {
 #[test]
 fn the_sketch_with_packets_speaks_the_protocol() {
     let Some(bytes) = sent("somatic_board", 100_000) else { return };
-    let mut decoder = somatic::wire::Decoder::new();
+    let mut decoder = somatic::internal::wire::Decoder::new();
     let (mut frames, mut identities) = (0, 0);
     decoder.push(&bytes, |event| match event {
-        somatic::wire::Event::Frame { values, .. } => {
+        somatic::internal::wire::Event::Frame { values, .. } => {
             let values: Vec<u16> = values.iter().map(|(_, value)| value).collect();
             assert_eq!(values, [0, 1, 2, 3]);
             frames += 1;
         }
-        somatic::wire::Event::Identity { identity, .. } => {
+        somatic::internal::wire::Event::Identity { identity, .. } => {
             assert_eq!((identity.channels, identity.rate_mhz), (4, 100_000));
             identities += 1;
         }

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use glam::DVec3;
 use serde_json::{Value, json};
-use somatic::robot::messages::{
+use somatic::internal::robot::messages::{
     Float32MultiArray, Header, JointState, Message, MultiArrayLayout, PointCloud2, PointField, Time,
 };
 

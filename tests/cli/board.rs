@@ -5,7 +5,7 @@ use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use somatic::wire::{Bits, Command, Corruption, Decoder, Dialogue, Event, Outcome, RetryPolicy, Status};
+use somatic::internal::wire::{Bits, Command, Corruption, Decoder, Dialogue, Event, Outcome, RetryPolicy, Status};
 
 use crate::{done, fails, somatic};
 
@@ -81,7 +81,7 @@ fn listen(port: &mut serialport::TTYPort, decoder: &mut Decoder, mut on: impl Fn
 
 /// Asks until it is answered.
 fn ask(port: &mut serialport::TTYPort, decoder: &mut Decoder, command: Command) -> Outcome {
-    let mut dialogue = Dialogue::new(somatic::wire::ANY_BOARD, RetryPolicy::default(), 0);
+    let mut dialogue = Dialogue::new(somatic::internal::wire::ANY_BOARD, RetryPolicy::default(), 0);
     dialogue.ask(command).unwrap();
     let (start, mut buffer, mut ended) = (Instant::now(), [0; 4096], None);
     loop {

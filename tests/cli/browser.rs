@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 #[cfg(any(feature = "serial", feature = "zenoh"))]
-use somatic::source::BoardState;
+use somatic::internal::source::BoardState;
 use somatic_testing::skip;
 
 /// Browsers by the names that systems give them.

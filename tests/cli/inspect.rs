@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use serde_json::{Value, json};
-use somatic::body::{FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+use somatic::body::{FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::{Glb, MeshData};
 
 use super::{done, fails, file, output, text_of};
 

@@ -78,7 +78,7 @@ mod voronoi;
 mod world;
 
 // The library's own numbers that look like chance.
-use somatic_skin::random;
+use somatic::internal::random;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

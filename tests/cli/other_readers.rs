@@ -5,7 +5,8 @@ use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
-use somatic::author::mesh::{MeshOptions, Up, open};
+use somatic::author::mesh::{MeshOptions, open};
+use somatic::internal::author::mesh::Up;
 
 use crate::python::python_with;
 use crate::{stderr, text_of};

@@ -31,7 +31,7 @@ fn ids() -> Vec<u32> {
 fn recorded(path: &Path, count: u64, keep: bool) -> Vec<Frame> {
     let ids = ids();
     let mut recorder = Recorder::create(OutputPath::new(path, false, &[]).unwrap(), &ids).unwrap();
-    recorder.attach("hand", somatic::recording::BODY, somatic::bundled::HAND).unwrap();
+    recorder.attach("hand", somatic::internal::recording::BODY, somatic::bundled::HAND).unwrap();
     let mut chance = Random::new(7);
     let mut kept = Vec::new();
     let mut frame = Frame::missing(0.0, ids.len());
@@ -354,7 +354,7 @@ fn survive(rounds: u64, end: Option<Instant>, seed: u64) -> u64 {
         let attached = reader.attached().to_vec();
         for file in attached {
             if let Ok(bytes) = reader.bytes_of(&file) {
-                assert!(file.media_type != somatic::recording::BODY || bytes == somatic::bundled::HAND);
+                assert!(file.media_type != somatic::internal::recording::BODY || bytes == somatic::bundled::HAND);
             }
         }
     }
@@ -637,7 +637,7 @@ fn what_is_stale_is_stale_in_a_recording() {
     let body = somatic::Body::from_bytes("hand", somatic::bundled::HAND).unwrap();
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let mut recorder = Recorder::create(OutputPath::new(place("a.mcap"), false, &[]).unwrap(), &ids).unwrap();
-    recorder.attach("hand", somatic::recording::BODY, somatic::bundled::HAND).unwrap();
+    recorder.attach("hand", somatic::internal::recording::BODY, somatic::bundled::HAND).unwrap();
     // The first frames are all there, then a third of them is stale, then most are; one is only missing.
     let stale_in = |index: usize, value: usize| value < [0, ids.len() / 3, ids.len() - 5][index / 100];
     let frames_of = |index: usize| {

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
-use somatic::robot::messages::{
+use somatic::internal::robot::messages::{
     Byte, DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Marker, MarkerArray, Message, PointCloud2,
     PointField, TfMessage, Time, TransformStamped, Wrench, WrenchStamped,
 };

@@ -16,7 +16,7 @@ const PRESSED: &str = "t,4\n0,0\n0.1,5\n0.2,7\n";
 
 fn has_adapters() -> bool {
     #[cfg(feature = "gpu")]
-    let there = !somatic::backend::gpu::adapters().is_empty();
+    let there = !somatic::internal::backend::gpu::adapters().is_empty();
     #[cfg(not(feature = "gpu"))]
     let there = false;
     if !there {
@@ -35,7 +35,7 @@ enum Gpus {
 
 fn gpus() -> Gpus {
     #[cfg(feature = "gpu")]
-    let kinds: Vec<&str> = somatic::backend::gpu::adapters().iter().map(|adapter| adapter.kind).collect();
+    let kinds: Vec<&str> = somatic::internal::backend::gpu::adapters().iter().map(|adapter| adapter.kind).collect();
     #[cfg(not(feature = "gpu"))]
     let kinds: Vec<&str> = Vec::new();
     match kinds.iter().filter(|kind| **kind != "software").count() {

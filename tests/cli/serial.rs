@@ -6,7 +6,8 @@ use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use somatic::source::{BoardAccount, Lines, SerialOptions, SerialSource, Source as _};
+use somatic::internal::source::BoardAccount;
+use somatic::source::{Lines, SerialOptions, SerialSource, Source as _};
 use somatic::{Frame, RawValue};
 
 use super::{somatic, stderr, text_of};

@@ -138,7 +138,7 @@ fn contradictions_are_found_where_they_stand() {
 #[cfg(feature = "gpu")]
 #[test]
 fn a_software_gpu_is_measured_only_if_it_is_asked_for() {
-    let adapters = somatic::backend::gpu::adapters();
+    let adapters = somatic::internal::backend::gpu::adapters();
     if adapters.is_empty() || adapters.iter().any(|adapter| adapter.kind != "software") {
         return somatic_testing::skip("SOFTWARE_GPU", "there is no software GPU, or a real one beside it");
     }

@@ -5,11 +5,12 @@ use std::io::Write as _;
 use glam::DVec3;
 use serde_json::json;
 use somatic::OutputPath;
-use somatic::body::{FieldSpec, Glb, LinkJoint, LinkMimic, LinkMotion, MemberSpec, MeshData, Modality, Taxel};
-use somatic::recording::Recorder;
-use somatic::robot::messages::{
+use somatic::body::{FieldSpec, LinkJoint, MemberSpec, Modality, Taxel};
+use somatic::internal::body::{Glb, LinkMimic, LinkMotion, MeshData};
+use somatic::internal::robot::messages::{
     Float32MultiArray, Header, JointState, Message as _, PointCloud2, PointField, TfMessage, TransformStamped,
 };
+use somatic::recording::Recorder;
 use somatic::{Frame, RawValue};
 
 pub(super) const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -151,7 +152,7 @@ pub(super) fn glb() -> Vec<u8> {
 
 /// A glTF with its buffer inside.
 pub(super) fn gltf() -> Vec<u8> {
-    let original = somatic::body::Original::from_bytes("a", &glb(), None).unwrap();
+    let original = somatic::internal::body::Original::from_bytes("a", &glb(), None).unwrap();
     original.to_gltf().into_bytes()
 }
 
@@ -243,7 +244,7 @@ pub(super) const CALIBRATION: &str = "[all]\nbaseline = 2\ndead_band = 1.5\np_ma
     [taxel.2]\ngain = 3\n[contact]\non = 3\noff = 1\n[checks]\nisolated_ratio = 5\n";
 
 pub(super) fn line_of_a_board() -> Vec<u8> {
-    use somatic::wire::{Bits, Head, Identity, MAX_ENCODED_BYTES, encode};
+    use somatic::internal::wire::{Bits, Head, Identity, MAX_ENCODED_BYTES, encode};
     let mut line = Vec::new();
     let mut to = [0; MAX_ENCODED_BYTES];
     let head = |sequence: u32| Head { board: 3, boot: 1, sequence, time_us: 1000 * sequence };

@@ -3,19 +3,20 @@
 use std::io::Cursor;
 
 use somatic::author::Recipe;
-use somatic::author::icub::IcubFile;
 use somatic::author::mesh::{MeshOptions, author_mjcf_skin, author_urdf_skin};
-use somatic::body::{Original, read_taxel_table};
-use somatic::recording::{BagSurvey, Reader};
+use somatic::internal::author::icub::IcubFile;
+use somatic::internal::body::{Original, read_taxel_table};
+use somatic::internal::recording::BagSurvey;
+use somatic::internal::robot::messages::{Float32MultiArray, JointState, Message, PointCloud2, TfMessage};
+use somatic::internal::source::JointStates;
+use somatic::internal::wire::{Decoder, Event};
+use somatic::recording::Reader;
 use somatic::robot::Kinematics;
-use somatic::robot::messages::{Float32MultiArray, JointState, Message, PointCloud2, TfMessage};
 use somatic::signal::Wiring;
 use somatic::sink::SinkSpec;
 use somatic::source::{
-    CsvSource, JointStates, NdjsonSource, SimulatedSource, Source, SourceSpec, TextSource, VendorFormat, VendorOptions,
-    VendorSource,
+    CsvSource, NdjsonSource, SimulatedSource, Source, SourceSpec, TextSource, VendorFormat, VendorOptions, VendorSource,
 };
-use somatic::wire::{Decoder, Event};
 use somatic::{Body, Calibration, Frame, RawValue, Result, bundled};
 
 use super::program::{self, Page};

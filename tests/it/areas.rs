@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 
 use glam::{DVec3, Vec3};
 use somatic::author::{Recipe, author};
-use somatic::body::{Body, Glb, MeshData, Original};
+use somatic::body::Body;
+use somatic::internal::body::{Glb, MeshData, Original};
 use somatic::{Result, bundled};
 
 const PITCH: f64 = 8.6e-3;

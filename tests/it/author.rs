@@ -9,8 +9,9 @@ use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
 use somatic::author::mesh::{self, MeshOptions};
 use somatic::author::{Authored, Recipe, author};
-use somatic::body::{Body, Glb, MeshData, Original};
+use somatic::body::Body;
 use somatic::field::FieldSet;
+use somatic::internal::body::{Glb, MeshData, Original};
 use somatic::{Result, bundled};
 
 use crate::common::data;
@@ -119,7 +120,7 @@ fn a_skinned_hand_gets_as_many_as_asked_and_feels_with_them() {
     lies_on_its_surface(&made.body);
     // Evenly as blue noise goes: no two closer than 0.65 of the widest spacing there is.
     let area: f64 = made.body.taxels.iter().map(|taxel| taxel.area).sum();
-    let widest = 2.0 * somatic::author::widest_radius(area, 500);
+    let widest = 2.0 * somatic::internal::author::widest_radius(area, 500);
     assert!(made.places[0].least_spacing_m.unwrap() > 0.65 * widest, "{:?}", made.places[0]);
     assert!(made.places[0].links.len() >= 20 && made.body.fields.len() > made.places[0].links.len());
     // Each rides on the joint that holds the skin there most: it is nobody else's fingertip.

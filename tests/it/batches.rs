@@ -1,8 +1,8 @@
 //! However a recording is cut into calls, and however its taxels are ordered, its percepts are the same bits.
 
+use somatic::internal::shape::Shape;
 use somatic::scene::{Arithmetic, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Letter, Options, Percepts, RawValue, Receptor, Scene};
-use somatic_engine::shape::Shape;
 
 use crate::common::{backends, frame};
 

@@ -7,9 +7,12 @@ use std::process::Command;
 use glam::DVec3;
 use serde_json::Value;
 use somatic::Body;
-use somatic::author::{FindingKind, lint, refresh};
-use somatic::body::{EdgeRow, FieldSpec, Glb, MemberSpec, StoredEdges};
-use somatic::field::{FieldSet, TaxelGraph};
+use somatic::author::{FindingKind, lint};
+use somatic::body::{FieldSpec, MemberSpec};
+use somatic::field::FieldSet;
+use somatic::internal::author::refresh;
+use somatic::internal::body::{EdgeRow, Glb, StoredEdges};
+use somatic::internal::field::TaxelGraph;
 use tempfile::TempDir;
 
 use crate::lint::{Plate, kinds};

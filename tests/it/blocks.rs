@@ -1,7 +1,8 @@
 //! Frames in one slice give the bits that the same frames give one by one, and are read where they lie.
 
 use glam::{DQuat, DVec3};
-use somatic::signal::{FrameBlock, Pose};
+use somatic::internal::signal::FrameBlock;
+use somatic::signal::Pose;
 use somatic::{
     BackendKind, Body, COLUMNS, Calibration, Engine, Frame, Options, Outputs, Percepts, RawValue, Scene, bundled,
 };

@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use somatic::Body;
-use somatic::author::{lint, widest_radius};
+use somatic::author::lint;
 use somatic::body::{FieldSpec, Surface, Taxel};
 use somatic::field::FieldSet;
+use somatic::internal::author::widest_radius;
 
 fn bundled(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("bodies").join(name)

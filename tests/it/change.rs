@@ -64,7 +64,7 @@ fn a_press_is_felt_by_its_ends_where_change_is_and_throughout_where_pressure_is(
     for kind in backends() {
         let percepts = run(&body, kind, "", &Letter::all_of(&BOTH, &[]), &frames);
         let names = engine(&body, kind, "", Letter::all_of(&BOTH, &[])).unwrap();
-        let palm = names.plan().fields().position(|(name, _)| name == "hand/palm").unwrap();
+        let palm = names.plan().fields().position(|field| field.name == "hand/palm").unwrap();
         assert_eq!(names.plan().label(palm + 1), "hand/palm · change");
         let (mut ends, mut held) = (0, 0);
         for (index, frame) in frames.iter().enumerate().skip(1) {

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use glam::DVec3;
-use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+use somatic::body::{ChartKind, ChartSpec, FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::{Glb, MeshData};
 use somatic::scene::{Arithmetic, Cadence, Coverage, Knobs};
 use somatic::{BackendKind, Body, Engine, Frame, Options, RawValue};
 
@@ -48,7 +49,7 @@ pub fn ways() -> Vec<(BackendKind, Knobs)> {
 pub fn has_gpu() -> bool {
     static FOUND: OnceLock<bool> = OnceLock::new();
     #[cfg(feature = "gpu")]
-    let found = *FOUND.get_or_init(|| !somatic::backend::gpu::adapters().is_empty());
+    let found = *FOUND.get_or_init(|| !somatic::internal::backend::gpu::adapters().is_empty());
     #[cfg(not(feature = "gpu"))]
     let found = *FOUND.get_or_init(|| false);
     if !found {

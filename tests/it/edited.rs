@@ -3,9 +3,11 @@
 use glam::DVec3;
 use serde_json::json;
 use somatic::Body;
-use somatic::author::{FindingKind, lint, refresh};
+use somatic::author::{FindingKind, lint};
 use somatic::body::MAX_TAXEL_ID;
-use somatic::field::{FieldSet, TaxelGraph};
+use somatic::field::FieldSet;
+use somatic::internal::author::refresh;
+use somatic::internal::field::TaxelGraph;
 
 use crate::draft::Draft;
 use crate::lint::{Plate, kinds};

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use glam::DVec3;
-use somatic::author::{Authored, Recipe, author, cell_spread, place_evenly};
-use somatic::body::{Glb, MeshData, Original};
+use somatic::author::{Authored, Recipe, author};
+use somatic::internal::author::{cell_spread, place_evenly};
+use somatic::internal::body::{Glb, MeshData, Original};
 
 /// A box between two corners, outside out, six sides of `n` × `n` squares; without the one on top if it is `open`.
 pub(crate) fn block([low, high]: [DVec3; 2], n: u32, is_open: bool) -> MeshData {

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use glam::DVec3;
 use somatic::author::{Recipe, author};
-use somatic::body::{Glb, MeshData, Original};
-use somatic::expected::{TestTouches, compare_layouts, expected_and_ideal_errors, expected_errors};
+use somatic::internal::body::{Glb, MeshData, Original};
+use somatic::internal::expected::{TestTouches, compare_layouts, expected_and_ideal_errors, expected_errors};
 use somatic::{Body, bundled};
 
 /// A square sheet of 0.3 m, facing up, with 300 taxels.

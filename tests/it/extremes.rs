@@ -3,7 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DQuat, DVec3};
-use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
+use somatic::body::{FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::Glb;
 use somatic::scene::Knobs;
 use somatic::{
     BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, Pose, RawValue, Scene, touch,
@@ -491,7 +492,7 @@ fn a_taxel_that_measures_something_else_is_left_out_and_named() {
         let scene = Scene::default().touches(touch::Options::default());
         let engine = |body: &Body| Engine::new(body, Options::default().backend(backend).scene(scene.clone())).unwrap();
         let (mut mixed, mut pressures) = (engine(&body), engine(&plain));
-        assert_eq!(mixed.plan().fields().map(|(name, _)| name.to_owned()).collect::<Vec<_>>(), ["field"]);
+        assert_eq!(mixed.plan().fields().map(|field| field.name.to_owned()).collect::<Vec<_>>(), ["field"]);
         let (percepts, agreement) = mixed.process_and_compare(std::slice::from_ref(&told)).unwrap();
         assert!(agreement.holds(), "{agreement}");
         let (found, right) = (percepts.get(0, 0), pressures.process_one(&untold).unwrap().get(0, 0));

@@ -275,7 +275,7 @@ fn over_the_bundled_touch_every_backend_agrees_and_few_choices_are_close() {
         let scene = Scene::default().outputs(Outputs::all());
         let mut engine = Engine::new(&body, Options::default().backend(backend).scene(scene).batch(64)).unwrap();
         engine.set_channels(source.taxels()).unwrap();
-        let back = engine.plan().fields().position(|(name, _)| name == "hand/back").unwrap();
+        let back = engine.plan().fields().position(|field| field.name == "hand/back").unwrap();
         let (percepts, agreement) = engine.process_and_compare(&frames).unwrap();
         assert!(agreement.holds(), "{backend:?}: {agreement}");
         let direction = agreement.quantities["filtered_direction"];

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
 
 use proptest::prelude::*;
-use somatic::wire::{Answer, Command, Status};
+use somatic::internal::wire::{Answer, Command, Status};
 
 use crate::wire::{Packet, decoded, examples, hex, root, unhex, vectors};
 use somatic_testing::skip;
@@ -50,7 +50,7 @@ fn says(program: &Path, lines: &[String]) -> Vec<String> {
 /// The line for the program, and what it must say to it.
 fn line(packet: &Packet) -> (String, String) {
     let list = |values: &[u16]| values.iter().map(u16::to_string).collect::<Vec<_>>().join(" ");
-    let with = |kind: &str, head: &somatic::wire::Head, rest: String| {
+    let with = |kind: &str, head: &somatic::internal::wire::Head, rest: String| {
         format!("{kind} {} {} {} {} {rest}", head.board, head.boot, head.sequence, head.time_us)
     };
     let bytes = hex(&packet.line());

@@ -1,11 +1,12 @@
 //! Contacts fitted to touches of the whole body against the truth of simulated touches, and why some are absent.
 
 use glam::DVec3;
+use somatic::internal::touch;
 use somatic::scene::{Knobs, OrientationBy, Scene};
 use somatic::source::{SimulatedSource, Source, Truth};
 use somatic::{
     BackendKind, Body, Calibration, ContactKind, Engine, Frame, Options, Outputs, Percept, RawValue, Touch, TouchFit,
-    TouchFlags, TouchOutputs, touch,
+    TouchFlags, TouchOutputs,
 };
 
 use crate::common::{Flat, backends};

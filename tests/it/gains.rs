@@ -1,7 +1,7 @@
 //! Gains and the layer's width from ordinary touches, against those that a simulation has.
 
 use glam::DVec2;
-use somatic::gains::{GainsEstimate, GainsSurvey};
+use somatic::internal::gains::{GainsEstimate, GainsSurvey};
 use somatic::source::{SimulatedSource, Source};
 use somatic::{Body, Calibration, Engine, Frame, Options, Outputs, Scene, TouchOutputs, touch};
 

@@ -4,9 +4,11 @@ use std::f64::consts::{PI, TAU};
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
-use somatic::author::{place_apart, place_by_density, place_evenly};
-use somatic::body::{ChartKind, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel, Topology};
-use somatic::field::{FieldSet, NoChart, Unroller};
+use somatic::body::{ChartKind, FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::field::{FieldSet, NoChart};
+use somatic::internal::author::{place_apart, place_by_density, place_evenly};
+use somatic::internal::body::{Glb, MeshData, Topology};
+use somatic::internal::field::Unroller;
 use somatic::{Body, Percept};
 
 use crate::common::{backends, engine, frame, meshes};
@@ -204,7 +206,7 @@ fn real_and_hostile_meshes_are_survived() {
             let spacing = (area / 120.0).sqrt();
             let apart = place_apart(&topology.positions, &topology.triangles, spacing, 1, &mut |_| true).unwrap();
             assert!(!apart.is_empty());
-            let density = |placed: &somatic::author::Placed| 1.0 + placed.point.normal.y;
+            let density = |placed: &somatic::internal::author::Placed| 1.0 + placed.point.normal.y;
             let _ = place_by_density(&topology.positions, &topology.triangles, 50, 1, density, &mut |_| true);
             body.taxels = placed
                 .iter()

@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
-use somatic::author::group::{FieldRule, Grouping, MAX_PLANE_DISTORTION, Painted, group};
-use somatic::author::place_evenly;
-use somatic::body::{ChartKind, FieldSpec, Glb, MeshData, Modality, Taxel};
+use somatic::body::{ChartKind, FieldSpec, Modality, Taxel};
 use somatic::field::{FieldSet, NoChart};
+use somatic::internal::author::group::{FieldRule, Grouping, MAX_PLANE_DISTORTION, Painted, group};
+use somatic::internal::author::place_evenly;
+use somatic::internal::body::{Glb, MeshData};
 use somatic::{Body, Result, bundled};
 
 use crate::common::meshes;

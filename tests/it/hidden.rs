@@ -2,8 +2,10 @@
 
 use glam::DVec3;
 use somatic::Body;
-use somatic::author::{Finding, FindingKind, lint, lint_with_progress};
-use somatic::body::{Glb, LinkJoint, LinkMotion, MeshData, Modality, Skinning, Taxel};
+use somatic::author::{Finding, FindingKind, lint};
+use somatic::body::{LinkJoint, Modality, Taxel};
+use somatic::internal::author::lint_with_progress;
+use somatic::internal::body::{Glb, LinkMotion, MeshData, Skinning};
 
 /// Corners and triangles of a box, outside out.
 fn cuboid(low: DVec3, high: DVec3) -> MeshData {

@@ -19,6 +19,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("plain", vec![]),
         ("random", vec![]),
         ("renamed", vec![]),
+        ("debug", vec![]),
         ("setters", vec![]),
         ("words", vec!["error"]),
         ("parallel", vec![]),

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use somatic::Body;
-use somatic::author::icub::{IcubFile, IcubRow, NormalFrom};
 use somatic::body::Modality;
 use somatic::field::FieldSet;
+use somatic::internal::author::icub::{IcubFile, IcubRow, NormalFrom};
 
 use crate::common::data;
 

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use somatic::author::mesh::{Geometry, MeshOptions, Up, author_mjcf_skin, author_urdf_skin, files, open};
+use somatic::author::mesh::{Geometry, MeshOptions, author_mjcf_skin, author_urdf_skin, open};
 use somatic::author::{Authored, Recipe, author, author_csv_skin, author_icub};
 use somatic::body::Body;
+use somatic::internal::author::mesh::{Up, files};
 
 /// The corners and sides, counter-clockwise seen from outside, of a box of 20 × 40 × 60 from the origin on.
 const CORNERS: [[f64; 3]; 8] = [
@@ -394,7 +395,7 @@ fn the_icubs_files_are_a_body_without_a_mesh() {
     assert_eq!(made.body.taxels.len(), placed);
     for (index, place) in made.places.iter().enumerate() {
         let text = std::fs::read_to_string(&files[index]).unwrap();
-        let file = somatic::author::icub::IcubFile::read(&text).unwrap();
+        let file = somatic::internal::author::icub::IcubFile::read(&text).unwrap();
         assert_eq!(place.ids.len(), file.taxels().count());
         assert!(place.ids.iter().all(|id| id / 1000 >= index as u32), "{:?}", place.ids);
     }

@@ -73,7 +73,7 @@ fn double_precision_is_the_references_wherever_it_is_asked_for() {
     let answer = |backend, arithmetic| {
         let knobs = Knobs::default().arithmetic(arithmetic);
         let mut engine = engine(&body, backend, Outputs::USUAL_AND_MOTION, knobs);
-        assert_eq!(engine.backend().0, "reference");
+        assert_eq!(engine.backend().name, "reference");
         format!("{:?}", engine.process(&[frame(0.0, &values)]).unwrap())
     };
     let right = answer(BackendKind::Reference, None);

@@ -4,7 +4,7 @@ use crate::draft::{Draft, FLOAT, U16};
 use glam::{DVec3, Mat4, Vec3};
 use serde_json::{Value, json};
 use somatic::Body;
-use somatic::body::Home;
+use somatic::internal::body::Home;
 
 const CORNERS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
 

@@ -5,9 +5,12 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use somatic::Body;
-use somatic::author::{FindingKind, Placed, coverage, lint, place_evenly};
-use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
-use somatic::field::{FieldSet, Unroller};
+use somatic::author::{FindingKind, coverage, lint};
+use somatic::body::{ChartKind, ChartSpec, FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::field::FieldSet;
+use somatic::internal::author::{Placed, place_evenly};
+use somatic::internal::body::{Glb, MeshData};
+use somatic::internal::field::Unroller;
 
 /// A sheet of 0.1 m × 0.1 m about the origin that looks along +z, with 10 × 10 taxels 10 mm apart in one field. `height`
 /// lifts it, by x.

@@ -59,4 +59,4 @@ mod world;
 mod worst;
 
 // The library's own numbers that look like chance.
-use somatic_skin::random;
+use somatic::internal::random;

@@ -3,7 +3,8 @@
 use crate::common::data;
 use glam::DVec3;
 use somatic::Body;
-use somatic::body::{Home, Surface};
+use somatic::body::Surface;
+use somatic::internal::body::Home;
 
 fn load(part: &str) -> Option<Body> {
     Some(Body::load(data(part)?).unwrap())

@@ -5,8 +5,9 @@ use std::path::Path;
 
 use glam::DVec3;
 use somatic::author::{Authored, Recipe, author};
-use somatic::body::{Body, MeshData, Original};
+use somatic::body::Body;
 use somatic::bundled;
+use somatic::internal::body::{MeshData, Original};
 
 use crate::even::{block, body, made};
 

@@ -76,7 +76,8 @@ impl Paths {
         };
         while let Some(first) = rest.first() {
             match first.as_str() {
-                "crate" | "somatic" | "self" => {}
+                // `somatic::internal` has the rooms of the house by their own names.
+                "crate" | "somatic" | "internal" | "self" => {}
                 "super" => {
                     module.pop();
                 }

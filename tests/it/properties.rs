@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use proptest::prelude::*;
-use somatic::body::{ChartKind, ChartSpec, FieldSpec, Glb, MemberSpec, Modality, Taxel};
+use somatic::body::{ChartKind, ChartSpec, FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::Glb;
 use somatic::{
     BackendKind, Body, Calibration, Engine, Flags, Frame, Letter, Options, Percept, Percepts, Receptor, Scene,
 };

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use glam::DVec3;
-use somatic::body::{FieldSpec, Glb, MemberSpec, Modality, Taxel};
+use somatic::body::{FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::Glb;
 use somatic::source::{CsvSource, Source};
 use somatic::{Agreement, BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Percepts};
 

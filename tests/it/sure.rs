@@ -372,7 +372,7 @@ fn hand(calibration: &str, outputs: Outputs, pressed: &[u32]) -> Percept {
     for (value, id) in frame.values.iter_mut().zip(&ids) {
         *value = RawValue::new(if pressed.contains(id) { 100.0 } else { 0.0 });
     }
-    let names: Vec<String> = engine.plan().fields().map(|(name, _)| name.to_owned()).collect();
+    let names: Vec<String> = engine.plan().fields().map(|field| field.name.to_owned()).collect();
     let back = names.iter().position(|name| name == "hand/back").unwrap();
     engine.process(&[frame]).unwrap().get(0, back)
 }

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
-use somatic::body::{FieldSpec, Glb, MemberSpec, MeshData, Modality, Taxel};
+use somatic::body::{FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::{Glb, MeshData};
 use somatic::{
     BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, RawValue, Scene, Touch, TouchFlags, TouchOutputs,
     touch,

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 use somatic::author::{Recipe, author};
-use somatic::body::Original;
+use somatic::internal::body::Original;
 
 use crate::common::data;
 use somatic_testing::skip;

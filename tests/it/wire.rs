@@ -5,7 +5,7 @@ use std::process::Command as Process;
 
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use somatic::wire::{
+use somatic::internal::wire::{
     Answer, Bits, Command, Corruption, Decoder, Event, HEAD_BYTES, Head, Identity, MAX_ENCODED_BYTES, Status, encode,
 };
 

@@ -137,7 +137,7 @@ fn a_field_over_links_that_move_is_where_its_members_are_now() {
             let (percepts, agreement) = engine.process_and_compare(&moving.frames).unwrap();
             assert!(agreement.holds(), "{backend:?}: {agreement}");
             let whole = percepts.clone();
-            let names: Vec<String> = engine.plan().fields().map(|(name, _)| name.to_owned()).collect();
+            let names: Vec<String> = engine.plan().fields().map(|field| field.name.to_owned()).collect();
             let (mut compared, mut speeds) = (0, 0);
             for (index, frame) in moving.frames.iter().enumerate() {
                 let to = |frame: &Frame| {
@@ -184,7 +184,7 @@ fn a_field_over_links_of_which_one_that_is_pressed_has_no_pose_has_no_position()
     let outputs = Outputs::TOTAL | Outputs::POSITION;
     for backend in backends() {
         let mut engine = moving.engine(Scene::default().outputs(outputs), backend);
-        let names: Vec<String> = engine.plan().fields().map(|(name, _)| name.to_owned()).collect();
+        let names: Vec<String> = engine.plan().fields().map(|field| field.name.to_owned()).collect();
         let percepts = engine.process_one(&frame).unwrap();
         let (mut placed, mut lost) = (0, 0);
         for (number, name) in names.iter().enumerate() {
@@ -217,7 +217,7 @@ fn links_without_a_pose_are_nowhere_while_joints_are_late() {
         frame.t_s = f64::from(number);
         let mut engine = moving.engine(Scene::default().outputs(Outputs::TOTAL | Outputs::POSITION), BackendKind::Cpu);
         let fields: Vec<(String, String)> =
-            engine.plan().fields().map(|(name, link)| (name.to_owned(), link.to_owned())).collect();
+            engine.plan().fields().map(|field| (field.name.to_owned(), field.link.to_owned())).collect();
         let percepts = engine.process_one(&frame).unwrap();
         for (number, (name, link)) in fields.iter().enumerate() {
             let percept = percepts.get(0, number);

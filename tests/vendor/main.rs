@@ -10,7 +10,8 @@ mod variants;
 
 use std::path::{Path, PathBuf};
 
-use somatic::source::{Layout, Source as _, VendorFormat, VendorOptions, VendorSource};
+use somatic::internal::source::Layout;
+use somatic::source::{Source as _, VendorFormat, VendorOptions, VendorSource};
 use somatic::{Frame, RawValue, Result};
 
 /// What is read of a file.

@@ -28,7 +28,7 @@ fn percepts(path: &PathBuf, backend: BackendKind) -> Percepts {
     let options = Options::default().scene(scene).calibration(calibration).backend(backend);
     let mut engine = Engine::new(&body, options).unwrap();
     engine.set_channels(source.taxels()).unwrap();
-    let names: Vec<String> = engine.plan().fields().map(|(name, _)| name.to_owned()).collect();
+    let names: Vec<String> = engine.plan().fields().map(|field| field.name.to_owned()).collect();
     let mut frame = Frame::missing(0.0, ids.len());
     let mut all = Vec::new();
     while source.next_frame(&mut frame).unwrap() {

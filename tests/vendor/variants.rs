@@ -1,6 +1,6 @@
 //! The same recording as other machines would write it, and other recordings in the same formats.
 
-use somatic::signal::UnitOfP;
+use somatic::internal::signal::UnitOfP;
 use somatic::source::{VendorFormat, VendorOptions};
 use somatic::{Error, RawValue};
 

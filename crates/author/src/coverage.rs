@@ -45,6 +45,7 @@ pub struct Hole {
 
 /// Coverage of a body by its taxels.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Coverage {
     /// Links with a surface.
     pub links: Vec<LinkCoverage>,

@@ -11,6 +11,7 @@ use super::rest_surface::{MeshTaxel, RestSurface};
 
 /// The result of a place of a recipe.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct PlaceReport {
     /// Its name.
     pub name: String,

@@ -22,6 +22,7 @@ const PROGRESS_GROUPED: f64 = 0.95;
 
 /// A file with taxels and fields, and a report.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Authored {
     /// The file, not saved yet.
     pub file: Original,

@@ -10,6 +10,7 @@ mod ids;
 mod input;
 mod links;
 mod on_skin;
+mod options;
 mod place;
 mod post;
 mod self_contacts;
@@ -26,48 +27,19 @@ use self::ids::ranges;
 use self::input::Input;
 use self::links::Links;
 use self::on_skin::OnSkin;
+pub use self::options::{ChosenBackend, Options};
 use self::post::PostState;
 pub use self::state::EngineState;
 use crate::backend::agreement::{Agreement, ComparedColumn, compare, compare_columns};
-use crate::backend::{self, Backend, BackendKind, Picks, Step};
+use crate::backend::{self, Backend, Picks, Step};
 use crate::body::Body;
 use crate::error::{Error, Result};
 use crate::field::{FieldSet, NoChart, Recharted, neighbours};
 use crate::percept::{LinkShare, Percepts};
-use crate::scene::{Cadence, Plan, Scene};
+use crate::scene::{Cadence, Plan};
 use crate::signal::{Calibration, Frame, FrameTime, Intake, RawValue, Receptor, Unfit, Wiring};
 use crate::stage::{Pressed, calibrate};
 use crate::touch::Skin;
-
-/// What an engine is to do; the default is everything, uncalibrated, one frame a call, on whatever is fastest.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Options {
-    /// What is asked for.
-    pub scene: Scene,
-    /// The robot's calibration; without one P is the raw value.
-    pub calibration: Option<Calibration>,
-    /// What it runs on.
-    pub backend: BackendKind,
-    /// Take the first frame's values as the baselines: only for a robot that nothing touches when it starts.
-    pub tare: bool,
-    /// Frames a call, about: 1 for a live robot, some hundred for recordings. More are taken in turns.
-    pub batch: usize,
-}
-
-setters!(Options {
-    scene: Scene,
-    calibration: impl Into<Option<Calibration>>,
-    backend: BackendKind,
-    tare: bool,
-    batch: usize,
-});
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { scene: Scene::default(), calibration: None, backend: BackendKind::Auto, tare: false, batch: 1 }
-    }
-}
 
 /// Turns frames into percepts.
 ///
@@ -78,7 +50,7 @@ impl Default for Options {
 /// let mut engine = somatic::Engine::new(&body, somatic::Options::default())?;
 /// let mut frame = engine.frame(0.0);
 /// frame.values.fill(somatic::RawValue::new(0.0));
-/// frame.values[engine.index_of_taxel(4).unwrap()] = somatic::RawValue::new(512.0);
+/// engine.set_value(&mut frame, 4, 512.0_f32)?;
 /// let percepts = engine.process_one(&frame)?;
 /// assert!(percepts.touched(0).all(|percept| percept.total == Some(512.0)));
 /// # Ok(())
@@ -120,6 +92,13 @@ pub struct Engine {
     on_skin: Option<OnSkin>,
     /// Fields that could not have the kind of chart that is asked for.
     kept_charts: Vec<(String, NoChart)>,
+}
+
+impl std::fmt::Debug for Engine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let fields = self.plan.fields.len();
+        f.debug_struct("Engine").field("backend", &self.backend()).field("fields", &fields).finish_non_exhaustive()
+    }
 }
 
 impl Engine {
@@ -206,10 +185,10 @@ impl Engine {
         &self.plan
     }
 
-    /// The backend: its name, what it runs on, and why it was chosen.
+    /// Which backend computes.
     #[must_use]
-    pub fn backend(&self) -> (&'static str, String, &str) {
-        (self.backend.name(), self.backend.describe(), &self.why)
+    pub fn backend(&self) -> ChosenBackend<'_> {
+        ChosenBackend { name: self.backend.name(), device: self.backend.describe(), reason: &self.why }
     }
 
     /// Fields that stay in the charts of the layout as they cannot have the kind that [`crate::scene::Knobs::charts`]
@@ -249,7 +228,7 @@ impl Engine {
         self.pick();
     }
 
-    /// From now on [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) has the taxels of touches, whatever [`Scene::touches`] asks for, if `are_kept`. For
+    /// From now on [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) has the taxels of touches, whatever [`Scene::touches`](crate::scene::Scene::touches) asks for, if `are_kept`. For
     /// pages, which show them.
     pub fn keep_touch_taxels(&mut self, are_kept: bool) {
         self.on_skin.iter_mut().filter(|_| are_kept).for_each(OnSkin::keep_taxels);
@@ -283,6 +262,20 @@ impl Engine {
         self.ids.binary_search(&id).ok()
     }
 
+    /// Sets the value of the taxel with `id` in `frame`, which is one of [`Engine::frame`].
+    ///
+    /// # Errors
+    /// The body has no such taxel, or `frame` is of other taxels.
+    pub fn set_value(&self, frame: &mut Frame, id: u32, value: impl Into<RawValue>) -> Result<()> {
+        let index = self
+            .index_of_taxel(id)
+            .ok_or_else(|| failed!("the body has no taxel {id}; its taxels are in `Body::taxels`"))?;
+        let (expected, count) = (self.ids.len(), frame.values.len());
+        let place = frame.values.get_mut(index).filter(|_| count == expected);
+        *place.ok_or_else(|| failed!("the frame has {count} values, and the engine's have {expected}"))? = value.into();
+        Ok(())
+    }
+
     /// What is to be known before the first frame, a line each: taxels that no letter reads, drift that no taxel can tell, edges
     /// between taxels that are not those of the body's file, and sensors of which nothing says what they cover.
     #[must_use]
@@ -296,7 +289,7 @@ impl Engine {
         self.plan.left_out.remark().into_iter().chain(drift).chain(on_skin).collect()
     }
 
-    /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`] asks for them. Its nodes are what
+    /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`](crate::scene::Scene::touches) asks for them. Its nodes are what
     /// [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) counts.
     #[must_use]
     pub fn skin(&self) -> Option<&Skin> {
@@ -305,7 +298,7 @@ impl Engine {
 
     /// Puts into `to`, in place of what it holds, what pressed on each link in the last frame, whatever touches it is of, in the body's
     /// order: its total, and its wrench in the link's frame where that is known. A controller takes this off what it measures.
-    /// Nothing unless [`Scene::touches`] asks for touches.
+    /// Nothing unless [`Scene::touches`](crate::scene::Scene::touches) asks for touches.
     ///
     /// ```
     /// # mod somatic { pub use somatic_bodies as bundled; pub use somatic_engine::{Engine, Options, percept::TouchFrame, scene::Scene, touch}; pub use somatic_skin::{body::Body, error::Result, signal, signal::RawValue}; }
@@ -317,7 +310,7 @@ impl Engine {
     /// let mut engine = Engine::new(&body, Options::default().scene(scene))?;
     /// let mut frame = engine.frame(0.0);
     /// frame.values.fill(RawValue::new(0.0));
-    /// frame.values[engine.index_of_taxel(4).unwrap()] = RawValue::new(5.0);
+    /// engine.set_value(&mut frame, 4, 5.0_f32)?;
     /// engine.process_one(&frame)?;
     /// let mut presses = Vec::new();
     /// engine.presses_on_links(&mut presses);
@@ -333,7 +326,7 @@ impl Engine {
         }
     }
 
-    /// What has changed since about how percepts are computed, to be said once: a GPU that [`BackendKind::Auto`] had chosen was
+    /// What has changed since about how percepts are computed, to be said once: a GPU that [`BackendKind::Auto`](crate::BackendKind::Auto) had chosen was
     /// lost, and the CPU goes on.
     pub fn notice(&mut self) -> Option<String> {
         self.backend.notice()

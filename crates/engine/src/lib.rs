@@ -32,7 +32,7 @@ pub mod touch;
 
 pub use backend::BackendKind;
 pub use backend::agreement::{Agreement, ComparedColumn, Comparison, Verdict};
-pub use engine::{Engine, EngineState, Options};
+pub use engine::{ChosenBackend, Engine, EngineState, Options};
 #[cfg(test)]
 use somatic_bodies as bundled;
 #[allow(unused_imports, reason = "which of them are used depends on features")]

@@ -55,6 +55,8 @@ pub struct Reader {
     account: Account,
 }
 
+somatic_skin::debug_by_name!(Reader);
+
 impl Reader {
     /// Opens the recording at `path`.
     ///

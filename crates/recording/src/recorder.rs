@@ -47,6 +47,8 @@ pub struct Recorder {
     worth_keeping: bool,
 }
 
+somatic_skin::debug_by_name!(Recorder);
+
 type Writer = mcap::Writer<NoSeek<BufWriter<OutputFile>>>;
 
 impl Recorder {

@@ -10,6 +10,7 @@
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]
 
+mod debug;
 #[macro_use]
 mod setters;
 #[macro_use]

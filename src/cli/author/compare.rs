@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use comfy_table::Cell;
 use serde_json::{Value, json};
-use somatic::author::cell_spread;
 use somatic::body::Body;
-use somatic::expected::{ComparedLayouts, LayoutErrors, TestTouches, compare_layouts};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
+use somatic::internal::author::cell_spread;
+use somatic::internal::expected::{ComparedLayouts, LayoutErrors, TestTouches, compare_layouts};
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::bodies::load_body;
 use somatic::{Error, Result};
 
 use super::compare_figure::figure;

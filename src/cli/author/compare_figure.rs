@@ -1,7 +1,7 @@
 //! The picture of two layouts: which share of touches is off by how much.
 
-use somatic::expected::{ComparedLayouts, LayoutErrors, TouchError};
-use somatic::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
+use somatic::internal::expected::{ComparedLayouts, LayoutErrors, TouchError};
+use somatic::internal::figure::{Arrangement, Axis, Colour, Figure, Layer, Mark, Panel, Point};
 
 const FIRST: Colour = [214, 96, 20];
 const SECOND: Colour = [31, 119, 180];

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use somatic::author::Recipe;
-use somatic::author::mesh::{self, Geometry, MeshOptions, Up};
-use somatic::body::Original;
+use somatic::author::mesh::{Geometry, MeshOptions};
+use somatic::internal::author::mesh::{self, Up};
+use somatic::internal::body::Original;
 use somatic::{Error, OutputPath, Result};
 
 use crate::cli::stdio::{DONE, print};

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use somatic::author::recipe_values::Length;
-use somatic::author::{Authored, GridOrder, SheetGrid, author_sheets};
-use somatic::limits::{self, MAX_TABLE_BYTES};
+use somatic::author::Authored;
+use somatic::internal::author::recipe_values::Length;
+use somatic::internal::author::{GridOrder, SheetGrid, author_sheets};
+use somatic::internal::limits::{self, MAX_TABLE_BYTES};
 use somatic::{Error, Result};
 
 const HEADING: &str = "A flat sheet: a mat, an insole, an array";

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use somatic::author::{Recipe, author};
-use somatic::body::Original;
-use somatic::error::nearest;
-use somatic::setup::FilesRead;
+use somatic::internal::body::Original;
+use somatic::internal::error::nearest;
+use somatic::internal::setup::FilesRead;
 use somatic::{Error, Result, bundled};
 
 use self::compare::{CompareArguments, body_output};

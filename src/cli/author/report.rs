@@ -6,8 +6,8 @@ use comfy_table::Cell;
 use serde_json::{Value, json};
 use somatic::author::{Authored, PlaceReport};
 use somatic::body::Body;
-use somatic::expected::LayoutErrors;
 use somatic::field::FieldSet;
+use somatic::internal::expected::LayoutErrors;
 
 use crate::cli::expected;
 use crate::cli::table::{plain, shown};

@@ -49,7 +49,7 @@ impl SkinArguments {
         files.extend(self.csv_skin.clone());
         files.extend(self.mjcf_skin.clone());
         if let Some(path) = &self.urdf_skin {
-            files.extend(somatic::author::mesh::files(path, &mesh.options(None)?));
+            files.extend(somatic::internal::author::mesh::files(path, &mesh.options(None)?));
         }
         Ok(files)
     }

@@ -9,21 +9,21 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use somatic::output::OutputLink;
-use somatic::scene::file::hertz;
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
+use somatic::internal::board::{BoardConfig, Faults, Potentiometers, VirtualBoard};
+use somatic::internal::output::OutputLink;
+use somatic::internal::scene_file::hertz;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::bodies::load_body;
+use somatic::internal::wire::{Bits, layout_hash};
 use somatic::signal::Wiring;
 use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec, VendorOptions};
-use somatic::wire::board::{BoardConfig, Faults, Potentiometers, VirtualBoard};
-use somatic::wire::{Bits, layout_hash};
 use somatic::{Error, Frame, Result, bundled};
 
 use self::station::{LineSettings, Station};
 use super::interrupt::stop_on_signal;
 use super::stdio::{DONE, print};
 use super::words;
-use somatic::run::{Arrival, Feed, ReadMode};
+use somatic::internal::run::{Arrival, Feed, ReadMode};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -295,11 +295,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, LineSettings, Play)> {
         Some(wiring) => wiring,
         None => in_order(if body.is_some() { &ids } else { &taxels }, arguments)?,
     };
-    let rate_mhz = match arguments.rate {
-        None => 0,
-        Some(hz) if (0.001..=1e6).contains(&hz) => (hz * 1e3).round() as u32,
-        Some(hz) => return Err(Error::usage(format!("--rate {hz} is not a rate; give 0.001 to 1000000 Hz"))),
-    };
+    let rate_mhz = rate_mhz(arguments)?;
     let read = FilesRead::default().named(arguments.source.as_slice()).files(&arguments.wiring).bodies(&arguments.body);
     let mut outputs = read.outputs(false);
     let mut stations = Vec::new();
@@ -336,6 +332,15 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, LineSettings, Play)> {
     }
     let common = LineSettings { baud: arguments.baud, faults, frames: arguments.frames.unwrap_or(u64::MAX) };
     Ok((stations, common, Play { spec, ids, taxels, most: most.into(), again: again && !live }))
+}
+
+/// The rate that is asked for, mHz; 0 where it is left to the boards.
+fn rate_mhz(arguments: &Arguments) -> Result<u32> {
+    match arguments.rate {
+        None => Ok(0),
+        Some(hz) if (0.001..=1e6).contains(&hz) => Ok((hz * 1e3).round() as u32),
+        Some(hz) => Err(Error::usage(format!("--rate {hz} is not a rate; give 0.001 to 1000000 Hz"))),
+    }
 }
 
 /// The wiring of `taxels` to as many boards as `arguments` say.

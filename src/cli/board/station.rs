@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use somatic::Result;
-use somatic::output::OutputLink;
-use somatic::wire::board::{Faults, FaultyLine, VirtualBoard, Window};
+use somatic::internal::board::{Faults, FaultyLine, VirtualBoard, Window};
+use somatic::internal::output::OutputLink;
 
 use super::pty::Pty;
 

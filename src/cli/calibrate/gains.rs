@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use serde_json::json;
-use somatic::gains::{GainsEstimate, GainsSurvey};
-use somatic::limits::{self, MAX_TOML_BYTES};
-use somatic::run::left_out;
-use somatic::setup::bodies::in_body;
+use somatic::internal::gains::{GainsEstimate, GainsSurvey};
+use somatic::internal::limits::{self, MAX_TOML_BYTES};
+use somatic::internal::run::left_out;
+use somatic::internal::setup::bodies::in_body;
+use somatic::internal::survey::gains::{layer_under, spread, untold_spread, with_gains};
 use somatic::source::{SourceSpec, VendorOptions};
-use somatic::survey::gains::{layer_under, spread, untold_spread, with_gains};
 use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 
 use crate::cli::bar::Bar;

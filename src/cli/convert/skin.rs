@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use somatic::author::mesh::urdf_of_skin;
-use somatic::body::{Modality, Taxel, taxel_table};
-use somatic::setup::FilesRead;
-use somatic::setup::bodies::load_body;
+use somatic::body::{Modality, Taxel};
+use somatic::internal::author::mesh::urdf_of_skin;
+use somatic::internal::body::taxel_table;
+use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::bodies::load_body;
 use somatic::{Error, Result, bundled};
 
 use crate::cli::stdio::{DONE, say};

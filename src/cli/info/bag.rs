@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 use somatic::FrameTime;
-use somatic::recording::{BagSurvey, SurveyedTopic};
-use somatic::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
+use somatic::internal::recording::{BagSurvey, SurveyedTopic};
+use somatic::internal::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
 
 use super::super::table::{plain, shown};
 use super::super::words::{count, number, size_words, span, title};

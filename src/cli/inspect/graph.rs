@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use somatic::body::Body;
-use somatic::field::TaxelGraph;
-use somatic::touch::{Reading, Skin};
+use somatic::internal::field::TaxelGraph;
+use somatic::internal::touch::{Reading, Skin};
 
 /// Neighbours of a taxel of which it has fewer at the end of the skin only.
 const FEW: usize = 3;

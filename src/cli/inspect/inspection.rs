@@ -2,8 +2,9 @@
 
 use somatic::author::{Coverage, Finding};
 use somatic::body::Body;
-use somatic::expected::LayoutErrors;
-use somatic::field::{Field, RestOverlap};
+use somatic::field::Field;
+use somatic::internal::expected::LayoutErrors;
+use somatic::internal::field::RestOverlap;
 
 use super::graph::SkinGraph;
 

@@ -1,9 +1,10 @@
 //! A body as JSON.
 
 use serde_json::{Map, Value, json};
-use somatic::author::{Finding, cell_spread};
+use somatic::author::Finding;
 use somatic::body::Body;
 use somatic::field::{Field, WORLD};
+use somatic::internal::author::cell_spread;
 
 use super::inspection::Inspection;
 use crate::cli::expected;

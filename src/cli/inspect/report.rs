@@ -3,9 +3,11 @@
 use comfy_table::ColumnConstraint;
 use console::style;
 use rstar::RTree;
-use somatic::author::{Coverage, cell_spread};
+use somatic::author::Coverage;
 use somatic::body::{Body, ChartKind};
-use somatic::field::{Field, RestOverlap, WORLD};
+use somatic::field::{Field, WORLD};
+use somatic::internal::author::cell_spread;
+use somatic::internal::field::RestOverlap;
 
 use super::inspection::Inspection;
 use crate::cli::expected;

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use console::style;
-use somatic::{Body, Engine, Percepts, Touch, TouchFlags, plain};
+use somatic::internal::plain;
+use somatic::{Body, Engine, Percepts, Touch, TouchFlags};
 
 use super::columns::PrintedUnit;
 use crate::cli::words::{clipped, fitted, millimetres, number};

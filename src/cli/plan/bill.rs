@@ -1,10 +1,10 @@
 //! What a scene costs: counted and measured.
 
+use somatic::internal::scene::PlannedStage;
+use somatic::internal::setup::Setup;
+use somatic::internal::setup::{Input, RECORDED_BATCH};
+use somatic::internal::tradeoff::{Combination, ladder};
 use somatic::scene::OrientationBy;
-use somatic::scene::PlannedStage;
-use somatic::setup::Setup;
-use somatic::setup::{Input, RECORDED_BATCH};
-use somatic::tradeoff::{Combination, ladder};
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result, TouchOutputs, touch};
 
 use super::timed::{Played, measured, pressed};
@@ -56,9 +56,9 @@ impl Bill {
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
         let Settled { options, why: picked, measured: kept } = settled(asked, input, body, batch)?;
         let engine = Engine::new(body, options.clone())?;
-        let (name, what, why) = engine.backend();
-        let backend = (name.to_owned(), what, picked.unwrap_or_else(|| why.to_owned()));
-        let kind: BackendKind = name.parse()?;
+        let chosen = engine.backend();
+        let kind: BackendKind = chosen.name.parse()?;
+        let backend = (chosen.name.to_owned(), chosen.device, picked.unwrap_or_else(|| chosen.reason.to_owned()));
         let plan = engine.plan();
         let knobs = Combination { backend: kind, knobs: plan.knobs() };
         let rungs = ladder(plan);

@@ -1,8 +1,9 @@
 //! What a limb would send: its frames, or its percepts.
 
 use serde_json::{Value, json};
-use somatic::setup::Setup;
-use somatic::sink::{FieldNames, SinkSpec, SkinNames, limb_frame_bytes, limb_percept_bytes};
+use somatic::internal::setup::Setup;
+use somatic::internal::sink::{SkinNames, limb_frame_bytes, limb_percept_bytes};
+use somatic::sink::{FieldNames, SinkSpec};
 use somatic::{Body, Engine, Frame, Result};
 
 /// Bytes that a limb sends, without those of Zenoh and of the network.

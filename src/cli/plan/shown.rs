@@ -3,7 +3,7 @@
 use comfy_table::ColumnConstraint;
 use serde_json::{Value, json};
 use somatic::Agreement;
-use somatic::tradeoff::Words;
+use somatic::internal::tradeoff::Words;
 
 use super::bill::{Bill, Stage};
 use crate::cli::table::{plain, shown};

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use somatic::field::Field;
+use somatic::internal::scene_file::{hertz, seconds};
+use somatic::internal::setup::Setup;
 use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture};
 use somatic::scene::Coordinates;
-use somatic::scene::file::{SceneFile, hertz, seconds};
-use somatic::setup::Setup;
+use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
 
 use super::super::bar::Bar;

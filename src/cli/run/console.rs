@@ -4,10 +4,10 @@ use std::time::Instant;
 
 #[cfg(feature = "page")]
 use somatic::EngineState;
-use somatic::run::{Ending, FrameInfo, Observer, Remark};
-use somatic::sink::News;
+use somatic::internal::sink::News;
 #[cfg(feature = "page")]
-use somatic::sink::Question;
+use somatic::internal::sink::Question;
+use somatic::run::{Ending, FrameInfo, Observer, Remark};
 use somatic::{Engine, Frame, Plan, Result};
 
 use crate::cli::doubts::Doubts;

@@ -2,9 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use somatic::internal::run::{Opened, Pace, RunOptions};
+use somatic::internal::setup::{Input, Setup};
 use somatic::output::OutputPath;
-use somatic::run::{Opened, Pace, Run, RunOptions};
-use somatic::setup::{Input, Setup};
+use somatic::run::Run;
 use somatic::sink::Sink;
 #[cfg(feature = "page")]
 use somatic::sink::SinkSpec;
@@ -99,10 +100,11 @@ impl Prepared {
         view: ViewKind,
         sinks: Vec<Box<dyn Sink + Send>>,
     ) -> Result<(Run, Console)> {
-        let Opened { body, engine, source, lines, backend, .. } = &self.opened;
+        let Opened { body, engine, lines, .. } = &self.opened;
         #[cfg(feature = "page")]
         let explainer = match asked.sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_))) {
             true => {
+                let Opened { backend, source, .. } = &self.opened;
                 let options = self.options.backend(backend[0].parse()?);
                 Some(LiveExplainer::start(body.clone(), options, source.taxels().to_vec()))
             }

@@ -1,6 +1,6 @@
 //! The outputs that are asked for, and what help says of them.
 
-use somatic::scene::AskedOutputs;
+use somatic::internal::scene::AskedOutputs;
 use somatic::{Error, Outputs, Result};
 
 /// The quantity of fields called `name`.

@@ -3,11 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use somatic::author::mesh::Up;
-use somatic::scene::file::{Accuracy, JointsDelay, SceneFile, Target, hertz, metres, seconds, time};
-use somatic::scene::{Arithmetic, AskedOutputs, Cadence, Charts, Coordinates, Coverage, FilterBy, OrientationBy};
+use somatic::internal::author::mesh::Up;
+use somatic::internal::scene::AskedOutputs;
+use somatic::internal::scene_file::Target;
+use somatic::internal::scene_file::{hertz, metres, seconds, time};
+use somatic::internal::sink::RecordPart;
+use somatic::scene::file::{Accuracy, JointsDelay, SceneFile};
+use somatic::scene::{Arithmetic, Cadence, Charts, Coordinates, Coverage, FilterBy, OrientationBy};
 use somatic::signal::{FsrSignal, Receptor};
-use somatic::sink::{RecordPart, RosTime};
+use somatic::sink::RosTime;
 use somatic::source::VendorFormat;
 use somatic::{BackendKind, Result};
 

@@ -1,9 +1,9 @@
 //! On which frames is measured, and how a measurement is described.
 
-use somatic::setup::Setup;
-use somatic::setup::{Input, RECORDED_BATCH};
+use somatic::internal::setup::Setup;
+use somatic::internal::setup::{Input, RECORDED_BATCH};
+use somatic::internal::tradeoff::{MeasureOptions, Measurement, Pick, Store, Target, TestFrames};
 use somatic::source::{SimulatedSource, SourceSpec};
-use somatic::tradeoff::{MeasureOptions, Measurement, Pick, Store, Target, TestFrames};
 use somatic::{Body, Options, Result};
 
 use crate::cli::plan::pressed;

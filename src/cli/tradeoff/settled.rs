@@ -1,9 +1,11 @@
 //! What is left to be chosen, settled by measurements: those that are kept, or brief ones.
 
+use somatic::internal::setup::Input;
+use somatic::internal::setup::Setup;
+use somatic::internal::tradeoff::{
+    CallMode, Combination, Found, Measurement, Pick, Report, Store, Tested, day, software,
+};
 use somatic::scene::{Coverage, OrientationBy};
-use somatic::setup::Input;
-use somatic::setup::Setup;
-use somatic::tradeoff::{CallMode, Combination, Found, Measurement, Pick, Report, Store, Tested, day, software};
 use somatic::{BackendKind, Body, Error, Options, Result};
 
 use super::measured::{in_words, made_up, measure_options, missed, played};
@@ -25,7 +27,7 @@ pub(in crate::cli) struct Settled {
 /// The GPU drivers of this machine, in words.
 pub(super) fn driver() -> String {
     #[cfg(feature = "gpu")]
-    return format!("{:?}", somatic::backend::gpu::adapters());
+    return format!("{:?}", somatic::internal::backend::gpu::adapters());
     #[cfg(not(feature = "gpu"))]
     return "none".to_owned();
 }

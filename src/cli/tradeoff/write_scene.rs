@@ -1,8 +1,8 @@
 //! Writes the selected combination into a scene file in place of the target; keeps everything else, comments too.
 
-use somatic::limits::{self, MAX_TOML_BYTES};
+use somatic::internal::limits::{self, MAX_TOML_BYTES};
+use somatic::internal::tradeoff::{Combination, Target, Words};
 use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
-use somatic::tradeoff::{Combination, Target, Words};
 use somatic::{BackendKind, Error, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
 

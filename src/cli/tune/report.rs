@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
+use somatic::internal::survey::tuning::{Tuned, Tuning};
 use somatic::signal::{FsrCircuit, Wiring};
-use somatic::survey::tuning::{Tuned, Tuning};
 use somatic::{Error, Result};
 
 use super::session::TunedChannel;

@@ -6,14 +6,15 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use console::Term;
+use somatic::internal::source::BoardState;
+use somatic::internal::survey::tuning::Tuning;
 use somatic::signal::Wiring;
-use somatic::source::{BoardState, Lines, SerialSource};
-use somatic::survey::tuning::Tuning;
+use somatic::source::{Lines, SerialSource};
 use somatic::{Error, Frame, Result};
 
 use crate::cli::stdio::{for_terminal, say};
 use crate::cli::words;
-use somatic::run::{Arrival, Feed};
+use somatic::internal::run::{Arrival, Feed};
 
 /// Boards without progress for this long are given up.
 const BOARD_TIMEOUT: Duration = Duration::from_secs(6);

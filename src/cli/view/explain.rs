@@ -2,7 +2,7 @@
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use somatic::page::{History, PeakMap, Request, Series, ViewerId};
+use somatic::internal::page::{History, PeakMap, Request, Series, ViewerId};
 use somatic::{Engine, Error, Result};
 
 use super::super::explanation::{explanation, no_explanation};

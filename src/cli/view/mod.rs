@@ -18,11 +18,12 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use somatic::author::lint;
 use somatic::field::FieldSet;
-use somatic::output::PrivateFile;
-use somatic::page::{EventKind, Listen, Mode, PageInfo, PageInput, PageScene, Publisher, Server};
-use somatic::setup::Setup;
+use somatic::internal::output::PrivateFile;
+use somatic::internal::page::{EventKind, Mode, PageInfo, PageInput, PageScene, Publisher};
+use somatic::internal::setup::Setup;
+use somatic::page::{Listen, Server};
 use somatic::source::SourceSpec;
-use somatic::{BackendKind, Body, Engine, Error, Options, Result};
+use somatic::{BackendKind, Body, ChosenBackend, Engine, Error, Options, Result};
 
 use self::checkpoints::Checkpoints;
 use self::explain::Explainer;
@@ -148,7 +149,7 @@ impl Opening<'_> {
     fn start(&self, scene: PageScene) -> Result<Opened> {
         let (server, publisher) = Server::start(&self.listen, scene)?;
         // A closed standard error is not a reason to stop.
-        somatic::plain::announce(&server.announcement());
+        somatic::internal::plain::announce(&server.announcement());
         let handed_over = match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
             Ok(file) => file,
             Err(error) => {
@@ -162,14 +163,14 @@ impl Opening<'_> {
     /// A body at rest.
     fn body(&self, body: &Body) -> Result<u8> {
         let mut engine = Engine::new(body, Options::default().backend(BackendKind::Cpu))?;
-        let (name, what, why) = engine.backend();
+        let ChosenBackend { name, device, reason, .. } = engine.backend();
         let scene = PageScene::new(
             body,
             engine.plan(),
             &PageInfo {
                 source: "at rest",
                 mode: Mode::Live,
-                backend: [name, &what, why],
+                backend: [name, &device, reason],
                 // Nothing sends a value of any.
                 taxels: &[],
                 wiring: None,
@@ -223,14 +224,14 @@ impl Opening<'_> {
         if !asked.quiet {
             engine.remarks().iter().for_each(|remark| say(remark));
         }
-        let (name, what, why) = engine.backend();
+        let ChosenBackend { name, device, reason, .. } = engine.backend();
         let scene = PageScene::new(
             &body,
             engine.plan(),
             &PageInfo {
                 source: &input.name,
                 mode: recording.mode(),
-                backend: [name, &what, settled.why.as_deref().unwrap_or(why)],
+                backend: [name, &device, settled.why.as_deref().unwrap_or(reason)],
                 taxels: &recording.taxels,
                 wiring: None,
                 recorded_max: recording.largest_pressure(&engine),

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use somatic::page::{PageInput, Publisher, Request, ViewerId};
+use somatic::internal::page::{PageInput, Publisher, Request, ViewerId};
 use somatic::{Engine, Result};
 
 use super::super::stdio::say;

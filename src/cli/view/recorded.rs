@@ -5,11 +5,11 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Map, Value};
-use somatic::body::WORLD_FROM_BODY;
 use somatic::field::WORLD;
+use somatic::internal::body::WORLD_FROM_BODY;
+use somatic::internal::renamed::old_name;
 use somatic::percept::Measure;
 use somatic::recording::Reader;
-use somatic::renamed::old_name;
 use somatic::sink::FieldNames;
 use somatic::{COLUMNS, Column, Outputs, Percept, Percepts, Plan, Result};
 

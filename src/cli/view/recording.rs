@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use somatic::page::Mode;
+use somatic::internal::page::Mode;
 use somatic::source::Source;
 use somatic::{Engine, Error, Frame, Result};
 

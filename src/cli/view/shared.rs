@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use somatic::page::Replies;
+use somatic::internal::page::Replies;
 use somatic::{Body, Engine, Options, Result};
 
 use super::checkpoints::Checkpoints;

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use somatic::setup::Setup;
-use somatic::setup::bodies::load_body;
-use somatic::source::{BagName, SimulatedSource};
+use somatic::internal::setup::Setup;
+use somatic::internal::setup::bodies::load_body;
+use somatic::internal::source::BagName;
+use somatic::source::SimulatedSource;
 use somatic::{Body, Error, Result, bundled};
 
 use super::super::scene::RunFlags;

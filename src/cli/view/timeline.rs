@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use somatic::page::RecordingEvents;
+use somatic::internal::page::RecordingEvents;
 use somatic::{Percepts, Result};
 
 use super::super::stdio::say;

@@ -73,6 +73,7 @@ pub struct LinkShare {
 
 /// One kind of problem, with all its places.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Finding {
     /// The kind.
     pub kind: FindingKind,

@@ -13,6 +13,7 @@ use crate::stage::limit::Limit;
 
 /// How a backend's percepts compare with the reference's on the same input.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Agreement {
     /// Percepts (a field in a frame) looked at.
     pub percepts: u64,
@@ -30,6 +31,7 @@ pub struct Agreement {
 /// The result of comparing one quantity. Every value of the backend or the reference is counted once: compared, too close to
 /// call, or not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Comparison {
     /// Values compared.
     pub compared: u64,

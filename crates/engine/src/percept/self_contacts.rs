@@ -31,6 +31,7 @@ impl SelfContact {
 
 /// One side of a [`SelfContact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SelfContactSide {
     /// Index of the link with most of the touch.
     pub link: u32,

@@ -66,6 +66,7 @@ impl TouchFlags {
 
 /// A touch of the whole body in one frame. Its place and directions are in the frame of its link, or in the world: [`Touch::in_world`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Touch {
     /// Lasts from onset to release, and is never used again.
     pub id: u64,
@@ -141,6 +142,7 @@ impl Touch {
 
 /// The contact that explains best what the taxels of a touch and those beside them feel, as `docs/explanation/fit.md` has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TouchFit {
     /// Its kind.
     pub kind: ContactKind,
@@ -180,6 +182,7 @@ pub struct FitSigma {
 
 /// The part of a touch on one of its links.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LinkShare {
     /// Index of the link.
     pub link: u32,
@@ -200,6 +203,7 @@ pub struct Wrench {
 
 /// The part of a touch in one field.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FieldShare {
     /// Index of the field.
     pub field: u32,
@@ -209,6 +213,7 @@ pub struct FieldShare {
 
 /// The touches of a frame.
 #[derive(Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct TouchFrame {
     /// The oldest first.
     pub touches: Vec<Touch>,

@@ -20,8 +20,7 @@ pub use explain::PlannedStage;
 pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
 pub(crate) use layer::{Around, REACH};
-pub use plan::Plan;
-pub use plan::PlanField;
+pub use plan::{Plan, PlanField, PlannedField};
 pub(crate) use stages::Stages;
 
 use crate::body::Body;

@@ -122,10 +122,20 @@ pub struct PlanField {
 }
 
 impl PlanField {
-    /// Whether it has so many members that the CPU takes sixteen of them abreast.
+    /// Whether it has enough members for the CPU to take sixteen of them side by side.
     pub(crate) fn is_wide(&self) -> bool {
         self.count >= layout::MANY
     }
+}
+
+/// A field that percepts come of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PlannedField<'a> {
+    /// Its name in the body.
+    pub name: &'a str,
+    /// The link in whose frame its percepts are, unless the scene asks for the world's.
+    pub link: &'a str,
 }
 
 impl Plan {
@@ -241,10 +251,9 @@ impl Plan {
         self.members.len()
     }
 
-    /// Names of the fields, in the order of the percepts, each with the link it answers in. A field stands there once for
-    /// each of [`Plan::letters`], in their order.
-    pub fn fields(&self) -> impl ExactSizeIterator<Item = (&str, &str)> {
-        self.fields.iter().map(|field| (field.name.as_str(), field.link.as_str()))
+    /// The fields, in the order of the percepts. A field stands there once for each of [`Plan::letters`], in their order.
+    pub fn fields(&self) -> impl ExactSizeIterator<Item = PlannedField<'_>> {
+        self.fields.iter().map(|field| PlannedField { name: &field.name, link: &field.link })
     }
 
     /// What is to be said of the letter of field `field` of the percepts, beside the field's name.

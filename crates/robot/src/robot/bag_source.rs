@@ -40,6 +40,8 @@ pub struct BagSource {
     notices: Vec<String>,
 }
 
+somatic_skin::debug_by_name!(BagSource);
+
 /// What is read.
 enum Kind {
     Array,

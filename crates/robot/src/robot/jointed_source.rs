@@ -73,6 +73,8 @@ pub struct JointedSource {
     remarks: JointRemarks,
 }
 
+somatic_skin::debug_by_name!(JointedSource);
+
 /// Frames that were read, and those of them without a pose.
 #[derive(Clone, Copy, Debug, Default)]
 struct PoseCounts {

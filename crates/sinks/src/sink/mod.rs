@@ -54,7 +54,7 @@ use std::time::{Duration, Instant};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::percept::{Outputs, Percepts};
-use crate::scene::Plan;
+use crate::scene::{Plan, PlannedField};
 use crate::signal::{BoardHealth, Frame, RawValue, Wiring};
 
 /// Something that takes percepts.
@@ -159,11 +159,11 @@ impl FieldNames {
     /// The names of the fields of `plan`, in their order.
     #[must_use]
     pub fn all_of(plan: &Plan) -> Vec<Self> {
-        let name = |(index, (field, link)): (usize, (&str, &str))| {
+        let name = |(index, field): (usize, PlannedField<'_>)| {
             let mark = plan.mark(index);
             Self {
-                field: field.into(),
-                link: link.into(),
+                field: field.name.into(),
+                link: field.link.into(),
                 world: plan.world().into(),
                 letter: mark.receptor.map(|receptor| receptor.to_string()),
                 signal: mark.signal.map(|signal| signal.to_string()),
@@ -195,6 +195,8 @@ pub struct InputFrames<'a> {
     /// How long the engine's call took.
     pub call: Duration,
 }
+
+somatic_skin::debug_by_name!(InputFrames<'_>);
 
 /// Writes taxel ids and pressures of a frame into a list.
 pub type Pressures<'a> = dyn Fn(&Frame, &mut Vec<(u32, f64)>) + 'a;

@@ -20,6 +20,8 @@ pub struct NdjsonSink {
     closed: bool,
 }
 
+somatic_skin::debug_by_name!(NdjsonSink);
+
 /// The destination of lines.
 enum Output {
     File(OutputFile),

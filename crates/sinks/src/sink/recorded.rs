@@ -20,6 +20,8 @@ pub struct RecordingSink {
     line: Vec<u8>,
 }
 
+somatic_skin::debug_by_name!(RecordingSink);
+
 impl RecordingSink {
     /// Begins a recording at `output`.
     ///

@@ -1,5 +1,7 @@
 //! Frames: a time stamp and the raw values of some taxels.
 
+use std::fmt;
+
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DQuat, DVec3};
 use serde::{Serialize, Serializer};
@@ -56,6 +58,13 @@ impl RawValue {
     }
 }
 
+/// Exactly; NaN and infinities become faulty.
+impl From<f32> for RawValue {
+    fn from(value: f32) -> Self {
+        if value.is_finite() { Self(value.to_bits()) } else { Self::FAULTY }
+    }
+}
+
 impl Default for RawValue {
     fn default() -> Self {
         Self::MISSING
@@ -74,8 +83,15 @@ impl Serialize for RawValue {
     }
 }
 
-impl std::fmt::Debug for RawValue {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Debug for RawValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// The number, or `missing`, `stale` or `faulty`.
+impl fmt::Display for RawValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.number() {
             Some(value) => write!(f, "{value}"),
             None if *self == Self::STALE => f.write_str("stale"),
@@ -209,6 +225,16 @@ mod tests {
         let frame = Frame { t_s: 0.5, values, pose: vec![("arm".to_owned(), pose)], ..Frame::default() };
         let expected = r#"{"t":0.5,"values":[0.1,null,"stale","faulty"],"pose":{"arm":[1.0,0.0,0.0,0.0,0.0,0.0,1.0]}}"#;
         assert_eq!(serde_json::to_string(&frame).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_single_is_taken_exactly_and_what_is_no_number_is_faulty() {
+        for value in [0.1_f32, -0.0, f32::MAX, f32::from_bits(1)] {
+            assert_eq!(RawValue::from(value).number(), Some(f64::from(value)));
+        }
+        assert!([f32::NAN, f32::INFINITY].map(RawValue::from).iter().all(|value| *value == RawValue::FAULTY));
+        let words = [RawValue::from(0.5), RawValue::MISSING, RawValue::STALE, RawValue::FAULTY].map(|v| v.to_string());
+        assert_eq!(words, ["0.5", "missing", "stale", "faulty"]);
     }
 
     #[test]

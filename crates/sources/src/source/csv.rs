@@ -38,6 +38,8 @@ pub struct CsvSource {
     losses: Vec<String>,
 }
 
+somatic_skin::debug_by_name!(CsvSource);
+
 enum Time {
     /// The first column.
     Column(TimeColumn),

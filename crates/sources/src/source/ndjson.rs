@@ -31,6 +31,8 @@ pub struct NdjsonSource {
     losses: Vec<String>,
 }
 
+somatic_skin::debug_by_name!(NdjsonSource);
+
 /// The body's taxels, and the line on which each last had a value.
 struct Taxels {
     ids: Vec<u32>,

@@ -47,6 +47,8 @@ pub struct Replay {
     losses: Vec<String>,
 }
 
+somatic_skin::debug_by_name!(Replay);
+
 impl Replay {
     /// Replays `cut` of the source that `open` opens, once per repetition.
     ///

@@ -65,6 +65,7 @@ impl Device {
 
 /// What there is to run on, for people.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AdapterSummary {
     /// The adapter's own name.
     pub name: String,

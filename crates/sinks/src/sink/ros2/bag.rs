@@ -20,6 +20,8 @@ pub struct Ros2BagSink {
     waiting: VecDeque<Moment>,
 }
 
+somatic_skin::debug_by_name!(Ros2BagSink);
+
 /// The bag and those of its topics that are there, by [`Topic`].
 struct Topics {
     bag: BagWriter,

@@ -29,6 +29,8 @@ pub struct CsvSink {
     closed: bool,
 }
 
+somatic_skin::debug_by_name!(CsvSink);
+
 enum Rows {
     /// One for each field in contact, or for each.
     PerField { all_fields: bool },

@@ -123,6 +123,8 @@ impl fmt::Display for Notice {
 #[derive(Clone)]
 pub struct Lines(pub(in crate::source) Arc<Shared>);
 
+somatic_skin::debug_by_name!(Lines);
+
 impl Lines {
     /// The potentiometers, one per channel, board by board in the order of the wiring.
     #[must_use]

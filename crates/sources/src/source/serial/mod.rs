@@ -46,6 +46,8 @@ pub struct SerialSource {
     wiring: Arc<Wiring>,
 }
 
+somatic_skin::debug_by_name!(SerialSource);
+
 impl SerialSource {
     /// Starts to read `ports`, each with its speed in baud where one is given, for a body whose taxels have `ids`.
     ///

@@ -72,6 +72,8 @@ pub struct SimulatedSource {
     forces_newton: Vec<f64>,
 }
 
+somatic_skin::debug_by_name!(SimulatedSource);
+
 /// A touch, and the taxels' (position, normal) in its link's frame.
 struct LinkTouch {
     touch: Touch,

@@ -34,7 +34,7 @@ use super::vendor::VendorOptions;
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue};
 
-/// Nothing for so long, and for so many times the usual, means that the board is silent.
+/// A board is silent after this time without a line, if it is also this many of its usual periods.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
 const SILENT_PERIODS: f64 = 5.0;
 
@@ -65,6 +65,8 @@ pub struct TextSource {
     told_restarts: u64,
     notices: Vec<String>,
 }
+
+somatic_skin::debug_by_name!(TextSource);
 
 impl TextSource {
     /// Opens `place` and listens until its lines are understood, a second from the first numbers on, as `options` say it: `text`,

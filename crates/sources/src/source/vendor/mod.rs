@@ -60,6 +60,8 @@ pub struct VendorSource {
     losses: Vec<String>,
 }
 
+somatic_skin::debug_by_name!(VendorSource);
+
 impl VendorSource {
     /// The format that the content of the file at `path` has, if it is one of these.
     #[must_use]

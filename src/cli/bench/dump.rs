@@ -6,10 +6,10 @@ use super::npy;
 use somatic::body::Body;
 use somatic::error::{Error, Result};
 use somatic::field::{Field, FieldSet};
-use somatic::output::OutputFolder;
+use somatic::internal::output::OutputFolder;
+use somatic::internal::shape::Shape;
 use somatic::percept::{Flags, Outputs, Percept, Percepts, Precision};
 use somatic::signal::Frame;
-use somatic_engine::shape::Shape;
 
 /// The files that [`write()`] writes for `shape` and `outputs`.
 pub fn files(shape: &Shape, outputs: Outputs) -> Vec<String> {
