@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Mutex;
+use std::time::Instant;
 
 use somatic_testing::skip;
 
@@ -174,33 +176,50 @@ fn the_readme_is_short() {
 
 #[test]
 fn every_command_that_is_shown_runs() {
-    let mut run = 0;
-    for page in pages() {
-        let text = std::fs::read_to_string(&page).unwrap();
-        let folder = workplace();
-        for command in commands(&text) {
-            if RUN_ELSEWHERE.contains(&command.as_str()) {
-                continue;
-            }
-            let shortened =
-                SHORTENED.iter().find(|(long, _)| *long == command).map_or(&command[..], |(_, short)| short);
-            let output = shell(shortened, folder.path());
-            let no_driver = String::from_utf8_lossy(&output.stderr).contains("no GPU driver answers");
-            if no_driver && !output.status.success() {
-                skip("GPU", format!("no adapter answers, and `{command}` draws"));
-                continue;
-            }
-            assert!(
-                output.status.success(),
-                "{}: `{command}` ended with {}\n{}",
-                page.display(),
-                output.status,
-                String::from_utf8_lossy(&output.stderr)
-            );
-            run += 1;
-        }
-    }
+    // Each page by itself, two beside each other.
+    let left = Mutex::new(pages());
+    let worker = || -> usize {
+        let next = || left.lock().unwrap().pop();
+        std::iter::from_fn(next).map(|page| run_page(&page)).sum()
+    };
+    let run: usize = std::thread::scope(|scope| {
+        let workers = [scope.spawn(worker), scope.spawn(worker)];
+        workers.into_iter().map(|worker| worker.join().unwrap()).sum()
+    });
     assert!(run >= 6, "only {run} commands were found in the documentation");
+}
+
+/// Runs the commands of a page, one after the other. Gives their number; with `--nocapture`, says which take long.
+fn run_page(page: &Path) -> usize {
+    let mut run = 0;
+    let text = std::fs::read_to_string(page).unwrap();
+    let folder = workplace();
+    for command in commands(&text) {
+        if RUN_ELSEWHERE.contains(&command.as_str()) {
+            continue;
+        }
+        let shortened = SHORTENED.iter().find(|(long, _)| *long == command).map_or(&command[..], |(_, short)| short);
+        let started = Instant::now();
+        let output = shell(shortened, folder.path());
+        let took_s = started.elapsed().as_secs_f64();
+        if took_s > 5.0 {
+            println!("{took_s:.0} s  {}: {command}", page.display());
+        }
+        let no_driver = String::from_utf8_lossy(&output.stderr).contains("no GPU driver answers");
+        if no_driver && !output.status.success() {
+            skip("GPU", format!("no adapter answers, and `{command}` draws"));
+            continue;
+        }
+        assert!(
+            output.status.success(),
+            "{}: `{command}` ended with {}\n{}",
+            page.display(),
+            output.status,
+            String::from_utf8_lossy(&output.stderr)
+        );
+        run += 1;
+    }
+    run
 }
 
 /// Files that blocks of `sh data` need, where they lie below the data.

@@ -148,7 +148,7 @@ fn compare(arguments: &[&str]) -> Option<String> {
 
 #[test]
 fn pressed_taxels_of_robots_are_in_the_world_where_pinocchio_and_yourdfpy_have_them() {
-    const TOUCHES: usize = 200;
+    const TOUCHES: usize = 80;
     let folder = tempfile::tempdir().unwrap();
     let (names, numbers) = (folder.path().join("names.json"), folder.path().join("numbers"));
     let (urdf, body) = (folder.path().join("robot.urdf"), folder.path().join("robot.glb"));
@@ -212,7 +212,8 @@ fn pressed_taxels_of_robots_are_in_the_world_where_pinocchio_and_yourdfpy_have_t
 
 #[test]
 fn links_are_where_pinocchio_and_yourdfpy_have_them() {
-    const CONFIGURATIONS: usize = 1000;
+    // yourdfpy takes 20 ms for each.
+    const CONFIGURATIONS: usize = 200;
     let folder = tempfile::tempdir().unwrap();
     let (names, numbers) = (folder.path().join("names.json"), folder.path().join("numbers"));
     for (robot, joints, links) in [("panda", 8, 13), ("icub", 32, 56), ("tiago", 48, 78)] {

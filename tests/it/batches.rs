@@ -61,7 +61,7 @@ pub(crate) fn recording(body: &Body, frames: usize) -> Vec<Frame> {
 #[test]
 fn percepts_do_not_depend_on_the_cut() {
     let body = Body::from_bytes("humanoid", somatic::bundled::HUMANOID).unwrap();
-    let frames = recording(&body, 203);
+    let frames = recording(&body, 131);
     for kind in backends() {
         let whole = run(&body, kind, &frames, frames.len(), None);
         for cut in [1, 7, 64] {

@@ -35,7 +35,7 @@ fn all_bits(percepts: &Percepts) -> Vec<Vec<String>> {
 #[test]
 fn a_block_gives_the_bits_of_its_frames() {
     let body = Body::from_bytes("humanoid", bundled::HUMANOID).unwrap();
-    let mut frames = recording(&body, 150);
+    let mut frames = recording(&body, 60);
     for (index, frame) in frames.iter_mut().enumerate() {
         let pose = Pose { translation: DVec3::X * index as f64, rotation: DQuat::IDENTITY };
         frame.pose = vec![(body.links[0].name.clone(), pose)];
@@ -74,7 +74,7 @@ fn a_block_gives_the_bits_of_its_frames() {
 #[test]
 fn an_interrupted_call_leaves_the_engine_where_it_was() {
     let body = Body::from_bytes("humanoid", bundled::HUMANOID).unwrap();
-    let frames = recording(&body, 600);
+    let frames = recording(&body, 300);
     let (t_s, values, poses) = flat(&frames);
     let block = FrameBlock { t_s: &t_s, values: &values, poses: &poses };
     for kind in backends() {

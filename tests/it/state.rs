@@ -63,7 +63,8 @@ fn a_recording_goes_on_from_a_state_with_the_same_bits() {
         {
             let case = Case { backend, cadence, drift, tare };
             let whole = percepts(&mut case.engine(&body), &frames, 32);
-            for start in [1, 37] {
+            // From the first frame on in one case only: a minute less.
+            for &start in if tare { &[1, 37][..] } else { &[37] } {
                 let mut first = case.engine(&body);
                 percepts(&mut first, &frames[..start], 16);
                 let state = first.state().unwrap();
