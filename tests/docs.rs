@@ -182,8 +182,10 @@ fn every_command_that_is_shown_runs() {
         let next = || left.lock().unwrap().pop();
         std::iter::from_fn(next).map(|page| run_page(&page)).sum()
     };
+    // Skips are listed by the thread's name.
+    let named = || std::thread::Builder::new().name("every_command_that_is_shown_runs".to_owned());
     let run: usize = std::thread::scope(|scope| {
-        let workers = [scope.spawn(worker), scope.spawn(worker)];
+        let workers = [(); 2].map(|()| named().spawn_scoped(scope, worker).unwrap());
         workers.into_iter().map(|worker| worker.join().unwrap()).sum()
     });
     assert!(run >= 6, "only {run} commands were found in the documentation");
