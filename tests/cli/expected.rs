@@ -70,7 +70,7 @@ fn two_layouts_are_compared_and_drawn() {
     for words in ["Errors of simulated touches", "A: scattered.glb", "B: even.glb", "off by, mm", "ideal"] {
         assert!(svg.contains(words), "{words}");
     }
-    // What is told of the touches, but for the time, is the same each time.
+    // The report on the touches, without the time, is the same each time.
     let timeless = |text: &str| -> String { text.lines().filter(|line| !line.contains("a frame")).collect() };
     assert_eq!(timeless(&done(&compare)), timeless(&text));
     assert_eq!(files_in(folder.path()), ["errors.svg", "even.glb", "scattered.glb"]);
