@@ -29,7 +29,7 @@ const BATCH: usize = 256;
 /// Turns a recording into a file of percepts, as `somatic run --source … --sink …` does, in bounded memory.
 ///
 /// `source` and `sink` are paths or texts such as `mcap:FILE` and `parquet:FILE`; `body`, `scene`, `calibration` and `backend` as in
-/// `read` and `Engine`; what comes with the recording is used where nothing is given. the file's metadata has `label` as its
+/// `read` and `Engine`; what comes with the recording is used where nothing is given. The file's metadata has `label` as its
 /// source. `progress` is called with the number of frames done; True shows a bar of tqdm.
 ///
 /// Gives the number of frames, and what of the source was lost, a line each.
