@@ -99,7 +99,7 @@ fn read(what: &str, body: &Body) {
 struct Reader(Child);
 
 impl Reader {
-    fn of(what: &str) -> Self {
+    fn spawn(what: &str) -> Self {
         let program = std::env::current_exe().expect("this program");
         Self(Command::new(program).env(READER, what).spawn().expect("it starts again"))
     }
@@ -145,8 +145,8 @@ fn run(body: &Body, way: Way) -> Took {
         ..Session::default()
     };
     let _reader = match way {
-        Way::Ros2 => Some(Reader::of("ros2")),
-        Way::Zenoh => Some(Reader::of("zenoh")),
+        Way::Ros2 => Some(Reader::spawn("ros2")),
+        Way::Zenoh => Some(Reader::spawn("zenoh")),
         Way::Bare(_) => None,
     };
     let mut sink: Option<Box<dyn Sink + Send>> = match way {

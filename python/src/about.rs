@@ -74,7 +74,7 @@ fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Res
     Ok(match &spec {
         SourceSpec::Mcap(path) => {
             let mut reader = Reader::open(path)?;
-            let survey = Survey::of(&mut reader, |_| {})?;
+            let survey = Survey::read(&mut reader, |_| {})?;
             let topic = |t: &somatic::internal::recording::Topic| json!({"topic": t.name, "encoding": t.encoding, "messages": t.messages, "bytes": t.bytes});
             let attached = |a: &somatic::internal::recording::Attached| json!({"name": a.name, "media_type": a.media_type, "bytes": a.bytes});
             let about = json!({
@@ -86,7 +86,7 @@ fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Res
             joined(about, times(&survey.rhythm))
         }
         SourceSpec::Ros2Mcap(bag) => {
-            let survey = BagSurvey::of(&bag.path, |_| {})?;
+            let survey = BagSurvey::read(&bag.path, |_| {})?;
             let topics = survey.topics.iter().filter(|t| bag.topics.is_empty() || bag.topics.contains(&t.name));
             let seconds = |ns: u64| ns as f64 / 1e9;
             let topics = topics.map(|t| {
@@ -147,7 +147,7 @@ pub(crate) fn inspect(py: Python<'_>, body: &PyBody, contact_tolerance_m: Option
             |set| set.fields,
         );
         let odd = lint_with_progress(body, &fields, DrawnPoses::of_own_joints(body).as_ref(), &mut |_| {});
-        let (graph, outdated) = TaxelGraph::of(body);
+        let (graph, outdated) = TaxelGraph::from_body(body);
         findings.extend(outdated);
         findings.extend(odd.iter().map(ToString::to_string));
         let covered = coverage(body);

@@ -180,7 +180,7 @@ impl Taking<'_> {
     }
 }
 
-/// Takes rest and press from `opened`; gives what was lost. Of what is live, `say` is told what is to be done, and Ctrl-C ends the presses.
+/// Takes rest and press from `opened`; gives what was lost. On a live source, `say` gets the instructions, and Ctrl-C ends the presses.
 fn gather(
     py: Python<'_>,
     taking: &mut Taking<'_>,
@@ -201,9 +201,9 @@ fn gather(
             warn(py, lines.notices().iter().map(ToString::to_string))?;
         }
         match arrival {
-            Some(Arrival::Frames(mut frames, told)) => {
-                warn(py, told.notices)?;
-                losses = told.losses;
+            Some(Arrival::Frames(mut frames, info)) => {
+                warn(py, info.notices)?;
+                losses = info.losses;
                 let was_pressing = taking.is_pressing;
                 let goes_on = frames.iter_mut().all(|frame| taking.take(frame));
                 feed.give_back(frames);

@@ -5,7 +5,7 @@ use pyo3::types::PyDict;
 use somatic::Agreement;
 
 /// The dict that `Engine.verify` gives.
-pub(crate) fn told<'py>(py: Python<'py>, sum: &Agreement) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn agreement_dict<'py>(py: Python<'py>, sum: &Agreement) -> PyResult<Bound<'py, PyDict>> {
     let quantities = PyDict::new(py);
     for (name, of) in &sum.quantities {
         let made = PyDict::new(py);

@@ -201,7 +201,7 @@ impl PyBody {
         let set = FieldSet::new(&self.inner).or_raise(py)?;
         let fields = PyDict::new(py);
         for field in &set.fields {
-            let made = PyField::of(py, &self.inner, &set, field)?;
+            let made = PyField::from_field(py, &self.inner, &set, field)?;
             fields.set_item(&field.name, Bound::new(py, made)?)?;
         }
         Ok(fields)
@@ -330,14 +330,14 @@ impl PyBody {
     ///     By joint its position in rad or m, of all frames or of each. At 0 a link is where the body has it at rest. Joints that follow
     ///     others are left out.
     /// pose : dict of str to array_like, [7] or [frames, 7], optional
-    ///     Poses of links that are known otherwise, such as a floating base: what hangs on these goes from there. Without it roots
+    ///     Poses of links that are known otherwise, such as a floating base: links below them start from there. Without it roots
     ///     are where the body has them at rest.
     ///
     /// Returns
     /// -------
     /// dict of str to numpy.ndarray
     ///     By link float64 [7], or [frames, 7] where any position or pose has frames: x, y, z in the world, in metres, and a quaternion
-    ///     qx, qy, qz, qw. Links that hang on a joint without a position are not in it.
+    ///     qx, qy, qz, qw. Links below a joint without a position are not in it.
     ///
     /// Examples
     /// --------

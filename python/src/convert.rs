@@ -185,10 +185,10 @@ pub(crate) fn convert(
     let (spec, path) = target_of(&to).or_raise(py)?;
     let (read, mut copied): (Option<PathBuf>, Copied) = match source.cast::<PyRecording>() {
         Ok(recording) => {
-            let of = recording.get();
-            let own = of.body.as_ref().map(|body| body.get().clone());
-            let text = of.calibration.as_ref().map(|calibration| calibration.get().text.clone());
-            (None, Copied { source: Box::new(InMemory::of(py, of)?), body: own, calibration: text })
+            let known = recording.get();
+            let own = known.body.as_ref().map(|body| body.get().clone());
+            let text = known.calibration.as_ref().map(|calibration| calibration.get().text.clone());
+            (None, Copied { source: Box::new(InMemory::from_recording(py, known)?), body: own, calibration: text })
         }
         Err(_) => {
             let options = VendorOptions { rate_hz, ..VendorOptions::default() };

@@ -27,7 +27,7 @@ pub(crate) fn draw(py: Python<'_>, wish: Wish<'_>) -> PyResult<PyPicture> {
             rate_hz: wish.rate_hz,
         },
     };
-    let read = wish.recording.map(|recording| Read::of(py, recording)).transpose()?;
+    let read = wish.recording.map(|recording| Read::from_recording(py, recording)).transpose()?;
     let drawn = free(py, || {
         let pictures = wish.pictures(read.as_ref(), times, &mut raised)?;
         let png = Picture::animation(&pictures, times.picture_s())?;
@@ -56,7 +56,7 @@ struct Read {
 }
 
 impl Read {
-    fn of(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
+    fn from_recording(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
         let t_s = crate::arrays::times(recording.t.bind(py))?.as_slice()?.to_vec();
         let shape = [t_s.len(), recording.taxels.len()];
         let values =
@@ -101,7 +101,7 @@ impl Wish<'_> {
             let mut engine = Engine::new(body, options_of_engine)?;
             engine.set_channels(&read.taxels)?;
             let frames = read.frames(raised);
-            let moments = Moments::of(&mut engine, body, times, &read.name, frames)?;
+            let moments = Moments::compute(&mut engine, body, times, &read.name, frames)?;
             return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));
         }
         let picture = match &self.uv {

@@ -11,7 +11,7 @@ use somatic::page::Listen;
 use somatic::signal::Pose;
 use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts};
 
-use crate::agreement::told;
+use crate::agreement::agreement_dict;
 use crate::arrays::{Values, poses, time_s, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
@@ -419,7 +419,7 @@ impl PyEngine {
             let part = self.without_python(py, |inner| inner.engine.process_and_compare(&frames).map(|(_, part)| part));
             sum.merge(part.or_raise(py)?);
         }
-        told(py, &sum)
+        agreement_dict(py, &sum)
     }
 
     /// Shows in a browser what it computes from now on, on the page of docs/reference/view.md: after each call its last frame.

@@ -52,7 +52,7 @@ pub(crate) fn usage(py: Python<'_>, message: impl Into<String>) -> PyErr {
     USAGE.error(py, message.into(), None, None)
 }
 
-/// The exception for a name of which there is nothing.
+/// The exception for an unknown name.
 pub(crate) fn unknown_name(py: Python<'_>, message: impl Into<String>) -> PyErr {
     UNKNOWN.error(py, message.into(), None, None)
 }

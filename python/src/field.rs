@@ -93,7 +93,7 @@ impl PyField {
 
 impl PyField {
     /// `field`, one of `set`, on `body`.
-    pub(crate) fn of(py: Python<'_>, body: &Body, set: &FieldSet, field: &Field) -> PyResult<Self> {
+    pub(crate) fn from_field(py: Python<'_>, body: &Body, set: &FieldSet, field: &Field) -> PyResult<Self> {
         let count = field.members.len();
         let members = || field.members.iter();
         let chart = field.chart.as_ref().ok();

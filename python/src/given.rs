@@ -23,7 +23,7 @@ pub(crate) struct InMemory {
 }
 
 impl InMemory {
-    pub(crate) fn of(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
+    pub(crate) fn from_recording(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
         let frames = recording.first_frames(py, usize::MAX)?.into_iter();
         Ok(Self { taxels: recording.taxels.clone(), frames })
     }
@@ -52,7 +52,7 @@ pub(crate) struct Given {
 }
 
 impl Given {
-    /// What `source` has, of which the first frames are read: as many as `most` says for so many taxels.
+    /// What `source` has. The first frames are read: as many as `most` gives for its number of taxels.
     pub(crate) fn new(
         py: Python<'_>,
         body: Option<&Bound<'_, PyAny>>,
@@ -132,14 +132,14 @@ impl OpenSource {
         options: &VendorOptions,
     ) -> PyResult<Self> {
         if let Ok(recording) = source.cast::<PyRecording>() {
-            let source = Box::new(InMemory::of(py, recording.get())?);
+            let source = Box::new(InMemory::from_recording(py, recording.get())?);
             return Ok(Self { source, lines: None, is_live: false });
         }
         let names = match text_of(source) {
             Ok(name) => vec![name],
             Err(_) => source.try_iter()?.map(|name| text_of(&name?)).collect::<PyResult<_>>()?,
         };
-        let mut told = Vec::new();
+        let mut notices = Vec::new();
         let opened = free(py, || {
             let specs = names.iter().map(|name| name.parse()).collect::<Result<Vec<SourceSpec>>>()?;
             let lines = keys.lines(&specs)?;
@@ -151,14 +151,15 @@ impl OpenSource {
             let Some(spec) = specs.into_iter().next() else { return Err(Error::usage("give a source")) };
             if let SourceSpec::Text(place) = &spec {
                 spec.check_options(options)?;
-                let source = TextSource::open(place, options, &mut |what| told.push(what.to_owned()))?.for_body(ids)?;
+                let source =
+                    TextSource::open(place, options, &mut |what| notices.push(what.to_owned()))?.for_body(ids)?;
                 return Ok(Self { source: Box::new(source), lines: None, is_live: true });
             }
             let is_live = spec.is_stdin();
             Ok(Self { source: spec.with_content(options).open(ids, options)?, lines: None, is_live })
         });
         let opened = opened.or_raise(py)?;
-        warn(py, told)?;
+        warn(py, notices)?;
         Ok(opened)
     }
 }

@@ -65,11 +65,11 @@ impl Positions {
             given.push((name, positions));
         }
         let frames = length.unwrap_or(1);
-        let of = given.into_iter().map(|(name, positions)| match positions[..] {
+        let repeated = given.into_iter().map(|(name, positions)| match positions[..] {
             [one] if frames != 1 => (name, vec![one; frames]),
             _ => (name, positions),
         });
-        Ok((Self { of: of.collect() }, length))
+        Ok((Self { of: repeated.collect() }, length))
     }
 
     /// The position of the joint of `link` in `frame`, if it is known; of a link that follows another's that one's.
@@ -87,7 +87,7 @@ impl Positions {
     }
 
     /// The pose of each link of `body` in the world, frame by frame, where it is known; `given` are poses of links that are known
-    /// otherwise, and what hangs on these goes from there.
+    /// otherwise; links below them start from there.
     pub(crate) fn poses(&self, body: &Body, frames: usize, given: &[(String, Vec<Pose>)]) -> Vec<(String, Vec<Pose>)> {
         let rest = |link: usize| {
             let own = body.links[link].body_from_link;

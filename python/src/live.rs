@@ -250,8 +250,8 @@ pub(crate) fn open_live(
     keys: &Bound<'_, PyDict>,
 ) -> PyResult<PyLive> {
     let (scene, text) = scene_of(py, scene, keys)?;
-    let told = Arc::new(Mutex::new(Vec::new()));
-    let to = Arc::clone(&told);
+    let notices = Arc::new(Mutex::new(Vec::new()));
+    let to = Arc::clone(&notices);
     let tell = Tell::new(move |line: &str| PyLive::lock(&to).push(line.to_owned()));
     let opened = free(py, || {
         scene.check()?;
@@ -265,7 +265,7 @@ pub(crate) fn open_live(
         }
         let setup = Setup::new(scene.clone(), tell.clone());
         let input = Input::named(&setup)?;
-        let pace = Pace::of(&setup, &input, false);
+        let pace = Pace::for_input(&setup, &input, false);
         let options = |body: &somatic::Body| {
             let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
             Ok((setup.options(body, &ids, pace.batch)?, None))
@@ -276,7 +276,7 @@ pub(crate) fn open_live(
         Ok((opened, files, input.name))
     });
     let (opened, files, name) = opened.or_raise(py)?;
-    warn(py, std::mem::take(&mut *PyLive::lock(&told)))?;
+    warn(py, std::mem::take(&mut *PyLive::lock(&notices)))?;
     let Opened { body, engine, source, lines, pace, .. } = opened;
     let bytes = files.iter().find(|(_, kind, _)| kind == BODY).map(|(.., bytes)| bytes.clone()).unwrap_or_default();
     let body = PyBody { inner: Arc::new(body), bytes: Arc::new(bytes) };

@@ -154,7 +154,7 @@ impl PyParts {
             progress.tell(py, (reading.frames,))?;
         }
         let part = reading.opening.recording(py, frames)?;
-        // What was lost is told once, by the part in which it was.
+        // Each loss is reported once, by its own part.
         let part = part.with_losses_from(&mut reading.losses);
         *self.lock() = Some(reading);
         Ok(Some(part))
@@ -178,7 +178,7 @@ impl PyParts {
     }
 }
 
-/// Opens a recording to be read in stretches of `seconds`, of which memory has one at a time.
+/// Opens a recording to be read in stretches of `seconds`. Memory holds one stretch at a time.
 ///
 /// Parameters
 /// ----------

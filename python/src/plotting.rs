@@ -93,15 +93,15 @@ pub(crate) fn plot(
     };
     let mut plotted = Vec::new();
     for recording in &recordings {
-        let of = recording.get();
-        let Some(body) = &of.body else {
-            return Err(usage(py, format!("{}: it has no body; read it with body=", of.name)));
+        let known = recording.get();
+        let Some(body) = &known.body else {
+            return Err(usage(py, format!("{}: it has no body; read it with body=", known.name)));
         };
         plotted.push(Plotted {
-            name: of.name.clone(),
+            name: known.name.clone(),
             body: body.get().clone(),
-            calibration: of.calibration.as_ref().map(|calibration| calibration.get().clone()),
-            source: InMemory::of(py, of)?,
+            calibration: known.calibration.as_ref().map(|calibration| calibration.get().clone()),
+            source: InMemory::from_recording(py, known)?,
         });
     }
     let mut raised = None;

@@ -1,4 +1,4 @@
-//! Who is told how far a long call is.
+//! Reports the progress of a long call.
 
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;

@@ -210,11 +210,11 @@ impl PyRecording {
         })
     }
 
-    /// The same with the losses from number `told` on, which is then how many there are.
-    pub(crate) fn with_losses_from(mut self, told: &mut usize) -> Self {
+    /// The same with the losses from number `known` on; `known` becomes their total.
+    pub(crate) fn with_losses_from(mut self, known: &mut usize) -> Self {
         let all = self.losses.len();
-        self.losses = self.losses.split_off((*told).min(all));
-        *told = all;
+        self.losses = self.losses.split_off((*known).min(all));
+        *known = all;
         self
     }
 

@@ -29,7 +29,7 @@ const BATCH: usize = 256;
 /// Turns a recording into a file of percepts, as `somatic run --source … --sink …` does, in bounded memory.
 ///
 /// `source` and `sink` are paths or texts such as `mcap:FILE` and `parquet:FILE`; `body`, `scene`, `calibration` and `backend` as in
-/// `read` and `Engine`; what comes with the recording is used where nothing is given. `label` stands in the file's metadata as its
+/// `read` and `Engine`; what comes with the recording is used where nothing is given. The file's metadata has `label` as its
 /// source. `progress` is called with the number of frames done; True shows a bar of tqdm.
 ///
 /// Gives the number of frames, and what of the source was lost, a line each.
@@ -112,15 +112,15 @@ pub(crate) fn run<'py>(
     match done.or_raise_of(py, &file)? {
         None => Err(interrupted(raised)),
         Some((frames, losses)) => {
-            let told = PyDict::new(py);
-            told.set_item("frames", frames)?;
-            told.set_item("losses", losses)?;
-            Ok(told)
+            let dict = PyDict::new(py);
+            dict.set_item("frames", frames)?;
+            dict.set_item("losses", losses)?;
+            Ok(dict)
         }
     }
 }
 
-/// Who has called `run`, and is told how it goes.
+/// The caller of `run`, who gets its progress and warnings.
 struct Caller<'a> {
     progress: Option<&'a Progress>,
     frames: usize,
@@ -131,8 +131,8 @@ struct Caller<'a> {
 }
 
 impl Caller<'_> {
-    fn heed(&mut self, told: PyResult<()>) {
-        if let Err(error) = told {
+    fn heed(&mut self, result: PyResult<()>) {
+        if let Err(error) = result {
             self.stop.store(true, Ordering::Relaxed);
             self.raised.get_or_insert(error);
         }
@@ -142,8 +142,8 @@ impl Caller<'_> {
 impl Observer for Caller<'_> {
     fn remark(&mut self, kind: Remark, text: &str) {
         if kind == Remark::Warning {
-            let told = Python::attach(|py| warn(py, Some(text.to_owned())));
-            self.heed(told);
+            let result = Python::attach(|py| warn(py, Some(text.to_owned())));
+            self.heed(result);
         }
     }
 
@@ -152,17 +152,17 @@ impl Observer for Caller<'_> {
     }
 
     fn written(&mut self, _: &[Instant]) {
-        let told = Python::attach(|py| {
+        let result = Python::attach(|py| {
             let frames = self.frames;
             self.progress.map_or(Ok(()), |progress| progress.tell(py, (frames,)))
         });
-        self.heed(told);
+        self.heed(result);
     }
 
     fn turned(&mut self) {
         #[expect(clippy::redundant_closure_for_method_calls, reason = "the method alone is for one lifetime")]
-        let told = Python::attach(|py| py.check_signals());
-        self.heed(told);
+        let result = Python::attach(|py| py.check_signals());
+        self.heed(result);
     }
 }
 
@@ -179,10 +179,10 @@ pub(crate) fn metadata<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'p
     let file = std::fs::File::open(&path).map_err(|e| Error::io(&path, &e)).or_raise_of(py, &path)?;
     let read = ParquetRecordBatchReaderBuilder::try_new(file);
     let read = read.map_err(|why| Error::failed(format!("this is not a whole Parquet file: {why}")).at(path.display()));
-    let told = PyDict::new(py);
+    let dict = PyDict::new(py);
     let schema = Arc::clone(read.or_raise_of(py, &path)?.schema());
     for (key, value) in schema.metadata() {
-        told.set_item(key, value)?;
+        dict.set_item(key, value)?;
     }
-    Ok(told)
+    Ok(dict)
 }

@@ -39,9 +39,9 @@ const COLUMNS: [&str; 9] = ["frame", "t", "id", "link", "touch", "total", "posit
 impl PySelfContacts {
     /// Frame and contact of each row.
     fn rows(&self) -> impl Iterator<Item = (usize, &SelfContact)> {
-        let of = |frame| self.percepts.self_contacts(frame).unwrap_or_default().iter();
+        let contacts = |frame| self.percepts.self_contacts(frame).unwrap_or_default().iter();
         let first = self.frames.start;
-        self.frames.clone().flat_map(move |frame| of(frame).map(move |contact| (frame - first, contact)))
+        self.frames.clone().flat_map(move |frame| contacts(frame).map(move |contact| (frame - first, contact)))
     }
 
     fn column<T: numpy::Element>(

@@ -59,7 +59,7 @@ impl Run {
         self.plan.common_quantity().map_or("", Quantity::symbol)
     }
 
-    /// What sinks and tables are told; `source` is what people call the input.
+    /// What sinks and tables know of the run; `source` is the input's name for people.
     pub(crate) fn session<'a>(&'a self, source: &'a str, all_fields: bool, attached: bool) -> Session<'a> {
         let mut files = Vec::new();
         if attached {

@@ -31,7 +31,7 @@ struct Row {
 }
 
 impl PySimulation {
-    fn of(py: Python<'_>, name: String, mut source: SimulatedSource, body: PyBody) -> PyResult<Self> {
+    fn from_source(py: Python<'_>, name: String, mut source: SimulatedSource, body: PyBody) -> PyResult<Self> {
         let (mut rows, mut forces, mut index) = (Vec::new(), Vec::new(), 0);
         let mut frame = somatic::Frame::missing(0.0, source.taxels().len());
         let mut frames = Frames::default();
@@ -135,7 +135,7 @@ impl PySimulation {
 
 /// Simulates the touches in a TOML file, as docs/reference/simulation.md describes it; its truth is in `.truth`.
 ///
-/// `simulation` is the file's path or its text. `body` takes the place of the one that it names.
+/// `simulation` is the file's path or its text. `body` replaces the body that it names.
 ///
 /// >>> import somatic_touch as st
 /// >>> ball = """
@@ -178,7 +178,7 @@ pub(crate) fn simulate(
     }
     let name = if is_text { "simulation".to_owned() } else { path.display().to_string() };
     let body = body_of(&source, &path, body).or_raise(py)?;
-    PySimulation::of(py, name, source, body)
+    PySimulation::from_source(py, name, source, body)
 }
 
 /// The body that `source` is on: `given`, a bundled one, or the file that the simulation at `path` names.

@@ -24,7 +24,7 @@ fn threads_of_fork() -> Option<Arc<ThreadPool>> {
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     if pool.as_ref().is_none_or(|(of, _)| *of != process) {
         let made = Arc::new(ThreadPoolBuilder::new().build().ok()?);
-        // That of the process before is left as it is: to end it is to wait for threads that are not there.
+        // The pool of the parent process stays as it is: to end it would wait for threads that do not exist here.
         std::mem::forget(pool.replace((process, made)));
     }
     pool.as_ref().map(|(_, pool)| Arc::clone(pool))

@@ -199,8 +199,8 @@ struct Times {
 }
 
 impl Times {
-    /// By rank: the least time that so large a share of the calls kept within.
-    fn of(mut seconds: Vec<f64>) -> Self {
+    /// By rank: the least time that this share of the calls kept within.
+    fn from_seconds(mut seconds: Vec<f64>) -> Self {
         seconds.sort_by(f64::total_cmp);
         let within = |share: f64| seconds[((share * seconds.len() as f64).ceil() as usize).max(1) - 1];
         Self { calls: seconds.len(), median_s: within(0.5), p99_s: within(0.99) }
@@ -246,7 +246,7 @@ fn measure(
     if stop.load(Ordering::Relaxed) {
         say(&format!("stopped after {}", count(seconds.len() as u64, "call")));
     }
-    Ok(Times::of(seconds))
+    Ok(Times::from_seconds(seconds))
 }
 
 fn words(shape: &Shape) -> String {
@@ -282,9 +282,9 @@ mod tests {
 
     #[test]
     fn a_median_and_a_percentile_are_times_that_were_measured() {
-        let times = Times::of((1..=200).rev().map(f64::from).collect());
+        let times = Times::from_seconds((1..=200).rev().map(f64::from).collect());
         assert_eq!((times.calls, times.median_s, times.p99_s), (200, 100.0, 198.0));
-        let one = Times::of(vec![7.0]);
+        let one = Times::from_seconds(vec![7.0]);
         assert_eq!((one.median_s, one.p99_s), (7.0, 7.0));
     }
 

@@ -304,9 +304,9 @@ fn gather(
     while !stop.load(Ordering::Relaxed) {
         lines.into_iter().for_each(tell);
         match feed.next(Duration::from_millis(40)) {
-            Some(Arrival::Frames(mut frames, told)) => {
-                told.notices.iter().for_each(|notice| say(notice));
-                taken.losses = told.losses;
+            Some(Arrival::Frames(mut frames, info)) => {
+                info.notices.iter().for_each(|notice| say(notice));
+                taken.losses = info.losses;
                 for frame in &mut frames {
                     (taken.frames, taken.last_s) = (taken.frames + 1, frame.t_s);
                     without(&arguments.missing, &mut frame.values);

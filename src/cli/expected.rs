@@ -23,14 +23,14 @@ pub(super) fn lines([layout, ideal]: &[LayoutErrors; 2]) -> [(&'static str, Stri
 }
 
 fn words(errors: &LayoutErrors) -> String {
-    let of = |what: &str, unit: &str, percentiles: Option<[String; 2]>| {
+    let phrase = |what: &str, unit: &str, percentiles: Option<[String; 2]>| {
         percentiles.map_or_else(|| format!("{what} –"), |[median, p95]| format!("{what} {median}, {p95}{unit}"))
     };
     format!(
         "{}, {}, {}",
-        of("place", " mm", place(errors)),
-        of("axis", "°", axis(errors)),
-        of("force", " %", force(errors))
+        phrase("place", " mm", place(errors)),
+        phrase("axis", "°", axis(errors)),
+        phrase("force", " %", force(errors))
     )
 }
 
@@ -71,7 +71,7 @@ pub(super) fn json_beside_ideal([layout, ideal]: &[LayoutErrors; 2]) -> Value {
 
 /// The errors as JSON: m, rad, and shares of the force.
 pub(super) fn json(errors: &LayoutErrors) -> Value {
-    let of = |percentiles: Option<Percentiles>| {
+    let json_of = |percentiles: Option<Percentiles>| {
         percentiles.map(|Percentiles { count, median, p95 }| json!({"touches": count, "median": median, "p95": p95}))
     };
     json!({
@@ -79,9 +79,9 @@ pub(super) fn json(errors: &LayoutErrors) -> Value {
         "spacing": errors.spacing_m,
         "touch_spacing": errors.touch_spacing_m,
         "touches": errors.touches.len(),
-        "place": of(errors.place_m()),
-        "axis": of(errors.axis_rad()),
-        "force": of(errors.force()),
+        "place": json_of(errors.place_m()),
+        "axis": json_of(errors.axis_rad()),
+        "force": json_of(errors.force()),
     })
 }
 

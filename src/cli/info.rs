@@ -73,7 +73,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
             }
             let mut reader = Reader::open(&path)?;
-            let survey = Survey::of(&mut reader, |share| bar.show(share))?;
+            let survey = Survey::read(&mut reader, |share| bar.show(share))?;
             let mut losses = reader.losses();
             // What is attached may be damaged, and the rest is described all the same.
             let contacts = recorded(&path).unwrap_or_else(|e| {
@@ -94,7 +94,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
             }
         }
         SourceSpec::Ros2Mcap(bag) => {
-            let mut survey = BagSurvey::of(&bag.path, |share| bar.show(share))?;
+            let mut survey = BagSurvey::read(&bag.path, |share| bar.show(share))?;
             survey.topics.retain(|topic| bag.topics.is_empty() || bag.topics.contains(&topic.name));
             drop(bar);
             let json = arguments.json.then(|| format!("{}\n", bag::as_json(&survey)));

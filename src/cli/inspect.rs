@@ -99,7 +99,7 @@ pub(super) fn inspect(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("looking for defects");
     let odd = lint_with_progress(&body, &fields, poses.as_ref(), &mut |share| bar.show(share));
     drop(bar);
-    let (graph, outdated) = TaxelGraph::of(&body);
+    let (graph, outdated) = TaxelGraph::from_body(&body);
     findings.extend(outdated);
     findings.extend(odd.iter().map(ToString::to_string));
     let coverage = coverage(&body);

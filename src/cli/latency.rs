@@ -5,7 +5,7 @@ use std::time::Duration;
 use hdrhistogram::Histogram;
 use serde_json::{Value, json};
 
-/// The longest latency that is told from longer ones, µs: a day.
+/// The longest latency that is counted, µs: a day. Longer ones count as this.
 const MOST_US: u64 = 86_400_000_000;
 /// Digits that a figure has: it is at most 1 % too high.
 const DIGITS: u8 = 2;

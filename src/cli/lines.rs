@@ -29,7 +29,7 @@ const HEALTH_PERIOD: Duration = Duration::from_millis(500);
 struct Latest {
     text: String,
     /// With its time and count.
-    told: String,
+    line: String,
 }
 
 /// Collects and shows the messages of serial lines.
@@ -42,9 +42,9 @@ pub(super) struct LineReport {
     latest: VecDeque<Latest>,
     summary: Option<OutputPath>,
     quiet: bool,
-    /// What sinks have not been told.
+    /// News that sinks have not received.
     news: News,
-    told_health: Option<Instant>,
+    health_sent_at: Option<Instant>,
     /// By board, its frames and when there was one more.
     last_frames: HashMap<u16, (u64, Instant)>,
 }
@@ -60,7 +60,7 @@ impl LineReport {
             summary,
             quiet,
             news: News::default(),
-            told_health: None,
+            health_sent_at: None,
             last_frames: HashMap::new(),
         }
     }
@@ -73,11 +73,11 @@ impl LineReport {
         (!percepts.0.is_empty()).then_some(percepts)
     }
 
-    /// What sinks are to be told now, if anything.
+    /// The news for sinks, if there is any.
     pub(super) fn news(&mut self) -> Option<News> {
         let now = Instant::now();
-        if self.told_health.is_none_or(|told| now - told >= HEALTH_PERIOD) {
-            self.told_health = Some(now);
+        if self.health_sent_at.is_none_or(|sent_at| now - sent_at >= HEALTH_PERIOD) {
+            self.health_sent_at = Some(now);
             let accounts = self.lines.accounts();
             self.news.boards = Some(accounts.iter().map(|account| self.health(account, now)).collect());
         }
@@ -108,30 +108,30 @@ impl LineReport {
     /// Shows new messages; with a table, below it and again at the end.
     pub(super) fn tell(&mut self, at_table: bool) {
         for notice in self.lines.notices() {
-            let Some(told) = self.repeats.tell(notice.at_s, &notice.text) else { continue };
+            let Some(line) = self.repeats.tell(notice.at_s, &notice.text) else { continue };
             self.news.notices.push((notice.at_s, notice.text.clone()));
             if !at_table {
-                say(&told);
+                say(&line);
                 continue;
             }
             if self.latest.len() == LATEST_MESSAGES {
                 self.latest.pop_front();
             }
-            self.latest.push_back(Latest { text: notice.text, told: told.clone() });
+            self.latest.push_back(Latest { text: notice.text, line: line.clone() });
             // A line that breaks in ever other ways fills no memory.
             if self.kept.len() < 1000 {
-                self.kept.push(told);
+                self.kept.push(line);
             }
         }
     }
 
-    /// What stands below the table.
+    /// The rows below the table.
     pub(super) fn rows(&self) -> Vec<String> {
         let accounts = self.lines.accounts();
         let mut rows: Vec<String> = Vec::new();
         if accounts.len() <= MAX_BOARD_ROWS {
             rows.extend(accounts.iter().map(|account| {
-                let text = format!("  {}: {}, {}", account.name(), account.state.word(), told(account));
+                let text = format!("  {}: {}, {}", account.name(), account.state.word(), frame_counts(account));
                 if account.state == BoardState::Speaking { text } else { style(text).yellow().to_string() }
             }));
         } else {
@@ -141,7 +141,7 @@ impl LineReport {
             rows.push(format!("  latency {}", self.latency.words()));
         }
         let latest = self.latest.iter().filter(|latest| !latest.is_over(&accounts));
-        rows.extend(latest.map(|latest| style(format!("  {}", latest.told)).yellow().to_string()));
+        rows.extend(latest.map(|latest| style(format!("  {}", latest.line)).yellow().to_string()));
         rows
     }
 
@@ -150,14 +150,14 @@ impl LineReport {
         self.lines.close();
         self.kept.drain(..).for_each(|notice| say(&notice));
         self.tell(false);
-        self.repeats.rest().for_each(|told| say(&told));
+        self.repeats.rest().for_each(|line| say(&line));
         let accounts = self.lines.accounts();
         let answered = accounts.iter().any(|account| account.port.is_some());
         if !self.quiet {
             for account in accounts.iter().filter(|account| account.state != BoardState::Awaited) {
                 let port = account.port.as_deref().unwrap_or("?");
                 let place = if account.limb.is_some() { String::new() } else { format!(" at {port}") };
-                say(&format!("{}{place}: {}", account.name(), told(account)));
+                say(&format!("{}{place}: {}", account.name(), frame_counts(account)));
             }
             let awaited = accounts.iter().filter(|account| account.state == BoardState::Awaited);
             let awaited: Vec<String> = awaited.map(BoardAccount::name).collect();
@@ -199,7 +199,7 @@ impl Latest {
 }
 
 /// What became of a board's frames, in words.
-fn told(account: &BoardAccount) -> String {
+fn frame_counts(account: &BoardAccount) -> String {
     let sent = account.delivered + account.lost;
     let mut text = format!("{} sent, {} delivered, {} lost", count(sent, "frame"), account.delivered, account.lost);
     let more = [
@@ -267,7 +267,7 @@ mod tests {
     fn a_plug_that_is_in_again_is_no_longer_said_to_be_out() {
         let mut account = BoardAccount::default();
         (account.port, account.state) = (Some("tty1".into()), BoardState::Unplugged);
-        let latest = |text: &str| Latest { text: text.into(), told: String::new() };
+        let latest = |text: &str| Latest { text: text.into(), line: String::new() };
         let gone = latest("tty1: unplugged; waiting for it to come back");
         assert!(!gone.is_over(&[account.clone()]));
         account.state = BoardState::Silent;

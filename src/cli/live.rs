@@ -223,7 +223,7 @@ impl Table {
     fn new(about: &RunInfo<'_>) -> Self {
         let ChosenBackend { name, device: what, .. } = about.engine.backend();
         let plan = about.engine.plan();
-        let unit = plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::of);
+        let unit = plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::for_quantity);
         let row = |field: usize| FieldRow {
             name: plain::line(&plan.label(field)).into_owned(),
             latest: None,

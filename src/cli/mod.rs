@@ -140,7 +140,7 @@ pub(crate) fn arguments() -> Result<Arguments, clap::Error> {
 
 /// Prints what the arguments are answered with, help or what is wrong with them, and gives the exit code.
 pub(crate) fn answer(answer: &clap::Error) -> ExitCode {
-    match old_names::told(answer, &command()) {
+    match old_names::renaming(answer, &command()) {
         Some(what) => {
             let error = Error::usage(what);
             say(&format!("{}: {error}", console::style("error").red().bold().for_stderr()));

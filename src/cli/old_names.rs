@@ -6,7 +6,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use somatic::internal::renamed::new_name;
 
 /// In one line, what is given under an old name, if that is what `error` says of the arguments of `command`.
-pub(super) fn told(error: &clap::Error, command: &clap::Command) -> Option<String> {
+pub(super) fn renaming(error: &clap::Error, command: &clap::Command) -> Option<String> {
     let ContextValue::String(argument) = error.get(ContextKind::InvalidArg)? else { return None };
     let flag = argument.split_whitespace().next()?;
     match error.kind() {

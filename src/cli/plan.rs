@@ -67,7 +67,7 @@ fn plan_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
         Some(input) => input.body(asked)?,
         None => load_body(asked.body.as_deref().unwrap_or("hand"))?,
     };
-    let bill = Bill::of(asked, input.as_ref(), &body)?;
+    let bill = Bill::for_run(asked, input.as_ref(), &body)?;
     print(&if arguments.json { format!("{}\n", bill.json()) } else { bill.text() })?;
     Ok(DONE)
 }

@@ -108,7 +108,7 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
         return Err(Error::usage("only PNG is drawn; let its name end in .png").at(path.display()));
     }
     let asked = arguments.touched.asked(arguments.body.as_deref())?;
-    let output = FilesRead::of(&asked, None).outputs(arguments.force).add(path)?;
+    let output = FilesRead::from_scene(&asked, None).outputs(arguments.force).add(path)?;
     let mut views = Vec::new();
     for name in &arguments.views {
         match name.as_str() {
@@ -129,7 +129,7 @@ pub(super) fn render(arguments: &Arguments) -> Result<u8> {
         None => None,
         Some(name) => match set.fields.iter().position(|field| field.name == *name) {
             Some(index) => Some(index),
-            // A glob will do where it names one, and what is wrong with it is said the same way.
+            // A glob works if it names one field, and its errors are reported the same way.
             None => Some(named(std::slice::from_ref(name))?[0]),
         },
     };

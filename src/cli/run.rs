@@ -119,7 +119,7 @@ impl Arguments {
         if self.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !self.describe {
             return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
         }
-        let mut outputs: OutputPaths = FilesRead::of(asked, self.scene.as_deref()).outputs(asked.overwrite);
+        let mut outputs: OutputPaths = FilesRead::from_scene(asked, self.scene.as_deref()).outputs(asked.overwrite);
         // A description makes no file.
         let targets = sinks
             .iter()

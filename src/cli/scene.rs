@@ -24,7 +24,7 @@ impl RunFlags {
         let file = scene.map(SceneFile::load).transpose()?.unwrap_or_default();
         let laid = self.over(file.clone()).and_then(|laid| laid.check().map(|()| laid));
         let laid = laid.map_err(|error| match scene {
-            // What is wrong with the file alone is said by its keys.
+            // Errors in the file alone name its keys.
             Some(path) if file.check().as_ref() == Err(&error) => error.at(path.display()),
             Some(path) => in_flags(error).at(path.display()),
             None => in_flags(error),
@@ -33,12 +33,12 @@ impl RunFlags {
     }
 }
 
-/// What `scene` asks for; what is found out is said in the words of flags.
+/// What `scene` asks for; messages speak of flags.
 pub(super) fn set_up(scene: SceneFile) -> Setup {
     Setup::new(scene, said())
 }
 
-/// Says what is told, in the words of flags.
+/// Prints each line with flags in place of keys.
 pub(super) fn said() -> Tell {
     Tell::new(|text| say(&words_of_flags(text)))
 }

@@ -8,7 +8,7 @@ use super::stdio::for_terminal;
 pub(super) struct Screen {
     term: Term,
     on_stderr: bool,
-    /// Width of each line that stands there, in columns.
+    /// Width of each line on the screen, in columns.
     drawn: Vec<usize>,
 }
 

@@ -91,11 +91,11 @@ pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
         bar.show_with_time_left(share);
     })?;
     drop(bar);
-    let mut told = format!("{frames} frames in {place}, the truth in {}", truth.display());
+    let mut summary = format!("{frames} frames in {place}, the truth in {}", truth.display());
     if let Some(to) = calibration_to {
-        told += &format!(", the calibration in {}", to.name().display());
+        summary += &format!(", the calibration in {}", to.name().display());
         to.write(simulation.calibration().as_bytes())?;
     }
-    say(&told);
+    say(&summary);
     Ok(DONE)
 }

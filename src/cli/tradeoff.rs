@@ -96,7 +96,7 @@ fn tradeoff_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) {
         return Err(Error::usage(format!("--seconds {} is not a time span; give seconds over 0", arguments.seconds)));
     }
-    let mut outputs = FilesRead::of(asked, arguments.scene.as_deref()).outputs(asked.overwrite);
+    let mut outputs = FilesRead::from_scene(asked, arguments.scene.as_deref()).outputs(asked.overwrite);
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let scene = match (&arguments.scene, arguments.write) {
         (None, true) => return Err(Error::usage("--write writes into a scene file; name one")),
@@ -204,8 +204,8 @@ fn said(value: f64, errors: &Errors) -> String {
 
 /// How far each method is from the truth, and what it costs.
 fn truth(report: &Report) -> String {
-    let of = if report.touches.is_empty() { "touches of the source" } else { &report.touches };
-    let mut text = format!("\n{}: {of}\n", style("from the truth").bold());
+    let touches = if report.touches.is_empty() { "touches of the source" } else { &report.touches };
+    let mut text = format!("\n{}: {touches}\n", style("from the truth").bold());
     text += &rungs(report, &|row| row.truth.as_ref());
     let fitted = report.rows.iter().find_map(|row| row.truth_with_fit.as_ref());
     if let Some(fitted) = fitted.filter(|fitted| fitted.touches > 0) {
@@ -217,7 +217,7 @@ fn truth(report: &Report) -> String {
 
 /// A table of the methods by their errors `of` some touches.
 fn rungs(report: &Report, of: &dyn Fn(&Measurement) -> Option<&TrueErrors>) -> String {
-    let ways: Vec<CallMode> = CallMode::ALL.into_iter().filter(|way| !report.of(*way).is_empty()).collect();
+    let ways: Vec<CallMode> = CallMode::ALL.into_iter().filter(|way| !report.measurements(*way).is_empty()).collect();
     let times = ways.iter().map(|way| format!("{}, µs", way.word()));
     let errors =
         ["round, mm: median", "p95", "across rods, mm: median", "p95", "angle, °: median", "p95", "rms", "given"];
@@ -246,7 +246,7 @@ fn rungs(report: &Report, of: &dyn Fn(&Measurement) -> Option<&TrueErrors>) -> S
 
 /// What rounding costs and gives: the combinations of the other options against the reference.
 fn rounding(report: &Report, way: CallMode, all: bool) -> String {
-    let rows = report.of(way);
+    let rows = report.measurements(way);
     if rows.is_empty() {
         return String::new();
     }

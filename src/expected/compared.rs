@@ -29,8 +29,8 @@ pub struct ComparedLayouts {
     pub ideal: [LayoutErrors; 2],
     /// Whether both have one surface, and so are touched at the same places.
     pub same_places: bool,
-    /// Median time of a live frame with a touch, on the CPU, of all that a run computes unless told otherwise, s. It is measured, and
-    /// another each time.
+    /// Median time of a live frame with a touch, on the CPU, of all that a run computes by default, s. It is measured, so
+    /// it differs each time.
     pub frame_s: [f64; 2],
 }
 
@@ -57,14 +57,14 @@ pub fn compare_layouts(bodies: [&Body; 2], touches: &TestTouches) -> Result<Comp
     let touches = touches.spacing_m(spacing_m);
     let same_places = bodies[0].triangles_at_rest() == bodies[1].triangles_at_rest();
     let skins = [first.skin(spacing_m), second.skin(spacing_m)];
-    let of = |taken: [bool; 2]| {
+    let presses_on = |taken: [bool; 2]| {
         presses(touches.count, spacing_m, |press| {
             skins.iter().zip(taken).all(|(skin, taken)| !taken || skin.skin_at(press).is_some())
         })
     };
     let [of_first, of_second] = match same_places {
-        true => [of([true; 2]), of([true; 2])],
-        false => [of([true, false]), of([false, true])],
+        true => [presses_on([true; 2]), presses_on([true; 2])],
+        false => [presses_on([true, false]), presses_on([false, true])],
     };
     let layouts = [first.errors(&skins[0], &of_first, spacing_m)?, second.errors(&skins[1], &of_second, spacing_m)?];
     let ideal = [hexagons::errors(first.spacing_m, &touches)?, hexagons::errors(second.spacing_m, &touches)?];

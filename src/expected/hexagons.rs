@@ -86,7 +86,7 @@ mod tests {
     fn every_cell_in_the_middle_is_a_regular_hexagon_of_the_wanted_size() {
         let spacing_m = 0.0162;
         let sheet = sheet(spacing_m);
-        let (graph, _) = TaxelGraph::of(&sheet);
+        let (graph, _) = TaxelGraph::from_body(&sheet);
         let mut inner = 0;
         for (index, taxel) in sheet.taxels.iter().enumerate() {
             if taxel.position_in_link.abs().max_element() < 5.0 * spacing_m {

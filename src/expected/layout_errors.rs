@@ -54,8 +54,8 @@ pub struct LayoutErrors {
 }
 
 impl Percentiles {
-    /// Those of `errors`, if there are any.
-    fn of(errors: impl Iterator<Item = f64>) -> Option<Self> {
+    /// The percentiles of `errors`, if there are any.
+    fn from_errors(errors: impl Iterator<Item = f64>) -> Option<Self> {
         let mut errors: Vec<f64> = errors.collect();
         errors.sort_by(f64::total_cmp);
         let rank = |share: f64| {
@@ -75,19 +75,19 @@ impl LayoutErrors {
     /// Errors of the position, m; `None` if no touch counts.
     #[must_use]
     pub fn place_m(&self) -> Option<Percentiles> {
-        Percentiles::of(self.counted().map(|touch| touch.place_m))
+        Percentiles::from_errors(self.counted().map(|touch| touch.place_m))
     }
 
     /// Errors of the principal axes of lines, rad; `None` if none has one.
     #[must_use]
     pub fn axis_rad(&self) -> Option<Percentiles> {
-        Percentiles::of(self.counted().filter_map(|touch| touch.axis_rad))
+        Percentiles::from_errors(self.counted().filter_map(|touch| touch.axis_rad))
     }
 
     /// Errors of the force, whatever their sign, as shares of it; `None` if no touch counts.
     #[must_use]
     pub fn force(&self) -> Option<Percentiles> {
-        Percentiles::of(self.counted().map(|touch| touch.force.abs()))
+        Percentiles::from_errors(self.counted().map(|touch| touch.force.abs()))
     }
 }
 
@@ -97,9 +97,9 @@ mod tests {
 
     #[test]
     fn percentiles_are_of_what_is_there() {
-        let of = Percentiles::of((1..=200).rev().map(f64::from)).unwrap();
-        assert_eq!(of, Percentiles { count: 200, median: 100.0, p95: 190.0 });
-        assert_eq!(Percentiles::of([3.0].into_iter()), Some(Percentiles { count: 1, median: 3.0, p95: 3.0 }));
-        assert_eq!(Percentiles::of(std::iter::empty()), None);
+        let percentiles = Percentiles::from_errors((1..=200).rev().map(f64::from)).unwrap();
+        assert_eq!(percentiles, Percentiles { count: 200, median: 100.0, p95: 190.0 });
+        assert_eq!(Percentiles::from_errors([3.0].into_iter()), Some(Percentiles { count: 1, median: 3.0, p95: 3.0 }));
+        assert_eq!(Percentiles::from_errors(std::iter::empty()), None);
     }
 }

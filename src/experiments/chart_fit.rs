@@ -32,7 +32,7 @@ pub(super) struct PlaneChart {
 }
 
 impl PlaneChart {
-    /// That of `field` of `body`.
+    /// The chart of `field` of `body`.
     pub(super) fn new(body: &Body, field: &str) -> Result<Self> {
         let fields = FieldSet::new(body)?.fields;
         let of_field = fields.iter().find(|of_body| of_body.name == field);

@@ -148,7 +148,7 @@ struct Scores {
 }
 
 impl Scores {
-    fn of(trial: &Trial, signal: usize) -> Self {
+    fn from_trial(trial: &Trial, signal: usize) -> Self {
         let mut scores = Self::default();
         for (index, moment) in trial.moments.iter().enumerate() {
             let earlier = index.checked_sub(SPAN_FRAMES).map(|earlier| &trial.moments[earlier]);
@@ -303,7 +303,8 @@ impl Table {
         let scores = cases.par_iter().map(|case| {
             let (name, text) = ("a simulation of the table", case.simulation());
             let trials = trial::run_seeds(name, &text, body, "hand/back", &case.seeds())?;
-            let scores: Vec<_> = trials.iter().map(|trial| [0, 1].map(|signal| Scores::of(trial, signal))).collect();
+            let scores: Vec<_> =
+                trials.iter().map(|trial| [0, 1].map(|signal| Scores::from_trial(trial, signal))).collect();
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / cases.len() as f64);
             Ok(scores)
         });

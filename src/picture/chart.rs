@@ -92,7 +92,7 @@ impl<'a> ChartPicture<'a> {
                 field
             })
             .collect();
-        let shown = FieldColours::of(&within, &self.options.fields, &self.dots);
+        let shown = FieldColours::for_fields(&within, &self.options.fields, &self.dots);
         let slices = |rims: bool| self.dots.slices(&shown.coloured(&within), DVec3::ZERO, rims);
         let title = format!("{}{}", self.name, self.about);
         self.drawn(&title, shown.key(&within), slices, |_| PAPER, |_| {})
@@ -113,7 +113,7 @@ impl<'a> ChartPicture<'a> {
         }
         let time = moment.t_s.map_or(String::new(), |t_s| format!("{t_s:.2} s"));
         let slices = |rims: bool| self.dots.flat_slices(&colours, &touched, DVec3::ZERO, rims);
-        // The colours of pressure take the place of what else is known.
+        // The colours of pressure replace all others.
         self.drawn(
             &self.name,
             vec![(None, time)],

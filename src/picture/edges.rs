@@ -48,7 +48,7 @@ impl Lines {
         middle: DVec3,
         thick: u32,
     ) -> Self {
-        let (graph, _) = TaxelGraph::of(body);
+        let (graph, _) = TaxelGraph::from_body(body);
         let seen_in_views = seen(body, dots, views);
         let mut lines = Vec::new();
         for (index, seen) in seen_in_views.iter().enumerate() {
@@ -86,13 +86,13 @@ mod tests {
     #[test]
     fn a_view_sees_the_taxels_that_face_it_and_that_nothing_hides() {
         let body = Body::from_bytes("humanoid", bundled::body("humanoid").unwrap()).unwrap();
-        let dots = Dots::of(&body);
+        let dots = Dots::from_body(&body);
         let seen = seen(&body, &dots, &[View::Front, View::Back]);
         let facing = |view: View, taxel: usize| dots.normals[taxel].dot(view.axes()[2]) > MIN_FACING;
         for (view, seen) in [View::Front, View::Back].into_iter().zip(&seen) {
-            let of = |wanted: &dyn Fn(usize) -> bool| (0..seen.len()).filter(|&taxel| wanted(taxel)).count();
+            let count = |wanted: &dyn Fn(usize) -> bool| (0..seen.len()).filter(|&taxel| wanted(taxel)).count();
             assert!(seen.iter().enumerate().all(|(taxel, seen)| !seen || facing(view, taxel)));
-            let (all, visible) = (of(&|taxel| facing(view, taxel)), of(&|taxel| seen[taxel]));
+            let (all, visible) = (count(&|taxel| facing(view, taxel)), count(&|taxel| seen[taxel]));
             // An arm hides some of the flank, and little else is hidden.
             assert!(visible < all && visible > all / 2, "{view:?}: {visible} of {all}");
         }

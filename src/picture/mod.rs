@@ -59,8 +59,8 @@ pub struct Options {
 /// # Errors
 /// There is nothing to draw, no adapter, a size that cannot be drawn, or a device that stopped answering.
 pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Picture> {
-    let dots = Dots::of(body);
-    let shown = FieldColours::of(fields, &options.fields, &dots);
+    let dots = Dots::from_body(body);
+    let shown = FieldColours::for_fields(fields, &options.fields, &dots);
     let title = format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel"));
     let prepared = Prepared::new(body, fields, options, &title, shown.key(fields))?;
     let Prepared { size, middle, arrangement, views, .. } = &prepared;
@@ -105,7 +105,7 @@ impl Prepared {
     ) -> Result<Self> {
         let size = checked(options.size)?;
         let triangles = body.triangles_at_rest();
-        let dots = Dots::of(body);
+        let dots = Dots::from_body(body);
         let bounds = || triangles.iter().flat_map(|(_, corners)| *corners).chain(dots.places.iter().copied());
         let (low, high) = bounds().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
         if !(low.is_finite() && high.is_finite()) {
@@ -185,7 +185,7 @@ fn arranged(
         let least = taken + 40;
         return Err(Error::usage(format!("the picture is too low; give a height over {least} pixels")));
     }
-    let arrangement = Arrangement::of(views, points, [width, height - taken], labels.above(), labels.above_view());
+    let arrangement = Arrangement::in_rows(views, points, [width, height - taken], labels.above(), labels.above_view());
     let size = [width, arrangement.height + taken];
     Ok((arrangement, size))
 }
@@ -212,8 +212,8 @@ struct FieldColours {
 }
 
 impl FieldColours {
-    /// The fields `chosen`, or those of `fields` without children.
-    fn of(fields: &[Field], chosen: &[usize], dots: &Dots) -> Self {
+    /// Colours of the fields `chosen`, or else of the fields without children.
+    fn for_fields(fields: &[Field], chosen: &[usize], dots: &Dots) -> Self {
         let leaf = |index: &usize| fields.iter().all(|field| field.parent != Some(*index));
         let fields_shown: Vec<usize> = match chosen {
             [] => (0..fields.len()).filter(leaf).collect(),
@@ -221,9 +221,9 @@ impl FieldColours {
         };
         let fields_shown: Vec<usize> =
             fields_shown.into_iter().filter(|&index| !fields[index].members.is_empty()).collect();
-        let of: Vec<&Field> = fields_shown.iter().map(|&index| &fields[index]).collect();
-        let beside = if of.len() > PALETTE.len() { dots.beside(&of) } else { Default::default() };
-        let (colours, own) = colour::assign(of.len(), &beside);
+        let shown: Vec<&Field> = fields_shown.iter().map(|&index| &fields[index]).collect();
+        let beside = if shown.len() > PALETTE.len() { dots.beside(&shown) } else { Default::default() };
+        let (colours, own) = colour::assign(shown.len(), &beside);
         Self { fields: fields_shown, colours, own }
     }
 

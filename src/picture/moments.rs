@@ -75,7 +75,7 @@ impl Moments {
     ///
     /// # Errors
     /// What reading and computing say; there is no frame at these times, or there are too many.
-    pub fn of(
+    pub fn compute(
         engine: &mut Engine,
         body: &Body,
         times: Times,
@@ -209,7 +209,7 @@ fn marked(found: &TouchFrame, trails: &TouchTrails, of_skin: &[usize]) -> Vec<Ma
     let of_touch = |touch: &Touch| MarkedTouch {
         touch: touch.clone(),
         taxels: found.taxels(touch).iter().map(|&node| of_skin[node as usize]).collect(),
-        trail: trails.of(touch.id).filter_map(|point| Some((point.link?, point.position))).collect(),
+        trail: trails.trail(touch.id).filter_map(|point| Some((point.link?, point.position))).collect(),
     };
     found.touches.iter().map(of_touch).collect()
 }

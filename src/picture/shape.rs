@@ -43,8 +43,8 @@ pub(super) struct Dots {
 }
 
 impl Dots {
-    /// For `body`'s taxels, at rest, none larger than its area.
-    pub(super) fn of(body: &Body) -> Self {
+    /// The dots of `body`'s taxels at rest, none larger than its taxel.
+    pub(super) fn from_body(body: &Body) -> Self {
         let way = |link: usize| body.links[link].body_from_link;
         let places = body.taxels.iter().map(|t| way(t.link).transform_point3(t.position_in_link)).collect();
         let normals = body.taxels.iter().map(|t| way(t.link).transform_vector3(t.normal_in_link)).collect();

@@ -102,7 +102,7 @@ pub(super) struct Arrangement {
 impl Arrangement {
     /// Arranges `views` of `points` (in m, about their middle) in rows within `width` × `height` pixels, as large as they
     /// can be; the first row starts at `top`, and each view has `caption` pixels above it.
-    pub(super) fn of(
+    pub(super) fn in_rows(
         views: &[[DVec3; 3]],
         points: &[DVec3],
         [width, height]: [u32; 2],
@@ -129,7 +129,7 @@ impl Arrangement {
         let (scale, widths, heights) = best.unwrap_or((1.0, Vec::new(), Vec::new()));
         let scale = if scale.is_finite() { scale } else { 1.0 };
         let used: f64 = widths.iter().map(|w| w * scale + 2.0 * MARGIN).sum();
-        // What is left over goes to all columns: views fill the picture, and show more of a body of which they show a part.
+        // All columns share the room that is left: views fill the picture, and partial views show more of the body.
         let spare = ((f64::from(width) - used) / widths.len().max(1) as f64).max(0.0);
         let mut placed = Vec::with_capacity(views.len());
         let mut y = f64::from(top);
@@ -225,7 +225,7 @@ mod tests {
             (0..64).map(|i| DVec3::new(f64::from(i % 4), f64::from(i / 4 % 4) * 3.0, 7.0)).collect();
         for count in 1..=7 {
             let views: Vec<_> = View::ALL[..count].iter().map(|view| view.axes()).collect();
-            let arrangement = Arrangement::of(&views, &points, [900, 700], 40, 26);
+            let arrangement = Arrangement::in_rows(&views, &points, [900, 700], 40, 26);
             assert!(arrangement.height <= 701);
             for (eye, placed) in arrangement.eyes(20.0).iter().zip(&arrangement.views) {
                 let [left, top, width, height] = placed.part;

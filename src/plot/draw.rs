@@ -46,7 +46,7 @@ const INTEGRAL: usize = 1;
 /// # Errors
 /// There is nothing to draw, or it cannot be drawn.
 pub fn svg(all: &[Gathered]) -> Result<String> {
-    let plot = Plot::of(all)?;
+    let plot = Plot::for_fields(all)?;
     let mut text = String::new();
     plot.draw(&SVGBackend::with_string(&mut text, plot.dots()).into_drawing_area(), true)?;
     Ok(plain::xml(&text).replace("<polyline ", "<polyline stroke-linejoin=\"round\" stroke-linecap=\"round\" "))
@@ -57,7 +57,7 @@ pub fn svg(all: &[Gathered]) -> Result<String> {
 /// # Errors
 /// As [`svg`].
 pub fn png(all: &[Gathered]) -> Result<Vec<u8>> {
-    let plot = Plot::of(all)?;
+    let plot = Plot::for_fields(all)?;
     let (width, height) = plot.dots();
     let mut pixels = vec![0; (3 * width * height) as usize];
     plot.draw(&BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area(), false)?;
@@ -100,7 +100,7 @@ fn p_for_people(unit: &str) -> (f64, &str) {
 }
 
 impl<'a> Plot<'a> {
-    fn of(all: &'a [Gathered]) -> Result<Self> {
+    fn for_fields(all: &'a [Gathered]) -> Result<Self> {
         if all.iter().all(|gathered| gathered.frames == 0 || gathered.panels.is_empty()) {
             return Err(Error::failed("there are no frames to plot"));
         }
@@ -108,7 +108,7 @@ impl<'a> Plot<'a> {
             let taxels = all.iter().flat_map(|gathered| &gathered.maps).flat_map(|map| &map.taxels);
             taxels.map(of).fold(0.0, f64::max)
         };
-        let page = Page::of(all);
+        let page = Page::for_fields(all);
         let per_m = all.iter().enumerate().flat_map(|(column, gathered)| {
             let area = page.map(column, 0, 2 * gathered.maps.len());
             gathered.maps.iter().map(move |map| {

@@ -142,7 +142,7 @@ impl Gatherer {
         Self { p_unit: unit.to_owned(), ..self }
     }
 
-    /// Takes `frames`, of which `engine` has just made percepts.
+    /// Adds `frames`, which `engine` has just made percepts of.
     pub fn see(&mut self, engine: &Engine, frames: &[Frame]) {
         let percepts = engine.percepts();
         for (index, frame) in frames.iter().enumerate() {
@@ -175,11 +175,12 @@ impl Gatherer {
                 }
             }
             let [total, centroid] = [Outputs::TOTAL, Outputs::CENTROID].map(column_of);
-            let of = |column: Option<&Column>| column.and_then(|column| percepts.value(frame, field.in_plan, column));
-            let load = of(total).map_or(0.0, |total| total[0]);
+            let value_of =
+                |column: Option<&Column>| column.and_then(|column| percepts.value(frame, field.in_plan, column));
+            let load = value_of(total).map_or(0.0, |total| total[0]);
             field.most_load = field.most_load.max(load);
             field.impulse += load * dt_s;
-            field.path.push(of(centroid).map(|[u, v, _]| [u, v]));
+            field.path.push(value_of(centroid).map(|[u, v, _]| [u, v]));
         }
     }
 

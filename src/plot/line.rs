@@ -3,7 +3,7 @@
 
 use super::series::Series;
 
-/// What is seen of a quantity at one dot across.
+/// What a plot shows of a quantity at one column of dots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stretch {
     x: i32,

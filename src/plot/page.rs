@@ -45,7 +45,7 @@ pub(super) struct Page {
 }
 
 impl Page {
-    pub(super) fn of(all: &[Gathered]) -> Self {
+    pub(super) fn for_fields(all: &[Gathered]) -> Self {
         let columns = all.len().max(1);
         let width = match columns {
             1 => 760,

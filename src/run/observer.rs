@@ -7,7 +7,7 @@ use crate::engine::{Engine, EngineState};
 use crate::signal::Frame;
 use crate::sink::{News, Question};
 
-/// How a remark is to be told.
+/// How a remark is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Remark {
     /// Of the frames: where a table fills the terminal, it may be left out.
@@ -40,7 +40,7 @@ pub trait Observer {
         None
     }
 
-    /// What sinks are to be told of boards, if anything; asked once a turn.
+    /// News of boards for the sinks, if there is any; called once a turn.
     fn news(&mut self) -> Option<News> {
         None
     }

@@ -28,9 +28,9 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// As `setup` has it; a recording `is_watched` at its own speed.
+    /// The pace of `setup`; a recording that `is_watched` plays at its own speed.
     #[must_use]
-    pub fn of(setup: &Setup, input: &Input, is_watched: bool) -> Self {
+    pub fn for_input(setup: &Setup, input: &Input, is_watched: bool) -> Self {
         let is_watched = is_watched || (input.is_recording() && setup.sinks.iter().any(SinkSpec::is_watched));
         let speed = setup.playback_speed.or(is_watched.then_some(1.0));
         let gather = input.is_recording() && speed.is_none();
@@ -96,7 +96,7 @@ impl Opened {
         Ok(Self { body, engine, backend, source, lines, wiring, pace })
     }
 
-    /// What sinks are told that are opened for `targets`; a recording has the file `scene` in it.
+    /// The session for the sinks of `targets`; a recording holds the file `scene`.
     ///
     /// # Errors
     /// A file that a recording holds cannot be read.
@@ -181,11 +181,11 @@ impl Run {
         }
         let setup = Setup::new(scene, tell.clone());
         let input = Input::named(&setup)?;
-        let mut outputs = FilesRead::of(&setup, None).outputs(setup.overwrite);
+        let mut outputs = FilesRead::from_scene(&setup, None).outputs(setup.overwrite);
         let table = setup.table_wish(false)?;
         let target = |sink: &SinkSpec| sink.target(&mut outputs, &setup.allow_hosts, table);
         let targets = setup.sinks.iter().map(target).collect::<Result<Vec<SinkTarget>>>()?;
-        let pace = Pace::of(&setup, &input, false);
+        let pace = Pace::for_input(&setup, &input, false);
         let options = |body: &Body| {
             let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
             Ok((setup.options(body, &ids, pace.batch)?, None))

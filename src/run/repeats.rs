@@ -12,8 +12,8 @@ const LONGEST_WAIT_S: f64 = 640.0;
 struct Repeated {
     times: u64,
     /// How many of these the user knows of.
-    told: u64,
-    told_at_s: f64,
+    reported: u64,
+    reported_at_s: f64,
     wait_s: f64,
 }
 
@@ -26,24 +26,24 @@ pub struct Repeats {
 impl Repeats {
     /// The line to show now that `text` came at `at_s`, if any.
     pub fn tell(&mut self, at_s: f64, text: &str) -> Option<String> {
-        let Some(told) = self.messages.get_mut(text) else {
-            let first = Repeated { times: 1, told: 1, told_at_s: at_s, wait_s: FIRST_WAIT_S };
+        let Some(repeated) = self.messages.get_mut(text) else {
+            let first = Repeated { times: 1, reported: 1, reported_at_s: at_s, wait_s: FIRST_WAIT_S };
             self.messages.insert(text.to_owned(), first);
             return Some(timed(at_s, text));
         };
-        told.times += 1;
-        if at_s - told.told_at_s < told.wait_s {
+        repeated.times += 1;
+        if at_s - repeated.reported_at_s < repeated.wait_s {
             return None;
         }
-        (told.told, told.told_at_s) = (told.times, at_s);
-        told.wait_s = (2.0 * told.wait_s).min(LONGEST_WAIT_S);
-        Some(format!("{} ({} times so far)", timed(at_s, text), told.times))
+        (repeated.reported, repeated.reported_at_s) = (repeated.times, at_s);
+        repeated.wait_s = (2.0 * repeated.wait_s).min(LONGEST_WAIT_S);
+        Some(format!("{} ({} times so far)", timed(at_s, text), repeated.times))
     }
 
     /// The final counts of messages that came more often than was shown.
     pub fn rest(&self) -> impl Iterator<Item = String> + '_ {
-        let untold = self.messages.iter().filter(|(_, told)| told.times > told.told);
-        untold.map(|(text, told)| format!("{text}: {} times in all", told.times))
+        let unreported = self.messages.iter().filter(|(_, repeated)| repeated.times > repeated.reported);
+        unreported.map(|(text, repeated)| format!("{text}: {} times in all", repeated.times))
     }
 }
 
@@ -59,8 +59,8 @@ mod tests {
     #[test]
     fn a_flood_is_a_few_lines_and_what_is_rare_is_always_told() {
         let mut repeats = Repeats::default();
-        let told: Vec<String> = (0..1298).filter_map(|n| repeats.tell(f64::from(n) / 216.0, "again")).collect();
-        assert_eq!(told, ["0.00 s: again"]);
+        let shown: Vec<String> = (0..1298).filter_map(|n| repeats.tell(f64::from(n) / 216.0, "again")).collect();
+        assert_eq!(shown, ["0.00 s: again"]);
         assert_eq!(repeats.rest().collect::<Vec<_>>(), ["again: 1298 times in all"]);
         assert_eq!(repeats.tell(700.0, "again").unwrap(), "700.00 s: again (1299 times so far)");
         assert_eq!(repeats.rest().count(), 0);

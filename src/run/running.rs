@@ -222,7 +222,7 @@ impl Run {
     }
 }
 
-/// What is said of a recording that was left before its end, after `frames` frames, the last one at `t_s`; and of the files that
+/// The message about a recording that was left before its end, after `frames` frames, the last one at `t_s`; and of the files that
 /// are `absent` for this reason.
 #[must_use]
 pub fn left_out(recording: &str, frames: u64, t_s: f64, progress: Option<f64>, absent: &[String]) -> String {

@@ -15,7 +15,7 @@ pub(super) struct Sinks {
 }
 
 impl Sinks {
-    /// Does something with each sink that somebody reads. While somebody waits for every frame, a sink that fails is told of and
+    /// Does something with each sink that somebody reads. While somebody waits for every frame, a sink that fails is reported and
     /// left out, and the others go on; the last one that fails is an error.
     pub(super) fn each(
         &mut self,

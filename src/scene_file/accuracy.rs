@@ -96,8 +96,8 @@ fn seconds<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> 
 }
 
 impl Accuracy {
-    /// This, and what `below` says where it says nothing. Knobs take the place of a wish that is below, and a wish that of
-    /// knobs below.
+    /// This, with the values of `below` where it has none. Options replace a target in `below`, and a target replaces
+    /// options in `below`.
     #[must_use]
     pub fn over(self, below: Self) -> Self {
         let below = match (self.target().is_empty(), self.knob().is_none()) {

@@ -100,7 +100,7 @@ impl SceneFile {
         let has_unit =
             |calibration: &Calibration| calibration.taxels.iter().any(|taxel| taxel.quantity != Quantity::Count);
         match (is_placed, calibration.is_some_and(has_unit)) {
-            // Of sensors of which nobody says where they are.
+            // Sensors without known places.
             (false, _) => Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE,
             (true, true) => self.outputs() | Outputs::FORCE,
             (true, false) => self.outputs(),
@@ -137,7 +137,7 @@ impl SceneFile {
         Ok(filter.over_s(self.filter_over_s.or(filter.over_s.filter(|_| !is_by_window))))
     }
 
-    /// What is said of a pressure system's export beside what its file says.
+    /// Options of a pressure system's export, besides what its file says.
     ///
     /// # Errors
     /// A usage error: a grid, a pitch or a unit is none, or a key of text is not written so.

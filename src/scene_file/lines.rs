@@ -13,11 +13,11 @@ use crate::source::{SerialOptions, SerialSource};
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct LineKeys {
-    /// Which taxel is on which channel of which board, a TOML file.
+    /// The TOML file that maps channels of boards to taxels.
     pub wiring: Option<PathBuf>,
     /// At which rate the boards' frames are merged, Hz; 0 is one for each frame of any board.
     pub live_rate_hz: Option<f64>,
-    /// At which rate boards are told to send, Hz; 0 is as fast as the line allows.
+    /// The rate at which boards shall send, Hz; 0 is as fast as the line allows.
     pub board_rate_hz: Option<f64>,
 }
 
@@ -33,7 +33,7 @@ impl LineKeys {
     /// The lines that `sources` name, each with its speed in baud where one is given; none where they are not serial lines.
     ///
     /// # Errors
-    /// A usage error: sources of these kinds are not read together, or something is said of lines and there are none.
+    /// A usage error: sources of these kinds are not read together, or there are keys for lines and no lines.
     pub fn lines(&self, sources: &[SourceSpec]) -> Result<Vec<(String, Option<u32>)>> {
         let mut lines = Vec::new();
         let mut limbs = 0;
@@ -62,7 +62,7 @@ impl LineKeys {
         }
     }
 
-    /// Which taxel is on which channel of which board, where a file says it.
+    /// The map from channels of boards to taxels, if there is a file of it.
     ///
     /// # Errors
     /// There is no such file, or it is not a wiring.
@@ -70,8 +70,8 @@ impl LineKeys {
         self.wiring.as_ref().map(Wiring::load).transpose()
     }
 
-    /// Opens `lines` for a body whose taxels have `ids`, values being up to `max_age_s` old. What is wrong with the wiring is
-    /// told with its file.
+    /// Opens `lines` for a body whose taxels have `ids`, values being up to `max_age_s` old. Errors in the wiring
+    /// name its file.
     ///
     /// # Errors
     /// A port cannot be opened, or the wiring does not fit.

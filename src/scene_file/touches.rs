@@ -21,7 +21,7 @@ pub struct TouchKeys {
 }
 
 impl TouchKeys {
-    /// What is asked of touches, of which `outputs` are wanted.
+    /// The options of touches, with `outputs`.
     pub(super) fn options(self, outputs: TouchOutputs) -> touch::Options {
         touch::Options { on: self.on, off: self.off, outputs, ..touch::Options::default() }
     }

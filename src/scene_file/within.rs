@@ -60,7 +60,7 @@ fn sink_within(folder: &Path, sink: SinkSpec) -> SinkSpec {
 fn states_within(folder: &Path, states: PathBuf) -> PathBuf {
     match StatesSpec::named(&states) {
         Ok(StatesSpec::Bag(bag)) if states != bag.path => format!("ros2-mcap:{}", bag_within(folder, bag)).into(),
-        // What is wrong with it is said by the checks.
+        // The checks report its errors.
         Ok(StatesSpec::Topic(_)) | Err(_) => states,
         Ok(StatesSpec::File(_) | StatesSpec::Bag(_)) => folder.join(states),
     }

@@ -7,7 +7,7 @@ use crate::bundled;
 use crate::error::{Error, Result, nearest};
 use crate::source::Source;
 
-/// The ids that `source` delivers, each of which `body` must have.
+/// The ids that `source` delivers. `body` must have them all.
 pub fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
     match source.taxels().iter().find(|id| !body.taxels.iter().any(|taxel| taxel.id == **id)) {
         Some(id) => Err(Error::failed(format!(

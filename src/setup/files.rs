@@ -12,8 +12,8 @@ use crate::source::{BagName, SimulatedSource, SourceSpec};
 pub struct FilesRead(Vec<PathBuf>);
 
 impl FilesRead {
-    /// Those of `asked`, by flags or by the scene file at `scene`.
-    pub fn of(asked: &SceneFile, scene: Option<&Path>) -> Self {
+    /// The files that `asked` names, by flags or by the scene file at `scene`.
+    pub fn from_scene(asked: &SceneFile, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
         let named = named.chain(asked.layout.as_deref());
         let named = named.chain(asked.joints.as_deref()).chain(asked.zenoh_config.as_deref());

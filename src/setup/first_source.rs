@@ -87,8 +87,8 @@ impl fmt::Debug for FirstSource {
 }
 
 impl Found {
-    /// The lines of text, listened to if the source is such. What they were taken for is said at once, before a table fills the terminal,
-    /// to whoever is told.
+    /// The source of lines of text, if this is one. `tell` gets their recognised format at once, before a table fills the
+    /// terminal.
     pub(super) fn text(&mut self, tell: &Tell) -> Result<Option<&mut Text>> {
         if let (SourceSpec::Text(place), None) = (&self.spec, &self.lines) {
             self.spec.check_options(&self.options)?;

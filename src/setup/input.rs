@@ -10,7 +10,7 @@ use crate::robot::BagSource;
 use crate::signal::Wiring;
 use crate::source::{CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, VendorOptions};
 
-/// Frames a call for recordings, unless told otherwise.
+/// Frames a call for recordings, by default.
 pub const RECORDED_BATCH: usize = 256;
 
 /// A source, or the bundled touch.

@@ -11,7 +11,7 @@ use crate::source::{JointStates, Source, SourceSpec};
 const Z_IS_ASSUMED: &str = "; its z counts as up, as in REP 103; if its y is up, give `up = \"y\"`";
 
 impl Setup {
-    /// The delay to go by, s, where the joints come from `states`; an estimate is said.
+    /// The delay to use, s, if the joints come from `states`; an estimate is reported.
     fn delay_s(&self, states: Option<&StatesSpec>) -> Result<f64> {
         match self.joints_delay_s {
             None => Ok(0.0),

@@ -1,38 +1,38 @@
-//! Who is told what is found out.
+//! Reports what is found out about sources and calibrations.
 
 use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Who is told, a line at a time, what is found out of a source or a calibration; by default nobody.
+/// Receives, line by line, what is found out about a source or a calibration. The default drops the lines.
 #[derive(Clone, Default)]
-pub struct Tell(Option<Arc<Told>>);
+pub struct Tell(Option<Arc<Listener>>);
 
-struct Told {
+struct Listener {
     to: Box<dyn Fn(&str) + Send + Sync>,
-    /// What was told and is not to be told again.
+    /// Lines that are not reported again.
     once: Mutex<BTreeSet<String>>,
 }
 
 impl Tell {
-    /// Tells `to`.
+    /// Reports to `to`.
     pub fn new(to: impl Fn(&str) + Send + Sync + 'static) -> Self {
-        Self(Some(Arc::new(Told { to: Box::new(to), once: Mutex::default() })))
+        Self(Some(Arc::new(Listener { to: Box::new(to), once: Mutex::default() })))
     }
 
-    /// Tells `text`.
+    /// Reports `text`.
     pub fn say(&self, text: &str) {
-        if let Some(told) = &self.0 {
-            (told.to)(text);
+        if let Some(listener) = &self.0 {
+            (listener.to)(text);
         }
     }
 
-    /// Tells `text` unless that was told before: a calibration may be needed several times.
+    /// Reports `text` once only: a calibration may be needed several times.
     pub fn once(&self, text: &str) {
-        if let Some(told) = &self.0
-            && told.once.lock().unwrap_or_else(PoisonError::into_inner).insert(text.to_owned())
+        if let Some(listener) = &self.0
+            && listener.once.lock().unwrap_or_else(PoisonError::into_inner).insert(text.to_owned())
         {
-            (told.to)(text);
+            (listener.to)(text);
         }
     }
 }

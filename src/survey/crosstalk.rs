@@ -20,7 +20,7 @@ const MARGIN: usize = 2;
 const MIN_OFF_LINES: usize = 4;
 /// A sensor off these lines that reads over this share of the press is pressed by something else.
 const OTHER_PRESS: f64 = 0.1;
-/// A smaller leak is not told from the tail of a soft layer,
+/// A smaller leak cannot be distinguished from the tail of a soft layer,
 const MIN_SHARE: f64 = 0.003;
 /// nor one that is not this many of its standard deviations.
 const MIN_SIGMAS: f64 = 5.0;
@@ -33,7 +33,7 @@ pub struct Crosstalk {
     pub share: f64,
     /// Frames with a press that could tell.
     pub frames: usize,
-    /// Those of them that show sensors beyond their dead bands that nothing touches.
+    /// Frames that show untouched sensors beyond their dead bands.
     pub split: usize,
     /// The dead band over which no leak goes, in raw units.
     pub dead_band: f64,

@@ -29,21 +29,21 @@ pub fn with_gains(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<S
     let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
     let number =
         |item: Option<&Item>| item.and_then(|item| item.as_float().or_else(|| item.as_integer().map(|n| n as f64)));
-    let untold = untold_spread(estimate);
+    let without_gain = spread_without_gain(estimate);
     for (id, gain) in ids.iter().zip(&estimate.gains) {
         let id = id.to_string();
-        let of = |document: &DocumentMut, key: &str| {
+        let number_at = |document: &DocumentMut, key: &str| {
             let own = document.get("taxel").and_then(|taxels| taxels.get(&id)).and_then(|taxel| taxel.get(key));
             number(own).or_else(|| number(document.get("all").and_then(|all| all.get(key))))
         };
         let new = match gain {
             Some(gain) => [
-                ("gain", Some(of(&document, "gain").unwrap_or(1.0) / gain)),
-                ("dead_band", of(&document, "dead_band").map(|band| band / gain)),
-                ("p_max", of(&document, "p_max").map(|most| most / gain)),
+                ("gain", Some(number_at(&document, "gain").unwrap_or(1.0) / gain)),
+                ("dead_band", number_at(&document, "dead_band").map(|band| band / gain)),
+                ("p_max", number_at(&document, "p_max").map(|most| most / gain)),
                 ("gain_spread", None),
             ],
-            None => [("gain", None), ("dead_band", None), ("p_max", None), ("gain_spread", Some(untold))],
+            None => [("gain", None), ("dead_band", None), ("p_max", None), ("gain_spread", Some(without_gain))],
         };
         let taxels = document.entry("taxel").or_insert_with(|| {
             let mut table = Table::new();
@@ -58,7 +58,7 @@ pub fn with_gains(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<S
         for (key, number) in new {
             match number {
                 Some(number) => _ = taxel.insert(key, value(rounded(number))),
-                // One that is told now has the layer's.
+                // A taxel with a gain now has the layer's spread.
                 None if key == "gain_spread" => _ = taxel.remove(key),
                 None => {}
             }
@@ -78,9 +78,9 @@ pub fn spread(estimate: &GainsEstimate) -> f64 {
     (logarithms().map(|x| x * x).sum::<f64>() / logarithms().count().max(1) as f64).sqrt()
 }
 
-/// By what share gains that no touch told may be off: as much as the others were.
+/// The relative error of gains that no touch measured: as large as the spread of the others.
 #[must_use]
-pub fn untold_spread(estimate: &GainsEstimate) -> f64 {
+pub fn spread_without_gain(estimate: &GainsEstimate) -> f64 {
     spread(estimate).max(estimate.gain_spread)
 }
 
@@ -114,7 +114,7 @@ mod tests {
         }
         assert_eq!(after.taxels[1].p_max, 640.0);
         assert_eq!(after.layer.unwrap().sigma_m, 0.002_345_7);
-        // What no touch told may be off by what the others were, and one that is told later no more than they.
+        // A gain that no touch measured may be off as much as the others were; one that is measured later, no more than they.
         let own_spread = after.taxels.iter().map(|taxel| taxel.gain_spread.is_some());
         assert_eq!(own_spread.collect::<Vec<_>>(), [false, false, true]);
         assert!((after.taxels[2].gain_spread.unwrap() / 0.223 - 1.0).abs() < 1e-2, "{:?}", after.taxels[2]);

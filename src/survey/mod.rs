@@ -2,8 +2,8 @@
 //!
 //! At rest a sensor has a **baseline**, the mean of its values without those that stray, and **noise**, the distance from it that one value in a
 //! thousand exceeds. While it is pressed it has a **travel**, the farthest that it goes to its pressed side; a value counts
-//! as far as it is the middle one of three in succession, so that a single wrong value is not a press. Which side is the
-//! pressed one is told by most of the sensors.
+//! as far as it is the middle one of three in succession, so that a single wrong value is not a press. Most of the
+//! sensors show which side is the pressed one.
 //!
 //! A sensor has **moved** during the rest where it strays far, again by the middle ones of three values, and farther than
 //! chance explains: the steps from value to value tell how far chance goes, as what moves a sensor takes many values over
@@ -408,8 +408,8 @@ impl Findings {
     }
 }
 
-/// The raw values of sensors that rise to `end` and no further, of which `lowest` is the lowest that was seen: from 0 on, or from as
-/// far down as up.
+/// The range of raw values of sensors that rise to `end` and no further. `lowest` is the lowest value seen. The range begins at
+/// 0, or as far down as up.
 fn range_to(end: f64, lowest: f64) -> [f64; 2] {
     [if lowest >= 0.0 { 0.0 } else { lowest.min(-end - 1.0) }, end]
 }
@@ -504,7 +504,7 @@ mod tests {
         }
         let refused = rested(press_of(880.0, 120)).finish(Wishes { bits: Some(10), ..Wishes::default() });
         assert!(refused.unwrap_err().to_string().contains("up to 1320 of a raw range of 1023. Keep everything off"));
-        // A rest that was pressed all over, in which nothing is pressed any more, is told by its reason too.
+        // A rest that was pressed all over, with nothing pressed afterwards, is reported with its reason, too.
         let mut all = Survey::new(&[3]);
         (0..150).for_each(|n| all.rest(&values(&[press_of(600.0, 90)(n).round()])));
         (0..30).for_each(|_| all.press(&values(&[900.0])));
@@ -594,17 +594,20 @@ mod tests {
             let unit = |k: usize| (mixed(k) >> 11) as f64 / 9_007_199_254_740_992.0;
             (0..12).map(unit).sum::<f64>() - 6.0
         };
-        let of = |value: &dyn Fn(usize) -> f64, unit: f64| {
+        let measured_noise = |value: &dyn Fn(usize) -> f64, unit: f64| {
             let kept: Vec<f32> = (0..4000).map(|n| value(n) as f32).collect();
             sigma_of(&kept, unit)
         };
         // Its own standard deviation is about σ/√(4000/1.5).
         let near = |found: f64, right: f64| (found / right - 1.0).abs() < 0.08;
-        assert!(near(of(&|n| 3.0 * noise(n), 0.0), 3.0));
-        assert!(near(of(&|n| (0.7 * noise(n)).round(), 1.0), (0.49_f64 + 1.0 / 12.0).sqrt()));
-        assert!(near(of(&|n| 3.0 * noise(n) + 0.01 * n as f64, 0.0), 3.0), "drift adds nothing");
-        assert!(near(of(&|n| if n % 500 == 9 { 900.0 } else { 3.0 * noise(n) }, 0.0), 3.0), "nor do wrong values");
-        assert_eq!(of(&|_| 700.0, 1.0), 1.0 / 12.0_f64.sqrt());
+        assert!(near(measured_noise(&|n| 3.0 * noise(n), 0.0), 3.0));
+        assert!(near(measured_noise(&|n| (0.7 * noise(n)).round(), 1.0), (0.49_f64 + 1.0 / 12.0).sqrt()));
+        assert!(near(measured_noise(&|n| 3.0 * noise(n) + 0.01 * n as f64, 0.0), 3.0), "drift adds nothing");
+        assert!(
+            near(measured_noise(&|n| if n % 500 == 9 { 900.0 } else { 3.0 * noise(n) }, 0.0), 3.0),
+            "nor do wrong values"
+        );
+        assert_eq!(measured_noise(&|_| 700.0, 1.0), 1.0 / 12.0_f64.sqrt());
         assert_eq!(hand().finish(Wishes::default()).unwrap().sensors[0].sigma.is_some(), hand().rest[0].len() >= 32);
     }
 

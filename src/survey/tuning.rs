@@ -228,7 +228,7 @@ impl Tuning {
         }
     }
 
-    /// The sensors of which a press is still awaited in this round.
+    /// The sensors that still await a press in this round.
     pub fn awaited(&self) -> impl Iterator<Item = u32> {
         let awaited = |sensor: &&Sensor| !sensor.was_pressed() && (self.rounds == 0 || sensor.moved());
         self.sensors.iter().filter(awaited).map(|sensor| sensor.id)

@@ -32,7 +32,7 @@ pub struct Errors {
 }
 
 impl Errors {
-    pub(super) fn of(errors: &mut [f64]) -> Self {
+    pub(super) fn from_samples(errors: &mut [f64]) -> Self {
         if errors.is_empty() {
             return Self::default();
         }
@@ -138,28 +138,28 @@ pub(super) struct TrueErrorSamples {
 pub struct TrueErrors {
     /// Number of touches.
     pub touches: u64,
-    /// The share of them of which a place is given. Moments always give one, a fit of contacts only where it explains the sensors.
+    /// The share of touches with a place. Moments always give one, a fit of contacts only where it explains the sensors.
     pub given: f64,
     /// Errors of all places that are given, mm: of round contacts, and of rods and edges across them.
     pub place_mm: Errors,
-    /// Those of round contacts, mm.
+    /// Errors of the places of round contacts, mm.
     pub round_mm: Errors,
-    /// Those of rods and edges, across them, mm: where along it one is pressed, the sensors under it cannot say.
+    /// Errors of the places of rods and edges, across them, mm. Sensors cannot say where along a rod it is pressed.
     pub across_mm: Errors,
     /// Errors of the orientations that are given of rods and edges, degrees.
     pub orientation_deg: Errors,
 }
 
 impl TrueErrors {
-    pub(super) fn of(samples: &mut TrueErrorSamples) -> Self {
+    pub(super) fn from_samples(samples: &mut TrueErrorSamples) -> Self {
         let mut places = [&samples.round[..], &samples.across].concat();
         Self {
             touches: samples.touches,
             given: if samples.touches > 0 { samples.given as f64 / samples.touches as f64 } else { 0.0 },
-            place_mm: Errors::of(&mut places),
-            round_mm: Errors::of(&mut samples.round),
-            across_mm: Errors::of(&mut samples.across),
-            orientation_deg: Errors::of(&mut samples.orientation),
+            place_mm: Errors::from_samples(&mut places),
+            round_mm: Errors::from_samples(&mut samples.round),
+            across_mm: Errors::from_samples(&mut samples.across),
+            orientation_deg: Errors::from_samples(&mut samples.orientation),
         }
     }
 }
@@ -271,12 +271,15 @@ mod tests {
     #[test]
     fn errors_are_counted_and_ranked() {
         let mut errors: Vec<f64> = (1..=200).rev().map(f64::from).collect();
-        let of = Errors::of(&mut errors);
-        assert_eq!((of.compared, of.median, of.p95, of.p99, of.worst), (200, 100.0, 190.0, 198.0, 200.0));
-        assert!((of.rms - (200.0 * 201.0 * 401.0 / 6.0 / 200.0_f64).sqrt()).abs() < 1e-9);
-        assert_eq!(Errors::of(&mut []), Errors::default());
+        let percentiles = Errors::from_samples(&mut errors);
         assert_eq!(
-            Errors::of(&mut [3.0]),
+            (percentiles.compared, percentiles.median, percentiles.p95, percentiles.p99, percentiles.worst),
+            (200, 100.0, 190.0, 198.0, 200.0)
+        );
+        assert!((percentiles.rms - (200.0 * 201.0 * 401.0 / 6.0 / 200.0_f64).sqrt()).abs() < 1e-9);
+        assert_eq!(Errors::from_samples(&mut []), Errors::default());
+        assert_eq!(
+            Errors::from_samples(&mut [3.0]),
             Errors { compared: 1, rms: 3.0, median: 3.0, p95: 3.0, p99: 3.0, worst: 3.0 }
         );
     }

@@ -44,8 +44,8 @@ impl FitOnLink {
     /// The fit of `touch` as it lies on `link` while the body of `engine` rests; it is given in the touch's own link.
     pub(super) fn new(engine: &Engine, touch: &Touch, link: u32) -> Option<Self> {
         // What doubts itself is not an answer to trade speed for.
-        let is_told = !touch.flags.intersects(TouchFlags::POOR_FIT | TouchFlags::FEW_TAXELS);
-        let (skin, fit) = (engine.skin()?, touch.fit.filter(|_| is_told)?);
+        let is_counted = !touch.flags.intersects(TouchFlags::POOR_FIT | TouchFlags::FEW_TAXELS);
+        let (skin, fit) = (engine.skin()?, touch.fit.filter(|_| is_counted)?);
         let link_from_own = skin.link_from_body(link) * skin.link_from_body(touch.link).inverse();
         Some(Self {
             place: link_from_own.transform_point3(fit.place),

@@ -192,10 +192,10 @@ fn take_turns(
             trials.iter_mut().for_each(|trial| trial.times_us.clear());
         }
         let share = (start.elapsed().as_secs_f64() / seconds).min(1.0);
-        let told = go_on(progress, PROGRESS_COMPARED + (1.0 - PROGRESS_COMPARED) * share);
+        let goes_on = go_on(progress, PROGRESS_COMPARED + (1.0 - PROGRESS_COMPARED) * share);
         if round < 2 {
-            told?;
-        } else if told.is_err() || (round >= MIN_ROUNDS && share >= 1.0) {
+            goes_on?;
+        } else if goes_on.is_err() || (round >= MIN_ROUNDS && share >= 1.0) {
             break;
         }
     }
@@ -344,8 +344,8 @@ impl Trial {
             words: self.combination.words(),
             p50_us: rank(&self.times_us, 0.5),
             p99_us: rank(&self.times_us, 0.99),
-            centroid_mm: Errors::of(&mut errors.centroid),
-            orientation_deg: Errors::of(&mut errors.orientation),
+            centroid_mm: Errors::from_samples(&mut errors.centroid),
+            orientation_deg: Errors::from_samples(&mut errors.orientation),
             truth: self.truth.map(|(all, _)| all),
             truth_with_fit: self.truth.and_then(|(_, with_fit)| with_fit),
             front: false,

@@ -292,7 +292,7 @@ impl Report {
     /// The rungs of `way` from the fastest up: of each method of orientation the fastest row of those nearest to the truth.
     #[must_use]
     pub fn rungs(&self, way: CallMode) -> Vec<&Measurement> {
-        let rows = self.of(way);
+        let rows = self.measurements(way);
         let is_rung = |row: &&Measurement| {
             let alike = || rows.iter().filter(|other| other.words.orientation_by == row.words.orientation_by);
             let least = alike().map(|other| other.off()).fold(f64::INFINITY, f64::min);
@@ -306,15 +306,16 @@ impl Report {
     /// reference, the fastest first: what the knobs of rounding give.
     #[must_use]
     pub fn rounding(&self, way: CallMode) -> Vec<&Measurement> {
-        let mut rows = self.of(way);
+        let mut rows = self.measurements(way);
         rows.retain(|row| row.words.orientation_by == self.asked_by);
         let errors = |row: &Measurement| [row.centroid_mm.p99, row.orientation_deg.p99];
         let is_beaten = |row: &Measurement| {
             let (time, errors_of_row) = (row.p50_us, errors(row));
             rows.iter().any(|by| {
-                let of = errors(by);
-                let no_worse = by.p50_us <= time && of[0] <= errors_of_row[0] && of[1] <= errors_of_row[1];
-                no_worse && (by.p50_us < time || of != errors_of_row)
+                let errors_of_by = errors(by);
+                let no_worse =
+                    by.p50_us <= time && errors_of_by[0] <= errors_of_row[0] && errors_of_by[1] <= errors_of_row[1];
+                no_worse && (by.p50_us < time || errors_of_by != errors_of_row)
             })
         };
         let front: Vec<bool> = rows.iter().map(|row| !is_beaten(row)).collect();
@@ -323,7 +324,7 @@ impl Report {
 
     /// The rows of `way`, the fastest first.
     #[must_use]
-    pub fn of(&self, way: CallMode) -> Vec<&Measurement> {
+    pub fn measurements(&self, way: CallMode) -> Vec<&Measurement> {
         let mut rows: Vec<&Measurement> = self.rows.iter().filter(|row| row.way == way).collect();
         rows.sort_by(|a, b| a.p50_us.total_cmp(&b.p50_us));
         rows

@@ -59,7 +59,7 @@ fn panels(report: &Report) -> Vec<Panel<'_>> {
     for way in CallMode::ALL {
         for (index, what, unit) in [(0, "place", "mm"), (1, "angle", "degrees")] {
             // What rounding changes cannot be seen beside what a rung is off by.
-            let rows = if report.truth { report.rungs(way) } else { report.of(way) };
+            let rows = if report.truth { report.rungs(way) } else { report.measurements(way) };
             let points = rows.into_iter().map(|row| (row, row.judged()[index]));
             let points: Vec<_> = points.filter(|(_, errors)| errors.compared > 0).collect();
             if !points.is_empty() {

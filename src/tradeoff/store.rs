@@ -160,8 +160,8 @@ fn requested(options: &Options) -> String {
 /// The processor and its number of threads.
 fn machine() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let told = limits::read_to_string("/proc/cpuinfo", MAX_SYSTEM_BYTES).unwrap_or_default();
-    let name = told.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let cpu_info = limits::read_to_string("/proc/cpuinfo", MAX_SYSTEM_BYTES).unwrap_or_default();
+    let name = cpu_info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let name = name.map_or("", |(_, name)| name.trim());
     format!("{} {} {name} {threads}", std::env::consts::OS, std::env::consts::ARCH)
 }

@@ -17,10 +17,13 @@ impl Target {
         let [centroid, orientation] = row.judged();
         let over = |value: f64, limit: Option<f64>| limit.map_or(0.0, |limit| value / limit);
         // Without a comparison no tolerance is met.
-        let of = |errors: &super::Errors| if errors.compared > 0 { errors.p95 } else { f64::INFINITY };
+        let p95 = |errors: &super::Errors| if errors.compared > 0 { errors.p95 } else { f64::INFINITY };
         [
-            over(if self.centroid_m.is_some() { of(centroid) * 1e-3 } else { 0.0 }, self.centroid_m),
-            over(if self.orientation_rad.is_some() { of(orientation).to_radians() } else { 0.0 }, self.orientation_rad),
+            over(if self.centroid_m.is_some() { p95(centroid) * 1e-3 } else { 0.0 }, self.centroid_m),
+            over(
+                if self.orientation_rad.is_some() { p95(orientation).to_radians() } else { 0.0 },
+                self.orientation_rad,
+            ),
             over(row.p50_us * 1e-6, self.budget_s),
         ]
     }
@@ -29,7 +32,7 @@ impl Target {
     /// it, the nearest one.
     #[must_use]
     pub fn pick<'a>(&self, report: &'a Report, way: CallMode) -> Option<Pick<'a>> {
-        let mut rows = report.of(way);
+        let mut rows = report.measurements(way);
         rows.retain(|row| report.truth || row.words.orientation_by == report.asked_by);
         let granted = |row: &&&Measurement| self.misses(row).iter().all(|times| *times <= 1.0);
         let tolerant = self.centroid_m.is_some() || self.orientation_rad.is_some();

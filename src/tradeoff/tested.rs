@@ -22,12 +22,12 @@ pub fn software() -> Option<String> {
     None
 }
 
-/// Frames that are measured on, unless told otherwise.
+/// Frames that are measured on by default.
 const FRAMES: usize = 512;
 /// Values that these hold at most, about.
 const VALUES: usize = 1 << 24;
 
-/// As many frames of so many taxels as memory is well spent on.
+/// The number of frames for `taxels` taxels that is worth its memory.
 #[must_use]
 pub fn usual_frames(taxels: usize) -> usize {
     FRAMES.min(VALUES / taxels.max(1)).max(8)

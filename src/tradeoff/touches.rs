@@ -184,7 +184,7 @@ impl Sensors {
     fn new(body: &Body, options: &Options, sigma_m: f64, gain_spread: f64) -> Self {
         let areas = || body.taxels.iter().map(|taxel| taxel.area);
         let has_areas = areas().all(|area| area > 0.0);
-        // A square as wide as the layer blurs, for taxels of which nobody says how large they are.
+        // A square as wide as the layer blurs, for taxels of unknown size.
         let area_m2 = if has_areas { areas().fold(0.0, f64::max) } else { sigma_m * sigma_m };
         // The share of a Gaussian on the taxel in its middle, or of a blurred line, at most all of it.
         let hardest = |indenter: &Indenter| {

@@ -21,7 +21,7 @@ const BATCH: usize = 256;
 /// Errors against the truth, of all touches, and of those that have a fit.
 pub(super) type OfTouches = (TrueErrors, Option<TrueErrors>);
 
-/// What is seen of a field that is touched.
+/// What is known of a field that is touched.
 struct Seen {
     percept: Percept,
     /// What presses it, where that is fitted.
@@ -43,7 +43,7 @@ pub(super) struct Truths<'a> {
 }
 
 impl<'a> Truths<'a> {
-    /// Those of `played`, or else of `touches`; `None` where neither has any. `charted` are the body's fields by kinds of charts.
+    /// The truths of `played`, or else of `touches`; `None` if neither has any. `charted` are the body's fields by kinds of charts.
     ///
     /// # Errors
     /// The scene is invalid.
@@ -63,14 +63,14 @@ impl<'a> Truths<'a> {
             });
             known.collect()
         };
-        let of = |frames: &'a TestFrames| -> Option<Vec<_>> {
+        let truths_in = |frames: &'a TestFrames| -> Option<Vec<_>> {
             let truth: Vec<_> = frames.truth.iter().map(of_frame).collect();
             truth.iter().any(|known| !known.is_empty()).then_some(truth)
         };
-        let (frames, truth, options, description) = match (of(played), touches) {
+        let (frames, truth, options, description) = match (truths_in(played), touches) {
             (Some(truth), _) => (played, truth, options.clone(), String::new()),
             (None, Some(touches)) => {
-                let Some(truth) = of(&touches.frames) else { return Ok(None) };
+                let Some(truth) = truths_in(&touches.frames) else { return Ok(None) };
                 let options = options.clone().calibration(touches.calibration.clone());
                 (&touches.frames, truth, options, touches.description.clone())
             }
@@ -119,8 +119,8 @@ impl<'a> Truths<'a> {
                 add(&mut fitted);
             }
         })?;
-        let fitted = self.with_fit.is_some().then(|| TrueErrors::of(&mut fitted));
-        let errors = (TrueErrors::of(&mut all), fitted);
+        let fitted = self.with_fit.is_some().then(|| TrueErrors::from_samples(&mut fitted));
+        let errors = (TrueErrors::from_samples(&mut all), fitted);
         self.known.insert(key, errors);
         Ok(errors)
     }
@@ -136,7 +136,7 @@ impl<'a> Truths<'a> {
         scene
     }
 
-    /// Calls `on` with the number of each frame, what is seen of each field that is touched, and the truth.
+    /// Calls `on` with the number of each frame, what is known of each field that is touched, and the truth.
     fn each(
         &self,
         backend: BackendKind,

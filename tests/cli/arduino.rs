@@ -41,7 +41,7 @@ fn compile(compiler: &str, arguments: &[&str], file: &Path, folder: &Path) -> Pa
     object
 }
 
-/// What the sketch `name` sends in so many of its loops.
+/// What the sketch `name` sends in this many of its loops.
 fn sent(name: &str, loops: u32) -> Option<Vec<u8>> {
     let [cpp, c] = compilers()?;
     let folder = tempfile::tempdir().unwrap();

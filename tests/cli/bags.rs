@@ -125,7 +125,7 @@ struct Clocks {
 
 const ONE_CLOCK: Clocks = Clocks { start_ns: 0, delay_ns: 0, frames_ns: [0, 0], joints_ns: [0, 0] };
 
-/// The arm's touch and joint states, from two publishers, each of which tells of some joints, in the order in which they come.
+/// The arm's touch and joint states, from two publishers with some joints each, in the order of arrival.
 fn said(clocks: &Clocks) -> Vec<Said> {
     let mut random = Random::new(3);
     let mut took = |[least, most]: [u64; 2]| {
@@ -436,7 +436,7 @@ fn bags_that_are_not_read_say_what_to_do_and_cut_ones_give_what_is_whole() {
     assert!(same + 10 > count, "{same} of {count}");
     let told = stderr(&cut);
     assert_eq!(told.matches("cut.mcap: it is cut off: what came after t = ").count(), 2, "{told}");
-    // A position that is not a number tells nothing, and is told.
+    // A position that is not a number is ignored and reported.
     let mut odd = messages.clone();
     let What::Joints(_, position) = &mut odd.iter_mut().rfind(|one| one.topic != "/skin").unwrap().what else {
         panic!()

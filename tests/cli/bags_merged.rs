@@ -282,7 +282,7 @@ fn what_cannot_be_merged_is_one_line_with_what_to_do() {
     done(&with(&run_of(&body, &format!("ros2-mcap:{}@{CLOUD}", text_of(&at("mixed.mcap")))), &[]));
     done(&with(&run_of(&body, &format!("ros2-mcap:{}:/n", text_of(&at("mixed.mcap")))), &[]));
 
-    // A bag without joint states, and one of which two topics are named.
+    // A bag without joint states, and one with two topics named.
     let joints = joints();
     let jointed = joints.each_ref().map(String::as_str);
     let source = format!("ros2-mcap:{}:/a,/b", text_of(&at("mixed.mcap")));
@@ -296,7 +296,7 @@ fn what_cannot_be_merged_is_one_line_with_what_to_do() {
     let looped = [&jointed[..], &["--loop"]].concat();
     assert!(fails(2, &with(&run_of(&body, &source), &looped)).contains("leave --loop out"));
 
-    // Half of a bag is told of once.
+    // Half of a bag is reported once.
     let said: Vec<Said> =
         all.iter().flat_map(|(t_ns, [left, right])| [cloud("/a", *t_ns, left), cloud("/b", *t_ns, right)]).collect();
     write_mcap(&at("whole.mcap"), &said, "cdr");

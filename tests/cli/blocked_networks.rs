@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::done;
 
-/// The frame `number` of a sheet of so many taxels as a line for standard input: the peak says which it is.
+/// The frame `number` of a sheet of `taxels` taxels as a line for standard input: the peak says which it is.
 fn frame(taxels: u64, number: u64) -> String {
     let values: BTreeMap<String, u64> = (0..taxels).map(|id| (id.to_string(), 1 + (id + number) % 90)).collect();
     let mut line = json!({"t": Duration::from_millis(4 * number).as_secs_f64(), "values": values});

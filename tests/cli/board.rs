@@ -33,7 +33,7 @@ impl Playing {
         Self { child, told, ports }
     }
 
-    /// What each board sent, told at the end.
+    /// What each board sent, reported at the end.
     fn end(mut self) -> Vec<Value> {
         let mut line = String::new();
         self.told.read_line(&mut line).unwrap();
@@ -137,7 +137,7 @@ fn a_board_says_who_it_is_obeys_and_sends_what_it_plays() {
 
 #[test]
 fn a_line_is_as_fast_as_its_baud_and_no_faster() {
-    // 40 channels of 10 bits are 13 + 1 + 50 + 4 + 3 bytes, of which 1920 baud take 2.7 in a second.
+    // 40 channels of 10 bits are 13 + 1 + 50 + 4 + 3 bytes, and 1920 baud carry 2.7 of these in a second.
     let playing = Playing::start(&["--wait", "--frames", "6", "--baud", "1920", "--rate", "50"]);
     let mut port = open(&playing.ports[0].1, 1920);
     let mut decoder = Decoder::new();

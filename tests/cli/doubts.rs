@@ -58,7 +58,7 @@ fn what_needs_poses_says_that_no_frame_has_any() {
     assert!(text.contains(about) && text.lines().count() == 1, "{text}");
     assert!(said_of(&["--relative-to", "thumb"]).contains("as --relative-to needs; "));
     assert_eq!(said_of(&["--outputs", "position"]), "");
-    // Joints that are late are told of elsewhere.
+    // Late joints are reported elsewhere.
     let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/robots");
     let of_robot = |name: &str| format!("{robot}/{name}");
     let (urdf, states, touch) = (of_robot("arm.urdf"), of_robot("arm-joints.csv"), of_robot("arm-touch.csv"));

@@ -9,7 +9,7 @@ use crate::python::python_with;
 use crate::stderr;
 use somatic_testing::skip;
 
-/// What `tests/hidden/escape.py` finds on `files` with so many `taxels`, `None` without Python, which is said.
+/// What `tests/hidden/escape.py` finds on `files` with these numbers of `taxels`; `None` without Python, which is reported.
 fn checked(taxels: &str, files: &[&str]) -> Option<Value> {
     let python = match python_with("hidden", "import embreex, numpy, trimesh") {
         Ok(python) => python,

@@ -21,7 +21,7 @@ fn is_long() -> bool {
     std::env::var_os("SOMATIC_LONG").is_some()
 }
 
-/// Frames in so many seconds, or fewer where there is no time.
+/// Frames in this many seconds, or fewer if there is no time.
 fn frames_of(long_s: u64, short_s: u64) -> u64 {
     (if is_long() { long_s } else { short_s }) * 50
 }

@@ -110,7 +110,7 @@ impl Running {
         self.child.stdin.take().unwrap()
     }
 
-    /// Waits for its end; what it has told.
+    /// Waits for its end; gives what it has printed.
     pub fn end(mut self, codes: &[i32]) -> (Vec<String>, Vec<String>) {
         let code = code_of(&mut self.child);
         assert!(code.is_some_and(|code| codes.contains(&code)), "{code:?}: {:?}", self.told.all());

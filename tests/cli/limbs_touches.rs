@@ -1,4 +1,4 @@
-//! Touches of the whole body over limbs: found once by the head of frames, told apart by limb of percepts.
+//! Touches of the whole body over limbs: found once by the host of frames; a host of percepts qualifies them by limb.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::thread;

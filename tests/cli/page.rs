@@ -28,11 +28,11 @@ pub(super) struct Run {
 impl Run {
     /// The bundled touch, over and over.
     fn start(arguments: &[&str]) -> Self {
-        Self::of(&[&["run", "--quiet", "--loop", "--sink", "page:127.0.0.1:0"], arguments].concat())
+        Self::spawn(&[&["run", "--quiet", "--loop", "--sink", "page:127.0.0.1:0"], arguments].concat())
     }
 
     /// A command that serves a page.
-    pub(super) fn of(arguments: &[&str]) -> Self {
+    pub(super) fn spawn(arguments: &[&str]) -> Self {
         let mut child = somatic(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let address = lines.find_map(|line| line.unwrap().strip_prefix("page at http://127.0.0.1:").map(str::to_owned));
@@ -399,7 +399,7 @@ fn a_taxel_that_is_left_out_is_an_event() {
     let (_folder, recording) = super::file("a.csv", &format!("t,4,5\n{rows}"));
     let calibration = recording.with_file_name("drift.toml");
     std::fs::write(&calibration, "[drift]\ncadence_s = 0.2\ndead_s = 0.5\n").unwrap();
-    let mut run = Run::of(&[
+    let mut run = Run::spawn(&[
         "run",
         "--quiet",
         "--loop",
@@ -497,7 +497,7 @@ fn attack(run: &Run, stop: &Arc<AtomicBool>) -> Vec<JoinHandle<()>> {
 #[test]
 fn a_run_and_a_view_end_when_told_whatever_viewers_do() {
     let view = ["view", "--listen", "127.0.0.1:0", "--backend", "cpu", "--quiet"];
-    for (mut run, is_played) in [(Run::start(&[]), false), (Run::of(&view), true)] {
+    for (mut run, is_played) in [(Run::start(&[]), false), (Run::spawn(&view), true)] {
         let stop = Arc::new(AtomicBool::new(false));
         let attackers = attack(&run, &stop);
         let deaf = run.viewer();

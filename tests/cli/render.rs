@@ -209,7 +209,7 @@ fn without_a_driver_it_says_what_would_help() {
 
 #[test]
 fn force_replaces_a_picture() {
-    // Where there is no adapter it cannot be told.
+    // Without an adapter it cannot be known.
     if render(&["hand", "--size", "300", "--view", "top"]).is_none() {
         return;
     }

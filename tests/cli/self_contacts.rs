@@ -93,7 +93,7 @@ impl Plates {
         Self { _folder: folder, urdf, body, taxels }
     }
 
-    /// A frame for each of `truth`: a bump of pressure on each pressed skin; joints are told with `slide_off` (m).
+    /// A frame for each of `truth`: a bump of pressure on each pressed skin; joint states are sent with `slide_off` (m).
     pub(super) fn lines(&self, truth: &[Truth], slide_off: f64) -> String {
         let line = |(index, truth): (usize, &Truth)| {
             let value = |(id, link, place): &(u64, String, DVec3)| {

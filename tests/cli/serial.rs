@@ -69,7 +69,7 @@ fn value(row: usize, taxel: usize) -> u16 {
     ((row * 13 + taxel * 101) % 1024) as u16
 }
 
-/// A recording at 50 Hz of `boards` times 16 taxels, 1024 rows long, which is as often as a row is told from the others.
+/// A recording at 50 Hz of `boards` times 16 taxels, 1024 rows long: no more rows could be distinguished.
 fn recording(folder: &Path, boards: usize) -> String {
     let taxels = boards * CHANNELS;
     let mut text = String::from("t");
@@ -185,7 +185,7 @@ fn a_taker_that_is_slow_loses_the_oldest_and_learns_how_many() {
     });
     let account = &lines.accounts()[0];
     balances(&lines.accounts(), &boards.end());
-    // In 3 s come 150 frames, of which 64 wait.
+    // In 3 s come 150 frames; 64 of them wait.
     assert!((50..150).contains(&account.dropped) && account.lost == 0, "{account:?}");
     assert!(seen.whole + account.dropped >= account.delivered && seen.frames > 100);
     assert!(lines.losses()[0].contains("came faster than they were read"), "{:?}", lines.losses());
@@ -266,7 +266,7 @@ fn usual_step_s(times: &[f64]) -> f64 {
 
 #[test]
 fn frames_come_as_often_as_is_asked_of_boards_and_of_their_merger() {
-    // Boards that are told to send ten frames a second do; frames are put together twenty times a second where asked for.
+    // Boards that get the command to send ten frames a second do; frames are put together twenty times a second where asked for.
     for (board, run, period_s) in [
         (&[][..], &["--board-rate", "10"][..], 0.1),
         (&["--partial"], &["--board-rate", "10"], 0.1),

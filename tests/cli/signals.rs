@@ -23,7 +23,7 @@ fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// A recording with so many thousand frames. Its time begins again every ten seconds.
+/// A recording of `thousands` thousand frames. Its time begins again every ten seconds.
 fn long(path: &Path, thousands: usize) {
     let rows: String = (0..1000).map(|k| format!("{},{}\n", f64::from(k) / 100.0, k % 7)).collect();
     std::fs::write(path, format!("t,4\n{}", rows.repeat(thousands))).unwrap();

@@ -63,14 +63,14 @@ fn a_pick_is_written_into_the_scene_and_used_and_told() {
     let written = std::fs::read_to_string(&path).unwrap();
     assert!(written.contains("# What I want.") && written.contains("# no more"), "{written}");
     assert!(written.contains("backend = ") && !written.contains("centroid = "), "{written}");
-    // What was measured is kept, and told by a plan of the scene as it was.
+    // What was measured is kept, and a plan of the unchanged scene reports it.
     let path = scene(folder.path(), text);
     let (plan, said) = done(folder.path(), &["plan", &path, "--json"]);
     let plan: Value = serde_json::from_str(&plan).unwrap();
     assert!(plan["measured"].as_str().unwrap().contains("touches simulated on it"), "{plan}");
     assert!(plan["why"].as_str().unwrap().contains("picked for 5 mm"), "{plan}");
     assert!(said.is_empty(), "{said}");
-    // Damaged, it is told in a line, and measured anew.
+    // Damage is reported in a line, and it is measured anew.
     let kept: Vec<_> = std::fs::read_dir(folder.path().join("cache/somatic/tradeoff")).unwrap().collect();
     let [kept] = &kept[..] else { panic!("{kept:?}") };
     std::fs::write(kept.as_ref().unwrap().path(), "{").unwrap();

@@ -1,4 +1,4 @@
-//! `somatic tune`, and `somatic calibrate` live: through real pseudo-terminals, with a person who presses when told to.
+//! `somatic tune`, and `somatic calibrate` live: through real pseudo-terminals, with a person who presses when asked to.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -37,7 +37,7 @@ impl Touched {
         touched
     }
 
-    /// From now on each taxel is pressed with so many newton.
+    /// From now on each taxel is pressed with this force, N.
     fn touch(&mut self, newton: impl Fn(u32) -> Option<f64>) {
         let taxels = (0..9).chain(16..27).chain(32..52);
         let read = |id: u32| (id.to_string(), json!(FsrCircuit::default().counts(newton(id).unwrap_or(0.0))));

@@ -52,7 +52,7 @@ fn totals(frame: &[u8], taxels: usize) -> Vec<(u32, f32)> {
 #[test]
 fn a_recording_is_entered_anywhere_with_the_percepts_of_an_uninterrupted_run() {
     let run = frames(&done(&["run", "--quiet", "--backend", "cpu", "--sink", "-"]));
-    let mut view = Run::of(&VIEW);
+    let mut view = Run::spawn(&VIEW);
     let mut viewer = view.viewer();
     viewer.binary();
     let welcome = text(&mut viewer, "welcome", |_| true);
@@ -99,7 +99,7 @@ fn a_recording_is_entered_anywhere_with_the_percepts_of_an_uninterrupted_run() {
 #[test]
 fn a_percept_is_explained_and_its_history_told() {
     let run = frames(&done(&["run", "--quiet", "--backend", "cpu", "--sink", "-"]));
-    let mut view = Run::of(&VIEW);
+    let mut view = Run::spawn(&VIEW);
     let mut viewer = view.viewer();
     viewer.binary();
     let welcome = text(&mut viewer, "welcome", |_| true);
@@ -175,7 +175,7 @@ fn percepts_that_a_recording_holds_are_compared_with_those_computed_now() {
         frames(&done(&["run", "--quiet", "--sink", "-"])).iter().filter(|frame| !frame["fields"][0].is_null()).count();
     for (calibration, differing) in [(None, 0), (Some(&*calibration), touched)] {
         let given = calibration.map_or(vec![], |file| vec!["--calibration", file]);
-        let mut view = Run::of(&[&VIEW[..], &[&*recorded], &given].concat());
+        let mut view = Run::spawn(&[&VIEW[..], &[&*recorded], &given].concat());
         let mut viewer = view.viewer();
         viewer.binary();
         let welcome = text(&mut viewer, "welcome", |_| true);
@@ -211,7 +211,7 @@ fn percepts_that_a_recording_holds_are_compared_with_those_computed_now() {
 
 #[test]
 fn a_body_is_shown_at_rest() {
-    let mut view = Run::of(&["view", "humanoid", "--listen", "127.0.0.1:0"]);
+    let mut view = Run::spawn(&["view", "humanoid", "--listen", "127.0.0.1:0"]);
     let mut viewer = view.viewer();
     let mesh = viewer.binary();
     assert_eq!(mesh[0], 1);
@@ -249,7 +249,7 @@ fn joints_move_the_links_of_a_view_and_self_contacts_are_reported() {
     let (touch, states) = (example("gripper-touch.csv"), example("gripper-joints.csv"));
     let joints = ["--joints", &urdf, "--joint-states", &states, "--up", "z"];
     let of_robot = ["--body", &body, "--source", &touch, "--outputs", "total,self_contacts"];
-    let mut view = Run::of(&[&VIEW[..], &of_robot, &joints].concat());
+    let mut view = Run::spawn(&[&VIEW[..], &of_robot, &joints].concat());
     let mut viewer = view.viewer();
     viewer.binary();
     say(&mut viewer.socket, &json!({"type": "pause"}));

@@ -27,7 +27,7 @@ pub(super) fn verdict(arguments: &[&str]) -> Result<bool, String> {
         .stderr(Stdio::piped())
         .spawn();
     let mut child = match started {
-        // Nobody can give so many.
+        // Nobody can give this many.
         Err(e) if e.kind() == ErrorKind::ArgumentListTooLong => return Ok(false),
         started => started.map_err(|e| format!("cannot start the program: {e}"))?,
     };

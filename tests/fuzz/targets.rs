@@ -224,7 +224,7 @@ pub(super) fn bag_metadata() -> Target {
             // A name that no file can have is left to the parser.
             let _ = std::fs::write(&file, &mcap);
         }
-        told(BagSurvey::of(folder, |_| {}))
+        told(BagSurvey::read(folder, |_| {}))
     })
 }
 
@@ -233,9 +233,9 @@ pub(super) fn bag() -> Target {
     let count = |survey: &BagSurvey| survey.topics.iter().map(|topic| topic.messages).sum::<u64>();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.mcap"), &sound).unwrap();
-    let expected = count(&BagSurvey::of(&folder.path().join("a.mcap"), |_| {}).unwrap());
+    let expected = count(&BagSurvey::read(&folder.path().join("a.mcap"), |_| {}).unwrap());
     assert!(expected > 0);
-    target("bag", "a.mcap", [sound], move |case| match BagSurvey::of(case.path, |_| {}) {
+    target("bag", "a.mcap", [sound], move |case| match BagSurvey::read(case.path, |_| {}) {
         Ok(survey) if survey.losses.is_empty() && count(&survey) < expected => {
             Err(format!("{} messages of {expected}, and nothing is said to be lost", count(&survey)))
         }

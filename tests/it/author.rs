@@ -596,7 +596,7 @@ fn buffers_and_images_of_their_own_are_taken_in() {
     let primitive = sheet(&mut draft, 8, 1.0);
     draft.push("meshes", json!({"primitives": [primitive]}));
     draft.node(json!({"name": "sheet", "mesh": 0}));
-    // Each view in a buffer of its own, the last of which is longer than it says.
+    // Each view in a buffer of its own; the last is longer than it says.
     let views = draft.json["bufferViews"].as_array().unwrap().clone();
     draft.json["buffers"] = json!([]);
     for (index, view) in views.iter().enumerate() {

@@ -76,7 +76,7 @@ fn percepts_do_not_depend_on_the_cut() {
     }
 }
 
-/// A call of so many frames goes through the GPU in several parts, some on their way while others are packed and read.
+/// A call of this many frames goes through the GPU in several parts, some on their way while others are packed and read.
 #[test]
 fn percepts_do_not_depend_on_how_a_long_call_streams() {
     let body = Body::from_bytes("mat", somatic::bundled::MAT).unwrap();

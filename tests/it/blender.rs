@@ -296,7 +296,7 @@ fn edges_come_back_also_at_four_megabytes() {
         // A bundled body's are current, and are not made anew.
         let after = edited(&python, &bundled("humanoid.glb"), &[]);
         assert!(after.edges.is_some());
-        assert_eq!(TaxelGraph::of(&after).1, None);
+        assert_eq!(TaxelGraph::from_body(&after).1, None);
     }
 }
 

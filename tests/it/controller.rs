@@ -70,7 +70,7 @@ fn a_joint_bears_what_presses_on_its_link_and_below_and_nothing_else() {
             if right.force_newton.length() > 5.0 && total(false) < 0.02 * total(true) {
                 let off_newton = found.force_newton.distance(right.force_newton);
                 let off_newton_m = found.torque_newton_m.distance(right.torque_newton_m);
-                // Sensors up to 3 cm apart on limbs 4 cm thick, of which each says its own normal: a quarter.
+                // Sensors up to 3 cm apart on limbs 4 cm thick, each with its own normal: a quarter.
                 let truth_newton = right.force_newton.length();
                 assert!(off_newton < 0.3 * truth_newton, "{} s: {off_newton} N", frame.t_s);
                 assert!(off_newton_m < 0.3 * truth_newton * lever_m, "{} s: {off_newton_m} N m", frame.t_s);

@@ -228,7 +228,7 @@ fn no_touch_is_lost_to_drift_and_none_is_left_behind() {
         let felt = run_boards(DRIFTING, &drifting(1200.0, per_minute, &presses));
         let is_known = |frame: &Vec<Percept>| !frame.iter().any(|p| p.flags.contains(Flags::DRIFT_UNKNOWN));
         assert!(felt.iter().all(is_known), "{per_minute}");
-        // While the rear is tapped, nobody is untouched: its own drift is not told in these 4 s.
+        // While the rear is tapped, nobody is untouched: its own drift is not known in these 4 s.
         check_against(&presses, &felt, [0.05, 0.05, 0.1]);
     }
 }

@@ -68,12 +68,12 @@ fn edges_of_a_file_are_used_while_they_are_current_and_no_damage_of_them_is_an_e
         }
         draft.load().unwrap()
     };
-    let pairs = |body: &Body| TaxelGraph::of(body).0.edges().collect::<Vec<_>>();
+    let pairs = |body: &Body| TaxelGraph::from_body(body).0.edges().collect::<Vec<_>>();
     let current = r#"{"version":1,"edges":{"1":[0.03,2,3],"2":[0],"3":[0]}}"#;
     for edges in [&[json!(current)][..], &[json!(current), json!(current)]] {
         let body = load(edges);
         assert_eq!((body.links.len(), body.findings.len()), (1, 0), "{:?}", body.findings);
-        assert_eq!((pairs(&body), TaxelGraph::of(&body).1), (vec![(0, 1), (0, 2)], None));
+        assert_eq!((pairs(&body), TaxelGraph::from_body(&body).1), (vec![(0, 1), (0, 2)], None));
     }
     // What is made without them: each taxel in the row and the next.
     let made = vec![(0, 1), (1, 2)];
@@ -84,7 +84,7 @@ fn edges_of_a_file_are_used_while_they_are_current_and_no_damage_of_them_is_an_e
         r#"{"version":1,"edges":{"1":[0.0301,2,3],"2":[0],"3":[0]}}"#,
     ] {
         let body = load(&[json!(outdated)]);
-        assert!(TaxelGraph::of(&body).1.unwrap().contains("made anew"));
+        assert!(TaxelGraph::from_body(&body).1.unwrap().contains("made anew"));
         assert_eq!((pairs(&body), body.findings.len()), (made.clone(), 0));
     }
     let other = json!(current.replace("0.03", "0.04"));

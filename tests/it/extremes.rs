@@ -342,7 +342,7 @@ fn ten_kilometres_from_the_origin_nothing_is_lost() {
         let shifted = DVec3::from_array(p.position.unwrap()) - far;
         assert!(shifted.distance(DVec3::from_array(here.position.unwrap())) < 1e-8, "{p:?} {here:?}");
         assert!(near(p.orientation, here.orientation.unwrap(), 1e-5));
-        // Second moments about the body's origin would have 10⁸ m² taken from 10⁸ m², of which f32 keeps some 8 m².
+        // Second moments about the body's origin would subtract 10⁸ m² from 10⁸ m²; f32 keeps some 8 m² of that.
         assert!(
             near(p.principal_axis, here.principal_axis.unwrap(), 1e-5)
                 && near(p.anisotropy, here.anisotropy.unwrap(), 1e-5)

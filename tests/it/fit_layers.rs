@@ -86,7 +86,7 @@ struct Found {
     /// Squares of errors of the moments and of `place`, for all touches, and for those with few taxels.
     placed: [f64; 2],
     placed_of_few: [f64; 2],
-    /// Errors within 1.96 σ, of so many: of the fit's place or angle, of `place`, and of the force.
+    /// Errors within 1.96 σ, and their number: of the fit's place or angle, of `place`, and of the force.
     covered: [usize; 2],
     places: [usize; 2],
     forces: [usize; 2],
@@ -113,7 +113,7 @@ impl Found {
         self.given as f64 / self.touches as f64
     }
 
-    fn of(pressed: Pressed, body: &Body, pressings: (u64, usize), layer: &str, noise: f64) -> Self {
+    fn measure(pressed: Pressed, body: &Body, pressings: (u64, usize), layer: &str, noise: f64) -> Self {
         let text = pressed.simulation(pressings, layer, noise);
         let (percepts, truths) = crate::fit_cells::found(body, &text, (SIGMA_M, 0.0));
         let mut found = Self::default();
@@ -218,7 +218,7 @@ fn fits_are_given_and_sure_of_themselves_under_every_layer() {
             for &noise in noises {
                 let mut all = Found::default();
                 for seed in first..first + seeds.unwrap_or(1) {
-                    all.add(&Found::of(pressed, &body, (seed, presses), layer, noise));
+                    all.add(&Found::measure(pressed, &body, (seed, presses), layer, noise));
                 }
                 println!("| {} | {layer} | {:.0} mN | {}", pressed.word(), 1e3 * noise, all.row(pressed));
                 // At a rim a place may be beyond the sensors; of few presses, one is a sixth.

@@ -164,7 +164,7 @@ fn patches_go_by_the_way_over_the_surface() {
     };
     assert!(whole.fields[1..].iter().any(whole_spans));
 
-    // The same again, and about so many a patch.
+    // The same again, and about this many a patch.
     assert_eq!(grouped(&fork, "[[fields]]\nname = \"fork\"\npatches = 5").unwrap().fields, grouping.fields);
     let of = grouped(&fork, "[[fields]]\npatches = { of = 20 }\nstem = \"spot\"").unwrap();
     assert_eq!(of.fields.len(), fork.taxels.len().div_ceil(20));

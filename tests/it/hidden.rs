@@ -216,7 +216,7 @@ fn of_a_skinned_mesh_all_is_a_link_s_own() {
     assert_eq!(found(&body), [(FindingKind::HiddenTaxel, vec![0])]);
 }
 
-/// A closed tube along z, of two joints in its middle, the second of which is turned by 90° towards −y at rest. Its weights change within
+/// A closed tube along z, with two joints in its middle; the second is turned by 90° towards −y at rest. Its weights change within
 /// `blend_m` of the middle. Taxels are on the inside of the bend.
 fn bent_tube(blend_m: f64) -> Body {
     let (rings, sides) = (41_u32, 24_u32);

@@ -175,7 +175,7 @@ fn sources() -> Vec<(String, PathBuf, String)> {
 
 /// All files but the command's own root, with their tests, which [`Paths`] leaves out.
 fn paths() -> Paths {
-    Paths::of(house().into_iter().filter(|(file, _)| !file.ends_with("main.rs")))
+    Paths::from_files(house().into_iter().filter(|(file, _)| !file.ends_with("main.rs")))
 }
 
 /// The room that a file is of: a folder of a crate, or a file there.
@@ -223,7 +223,7 @@ fn an_arrow_is_seen_however_it_is_written() {
         .map(|(path, text)| (PathBuf::from(path), text.to_owned()))
     };
     let used_by_third = |text: &str| -> Vec<String> {
-        let paths = Paths::of(files(text));
+        let paths = Paths::from_files(files(text));
         let uses = paths.uses(false);
         assert!(uses[Path::new("one.rs")].is_empty(), "what tests use does not count");
         uses[Path::new("three.rs")].iter().map(|path| path.display().to_string()).collect()
@@ -241,7 +241,7 @@ fn an_arrow_is_seen_however_it_is_written() {
     // What a module hands on is its maker's.
     assert_eq!(used_by_third("use crate::two::{Deep, Two};"), ["two/deep.rs", "two/mod.rs"]);
     assert!(used_by_third("pub use crate::one::One; use std::fmt;").is_empty());
-    let paths = Paths::of(
+    let paths = Paths::from_files(
         [("a.rs", "use crate::{b::B};"), ("b.rs", "use super::c::C;"), ("c.rs", "struct C(super::a::A);")]
             .map(|(path, text)| (PathBuf::from(path), text.to_owned()))
             .into_iter()
@@ -382,7 +382,7 @@ fn files_are_read_whole_within_limits_only() {
                 .find(|word| line.contains(word) && !line.contains(".take("))
         };
         for word in code.iter().filter_map(whole) {
-            // Recordings, line by line or record by record; and a file of which only the lock is asked for.
+            // Recordings, line by line or record by record; and a file that is only locked.
             let streams = ["source/csv.rs", "source/vendor/lines.rs", "recording", "output/lock.rs"]
                 .iter()
                 .any(|at| path.starts_with(at));

@@ -165,7 +165,7 @@ fn a_field_is_looked_at_when_it_changes_and_moves_from_change_to_change() {
                     assert!(left.contact && !right.contact);
                     match turn {
                         0..10 => assert!(left.flags.contains(Flags::NO_PREVIOUS)),
-                        // A centimetre in ten frames, not in the last of them; and told until there is news.
+                        // A centimetre in ten frames, not in the last of them; and reported until there is news.
                         _ => assert!((left.speed.unwrap() - 1.0).abs() < 1e-5, "{kind:?}, {turn}: {left:?}"),
                     }
                     said.push(format!("{left:?} {right:?}"));

@@ -59,7 +59,7 @@ fn are_pairs(body: &Body, first: u32, within_m: f64) {
     }
 }
 
-/// That the mirror image of each field of up to so many levels is the field of the exchanged name.
+/// Checks that the mirror image of each field of up to `levels` levels is the field of the exchanged name.
 fn fields_are_pairs(body: &Body, levels: usize) {
     let ids: BTreeMap<&str, BTreeSet<u32>> =
         body.fields.iter().map(|field| (field.name.as_str(), field.members.keys().copied().collect())).collect();

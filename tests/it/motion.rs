@@ -125,7 +125,7 @@ fn contact_with_thresholds_begins_high_and_ends_low() {
         let contact: Vec<bool> = run.iter().map(|p| p.contact).collect();
         assert_eq!(contact, [false, false, true, true, true, false, false, true]);
         for (p, total) in run.iter().zip(totals) {
-            // Out of contact the sums are still told, and nothing that needs a touch.
+            // Out of contact the sums are still given, and nothing that needs a touch.
             assert_eq!((p.total, p.centroid.is_some()), (Some(total), p.contact));
             assert_eq!(p.flags.contains(Flags::NO_CONTACT), !p.contact);
         }

@@ -57,7 +57,7 @@ fn frames(body: &Body, count: usize) -> Vec<Frame> {
     (0..count).map(frame).collect()
 }
 
-fn of(percepts: &Percepts, frame: usize) -> &[Touch] {
+fn touches_in(percepts: &Percepts, frame: usize) -> &[Touch] {
     &percepts.touches(frame).unwrap().touches
 }
 
@@ -99,7 +99,8 @@ fn they_are_the_same_on_every_backend_for_all_fields_and_however_a_recording_is_
         for index in 0..frames.len() {
             let strip =
                 |touch: &Touch| (touch.id, touch.total.to_bits(), touch.position, touch.principal_axis, touch.velocity);
-            let [a, b] = [&whole, narrow].map(|percepts| of(percepts, index).iter().map(strip).collect::<Vec<_>>());
+            let [a, b] =
+                [&whole, narrow].map(|percepts| touches_in(percepts, index).iter().map(strip).collect::<Vec<_>>());
             assert_eq!(a, b, "{backend:?} {index}");
         }
     }
@@ -146,11 +147,11 @@ fn a_touch_moves_with_its_link_and_its_wrench_stays_in_the_link() {
     let mut on_links = Vec::new();
     posed.presses_on_links(&mut on_links);
     let last = frames.len() - 1;
-    let total: f64 = of(posed.percepts(), last).iter().map(|touch| touch.total).sum();
+    let total: f64 = touches_in(posed.percepts(), last).iter().map(|touch| touch.total).sum();
     assert!((on_links.iter().map(|share| share.total).sum::<f64>() / total - 1.0).abs() < 1e-12);
     let relative = scene().relative_to(Some(root));
     let relative = engine(&body, relative, Some(calibration), BackendKind::Cpu).process(&frames).unwrap().clone();
-    let (found, still) = (&of(&relative, last)[0], &of(&rest_percepts, last)[0]);
+    let (found, still) = (&touches_in(&relative, last)[0], &touches_in(&rest_percepts, last)[0]);
     let root_from_link = root_at_rest.inverse() * body.links[still.link as usize].world_from_link();
     assert!(found.position.distance(root_from_link.transform_point3(still.position)) < 1e-12);
 }
@@ -176,12 +177,12 @@ fn what_is_missing_masked_or_out_of_range_is_reported_for_the_touches_it_is_in_o
     for backend in backends() {
         let mut engine = engine(&body, scene(), None, backend);
         let flagged = |percepts: &Percepts, flag: TouchFlags| {
-            of(percepts, 0).iter().filter(|touch| touch.flags.contains(flag)).count()
+            touches_in(percepts, 0).iter().filter(|touch| touch.flags.contains(flag)).count()
         };
         let percepts = engine.process_one(&missing).unwrap();
         assert!(flagged(percepts, TouchFlags::INCOMPLETE) >= 1, "{backend:?}");
         // Its neighbours are each other's: it is one touch still.
-        assert_eq!(of(percepts, 0).len(), whole.touches.len(), "{backend:?}");
+        assert_eq!(touches_in(percepts, 0).len(), whole.touches.len(), "{backend:?}");
         let of_taxel = |keys: &str| format!("[taxel.{id}]\n{keys}\n");
         for (keys, flag) in [
             ("mask = true", TouchFlags::FAULTY_INPUT),
@@ -199,7 +200,9 @@ fn what_is_missing_masked_or_out_of_range_is_reported_for_the_touches_it_is_in_o
     let mut stale = frame;
     stale.values[peak as usize] = RawValue::STALE;
     plain.track_stale();
-    assert!(of(plain.process_one(&stale).unwrap(), 0).iter().any(|touch| touch.flags.contains(TouchFlags::STALE)));
+    assert!(
+        touches_in(plain.process_one(&stale).unwrap(), 0).iter().any(|touch| touch.flags.contains(TouchFlags::STALE))
+    );
 }
 
 #[test]
@@ -221,7 +224,7 @@ fn a_taxel_in_no_field_is_touched_too_and_drift_does_not_take_its_touch_away() {
         }
         let percepts = engine.process_one(&Frame { t_s: number as f64 / HZ, values, ..Frame::default() }).unwrap();
         assert!(percepts.touched(0).next().is_none());
-        touched += of(percepts, 0).len();
+        touched += touches_in(percepts, 0).len();
     }
     assert_eq!(touched, 179);
     assert!(body.taxels[alone].modality == Modality::Pressure);
@@ -233,7 +236,7 @@ fn taxels_weigh_as_their_sensors_cover_their_cells() {
     let frame = frames(&body, 1).remove(0);
     let position = |body: &Body, keys: &str| {
         let mut engine = engine(body, scene(), Some(&format!("[all]\n{keys}\n")), BackendKind::Cpu);
-        (of(engine.process_one(&frame).unwrap(), 0)[0].position, engine.remarks())
+        (touches_in(engine.process_one(&frame).unwrap(), 0)[0].position, engine.remarks())
     };
     let [cell, equal] = ["sensors = \"cell\"", "sensors = \"equal\""].map(|keys| position(&body, keys).0);
     assert!(cell.distance(equal) > 1e-5, "{cell} {equal}");

@@ -1,4 +1,4 @@
-//! Which file of the crate uses an item of which other, as the compiler would find it.
+//! Which files of the crate use items of which others, as the compiler would find it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -28,8 +28,8 @@ struct Named {
 }
 
 impl Paths {
-    /// Of `files`, by path within `src/`, with their text.
-    pub fn of(files: impl IntoIterator<Item = (PathBuf, String)>) -> Self {
+    /// The paths of `files`, given by path within `src/` with their text.
+    pub fn from_files(files: impl IntoIterator<Item = (PathBuf, String)>) -> Self {
         let files: Vec<(PathBuf, String)> = files.into_iter().collect();
         let by_module = files.iter().map(|(path, _)| (module_of(path), path.clone())).collect();
         let mut paths = Self { files: by_module, exports: BTreeMap::new(), named: BTreeMap::new() };

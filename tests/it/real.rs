@@ -58,7 +58,7 @@ fn six_postures_on_the_mat() {
             for frame in 2..frames.len() {
                 let p = percepts.get(frame, whole);
                 assert!(p.contact && p.active.unwrap() > 1000, "{p:?}");
-                // A value beyond the sensor's range is told: as such, or as not believed where it stands alone.
+                // A value beyond the sensor's range is reported: as such, or as implausible if it is alone.
                 let beyond = frames[frame].values.iter().any(|v| v.number().unwrap() > 1000.0);
                 let told = p.flags.intersects(Flags::OUT_OF_RANGE | Flags::FAULTY_INPUT);
                 assert!(told || !beyond, "posture {posture}, frame {frame}");

@@ -1,4 +1,4 @@
-//! What is not tested is told where people look.
+//! Skipped tests are reported where people look.
 
 use std::path::Path;
 use std::process::Command;

@@ -25,7 +25,7 @@ pub(crate) enum Packet {
 }
 
 impl Packet {
-    pub(crate) fn of(event: &Event<'_>) -> Self {
+    pub(crate) fn from_event(event: &Event<'_>) -> Self {
         match *event {
             Event::Frame { head, values, .. } if values.is_partial() => {
                 Self::Partial { head, bits: values.bits(), values: values.iter().collect() }
@@ -140,7 +140,7 @@ pub(crate) fn unhex(text: &str) -> Vec<u8> {
 /// All that a decoder makes of `bytes`.
 pub(crate) fn decoded(bytes: &[u8]) -> Vec<Packet> {
     let mut events = Vec::new();
-    Decoder::new().push(bytes, |event| events.push(Packet::of(&event)));
+    Decoder::new().push(bytes, |event| events.push(Packet::from_event(&event)));
     events
 }
 
@@ -451,7 +451,7 @@ proptest! {
         let (mut rest, mut cuts) = (&line[..], cuts.iter().cycle());
         while !rest.is_empty() {
             let (piece, after) = rest.split_at((*cuts.next().unwrap()).min(rest.len()));
-            decoder.push(piece, |event| got.push(Packet::of(&event)));
+            decoder.push(piece, |event| got.push(Packet::from_event(&event)));
             rest = after;
         }
         let account = decoder.frame_counts().board(5).unwrap();
@@ -498,7 +498,7 @@ fn the_decoder_survives_a_long_time() {
         let (bytes, whole) = harmed(&frames, &harms);
         bytes_sent += bytes.len() as u64;
         let mut came = Vec::new();
-        decoder.push(&[bytes, told(sent as u32).line()].concat(), |event| came.push(Packet::of(&event)));
+        decoder.push(&[bytes, told(sent as u32).line()].concat(), |event| came.push(Packet::from_event(&event)));
         came.retain(|packet| matches!(packet, Packet::Frame { .. } | Packet::Partial { .. }));
         assert!(came.iter().all(|packet| frames.contains(packet)), "round {rounds}: something came that was not sent");
         assert!(frames.iter().zip(whole).all(|(frame, whole)| !whole || came.contains(frame)), "round {rounds}");

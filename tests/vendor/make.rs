@@ -156,7 +156,7 @@ pub fn emed(dialect: &Dialect, [rows, columns]: [usize; 2], numbers: &[usize], k
     dialect.finish(&text)
 }
 
-/// novel's `.asc`: `runs` of so many sensors each, and for pliance the places of a grid of `columns`.
+/// novel's `.asc`: `runs` with the number of sensors of each, and for pliance the places of a grid of `columns`.
 pub fn novel(dialect: &Dialect, runs: &[usize], columns: Option<usize>, numbers: &[usize]) -> String {
     let mut text = String::new();
     if !dialect.bare {

@@ -14,7 +14,7 @@ pub(super) struct Borders {
 }
 
 impl Borders {
-    /// Those of `topology`, whose triangles are `chosen` of `rest_surface`: where it ends, and between links and meshes.
+    /// The borders of `topology`, whose triangles are `chosen` of `rest_surface`: its ends, and between links and meshes.
     pub(super) fn new(rest_surface: &RestSurface<'_>, chosen: &[usize], topology: &Topology, clear_m: f64) -> Self {
         let owner = |triangle: u32| {
             let triangle = chosen[topology.given[triangle as usize] as usize];

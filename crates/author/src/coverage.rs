@@ -76,7 +76,7 @@ struct Sample {
 /// areas are accurate to about a percent of the total.
 #[must_use]
 pub fn coverage(body: &Body) -> Coverage {
-    let taxels = Taxels::of(body);
+    let taxels = Taxels::from_body(body);
     let corners: Vec<(usize, [DVec3; 3])> = body.triangles_at_rest();
     let area_of = |corners: [DVec3; 3]| area_vector(corners).length() / 2.0;
     let mut links: Vec<LinkCoverage> =
@@ -123,7 +123,7 @@ struct Taxels {
 }
 
 impl Taxels {
-    fn of(body: &Body) -> Self {
+    fn from_body(body: &Body) -> Self {
         let of_body = |taxel: &Taxel| body.links[taxel.link].body_from_link;
         let place = |taxel: &Taxel| of_body(taxel).transform_point3(taxel.position_in_link);
         let places: Vec<DVec3> = body.taxels.iter().map(place).collect();

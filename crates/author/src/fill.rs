@@ -159,7 +159,7 @@ impl Fill<'_> {
         Surface { positions, triangles, chosen, topology }
     }
 
-    /// The error on a grid that does not keep its pitch, instead of which `count` taxels are as dense.
+    /// The error on a grid that does not keep its pitch. It proposes `count` taxels, which are as dense.
     fn torn(&self, lattice: &Lattice, tear: &Tear, count: usize) -> Error {
         let named: Vec<String> = self.place.regions.iter().map(|name| format!("`{name}`")).collect();
         let region = match named.len() {

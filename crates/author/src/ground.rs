@@ -67,7 +67,7 @@ impl Rules<'_> {
         self.touchable.is_some() || self.borders.is_some() || self.mirror.is_some()
     }
 
-    /// Those of `placed` that they leave.
+    /// The taxels of `placed` that the rules leave.
     pub(super) fn without_closed(&self, placed: Vec<Placed>, progress: Progress<'_>) -> Result<Vec<Placed>> {
         let states = self.states(&placed, progress)?;
         Ok(placed.into_iter().zip(states).filter(|(_, state)| *state == State::Open).map(|(one, _)| one).collect())
@@ -267,8 +267,8 @@ impl<'a> Ground<'a> {
         triangles.iter().zip(counts).map(is_skin).collect()
     }
 
-    /// `placed`, of which those that may not be where they are went to the nearest open sample of their cells that is not beside another
-    /// of them, else of their cells, else of all.
+    /// `placed`, with taxels moved that may not be where they are: each to the nearest open sample of its cell that is not beside
+    /// another taxel, else to the nearest of its cell, else to the nearest of all.
     pub(super) fn settled(&self, mut placed: Vec<Placed>, progress: Progress<'_>) -> Result<Vec<Placed>> {
         let states = self.rules.states_of_final(&placed, progress)?;
         if states.iter().all(|state| *state == State::Open) {
@@ -356,7 +356,7 @@ mod tests {
     fn a_taxel_at_the_foot_of_a_wall_moves_away_from_it_whatever_rounding_says() {
         let (body, details) = floor_and_box().read().unwrap();
         let rest_surface = RestSurface::new(&body, &details);
-        let drawn = DrawnPoses::of(&body);
+        let drawn = DrawnPoses::from_body(&body);
         let touchable = Touchable::new(&body, &drawn);
         let chosen: Vec<usize> = (0..rest_surface.triangles.len()).collect();
         let rules = Rules {

@@ -11,7 +11,7 @@ const ON_PLANE: f64 = 1e-6;
 
 /// What is left of the plane, of some triangles.
 pub(super) struct Half {
-    /// Those of the whole surface, and then the points where edges are cut.
+    /// The positions of the whole surface, and then the points where edges are cut.
     pub(super) positions: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// Per triangle the one of the whole surface that it is of.

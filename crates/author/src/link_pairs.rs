@@ -32,7 +32,7 @@ pub(super) struct LinkPairs {
 }
 
 impl LinkPairs {
-    /// Those of `body`: two links are a pair if the words for sides in their names are opposite, and all else is the same.
+    /// The pairs of `body`: two links are a pair if the words for sides in their names are opposite, and all else is the same.
     pub(super) fn new(body: &Body) -> Self {
         let partners = partners(&body.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>());
         let middles = middles(body);
@@ -103,7 +103,7 @@ fn other_sides(name: &str) -> Vec<String> {
     (0..most).map(exchanged).collect()
 }
 
-/// What stands opposite `word`, in capitals as it is.
+/// The word opposite to `word`, with the same capitals.
 fn opposites(word: &str) -> Vec<String> {
     let low = word.to_ascii_lowercase();
     let other = |[left, right]: &[&'static str; 2]| match low.as_str() {

@@ -415,8 +415,8 @@ mod tests {
         for (spacing, seed) in [(0.05, 1), (0.05, 2), (0.3, 1), (3.0, 1)] {
             let placed = place_apart(&positions, &triangles, spacing, seed, &mut |_| true).unwrap();
             assert!(least_spacing(&placed) >= spacing, "{} m", least_spacing(&placed));
-            // Nobody fits in between: every place on the sheet has one within the spacing, but for the samples' own
-            // distance, of which there are nine for each disk of the densest packing.
+            // No further taxel fits: every place on the sheet has one within the spacing, up to the distance between samples.
+            // There are nine samples for each disk of the densest packing.
             let gap = spacing * (1.0 + 1.0 / 3.0);
             for p in Pieces::whole(&positions, &triangles).unwrap().scatter(2000, 77) {
                 assert!(placed.iter().any(|q| same_side(&p, q) && p.point.position.distance(q.point.position) < gap));

@@ -74,7 +74,7 @@ impl From<OneOrMany> for Names {
     }
 }
 
-/// Globs over names (`palm*`, `finger_?`), of which any may match. `*` also matches slashes.
+/// Globs over names (`palm*`, `finger_?`). A name matches if any of them does. `*` also matches slashes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(try_from = "Names")]
 pub struct Globs {

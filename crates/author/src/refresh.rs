@@ -16,9 +16,9 @@ const MAX_OFF_M: f64 = 0.03;
 /// that is within 30 mm.
 pub fn refresh(body: &mut Body) -> Vec<String> {
     let mut notes = Vec::new();
-    let surface_search = SurfaceSearch::of(body);
+    let surface_search = SurfaceSearch::from_body(body);
     let is_stale = |fit: &SurfaceFit| fit.is_stale() && fit.off_m < MAX_OFF_M;
-    let fit = |(index, taxel)| Some((index, SurfaceFit::of(body, &surface_search, taxel).filter(is_stale)?));
+    let fit = |(index, taxel)| Some((index, SurfaceFit::for_taxel(body, &surface_search, taxel).filter(is_stale)?));
     let stale: Vec<(usize, SurfaceFit)> = body.taxels.iter().enumerate().filter_map(fit).collect();
     if !stale.is_empty() {
         let ids: Vec<u32> = stale.iter().map(|&(index, _)| body.taxels[index].id).collect();

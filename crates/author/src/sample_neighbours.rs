@@ -78,7 +78,7 @@ impl<T: Copy + Send> SampleNeighbours<T> {
     }
 
     /// The neighbours of `sample`, by rising index.
-    pub(super) fn of(&self, sample: usize) -> &[(u32, T)] {
+    pub(super) fn neighbours(&self, sample: usize) -> &[(u32, T)] {
         let (chunk, begin, end) = self.lists[sample];
         &self.chunks[chunk as usize][begin as usize..end as usize]
     }
@@ -114,7 +114,7 @@ pub(super) fn eliminate_crowded(
     count: usize,
     progress: Progress<'_>,
 ) -> Result<Vec<usize>> {
-    let mut weights: Vec<f64> = (0..samples).map(|i| crowd.of(i).iter().map(|(_, w)| w).sum()).collect();
+    let mut weights: Vec<f64> = (0..samples).map(|i| crowd.neighbours(i).iter().map(|(_, w)| w).sum()).collect();
     let mut alive = vec![true; samples];
     let mut heap: BinaryHeap<u64> = weights.iter().enumerate().map(|(i, &weight)| priority(weight, i)).collect();
     let mut left = samples;
@@ -133,20 +133,20 @@ pub(super) fn eliminate_crowded(
         if left.is_multiple_of(CHUNK) {
             report_progress(progress, (samples - left) as f64 / (samples - count) as f64)?;
         }
-        for &(j, weight) in crowd.of(sample) {
+        for &(j, weight) in crowd.neighbours(sample) {
             weights[j as usize] -= weight;
         }
     }
     Ok((0..samples).filter(|&i| alive[i]).collect())
 }
 
-/// Selects samples of which no two are neighbours, always the one that blocks the fewest others. Returns ascending indices.
+/// Selects samples that are not neighbours of each other, always the one that blocks the fewest others. Returns ascending indices.
 pub(super) fn pack<T: Copy + Send>(
     crowd: &SampleNeighbours<T>,
     samples: usize,
     progress: Progress<'_>,
 ) -> Result<Vec<usize>> {
-    let mut free: Vec<usize> = (0..samples).map(|i| crowd.of(i).len()).collect();
+    let mut free: Vec<usize> = (0..samples).map(|i| crowd.neighbours(i).len()).collect();
     let mut open = vec![true; samples];
     // By the number of free neighbours; an outdated entry has a newer one in a lower bucket.
     let mut buckets: Vec<Vec<u32>> = vec![Vec::new(); free.iter().max().map_or(0, |most| most + 1)];
@@ -170,12 +170,12 @@ pub(super) fn pack<T: Copy + Send>(
         if kept.len().is_multiple_of(CHUNK) {
             report_progress(progress, settled as f64 / samples as f64)?;
         }
-        for &(gone, _) in crowd.of(sample) {
+        for &(gone, _) in crowd.neighbours(sample) {
             if !std::mem::replace(&mut open[gone as usize], false) {
                 continue;
             }
             settled += 1;
-            for &(near, _) in crowd.of(gone as usize) {
+            for &(near, _) in crowd.neighbours(gone as usize) {
                 let near = near as usize;
                 if open[near] {
                     free[near] -= 1;

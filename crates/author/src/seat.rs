@@ -41,7 +41,7 @@ pub(super) fn seat(rest_surface: &RestSurface<'_>, recipe: &Recipe, progress: Pr
     }
     let mut ids = UsedIds::default();
     ids.take(body.taxels.iter().map(|taxel| taxel.id), "the file", &Origin::default())?;
-    let drawn = DrawnPoses::of(body);
+    let drawn = DrawnPoses::from_body(body);
     let looks = !recipe.keeps_hidden && recipe.places.iter().any(|place| place.how.samples());
     let touchable = looks.then(|| Touchable::new(body, &drawn));
     let mut seated = Seated::default();

@@ -17,7 +17,7 @@ const LEAST_CELL: f64 = 0.5;
 /// Samples per taxel, as for all blue noise.
 const OVERSAMPLING: usize = 5;
 
-/// The most samples of a piece per taxel, of which only those on open surface count.
+/// The most samples of a piece per taxel. Only samples on open surface count.
 const MAX_OVERSAMPLING: f64 = 100.0;
 
 /// A connected piece of a link's surface.
@@ -33,7 +33,7 @@ pub(super) struct LinkPiece {
     pub(super) count: usize,
 }
 
-/// The pieces of `triangles`, `link_of` each of which is known, by link, with their shares of `count` taxels.
+/// The pieces of `triangles` by link, with their shares of `count` taxels; `link_of` has the link of each triangle.
 pub(super) fn shares(
     positions: &[DVec3],
     triangles: &[[u32; 3]],

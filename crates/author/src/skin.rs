@@ -131,7 +131,7 @@ pub(super) fn store_edges(
         let taxels: Option<Vec<usize>> = ids.iter().map(|&id| body.taxel_index(id)).collect();
         Some(TaxelGraph::of_cells(body, &taxels?, divided))
     });
-    let (graph, note) = known.map_or_else(|| TaxelGraph::of(body), |graph| (graph, None));
+    let (graph, note) = known.map_or_else(|| TaxelGraph::from_body(body), |graph| (graph, None));
     notes.extend(note);
     let edges = graph.to_stored(body);
     file.set_edges(&edges);

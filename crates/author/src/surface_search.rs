@@ -25,7 +25,7 @@ pub(super) struct SurfaceSearch<'a> {
 }
 
 impl<'a> SurfaceSearch<'a> {
-    pub(super) fn of(body: &'a Body) -> Self {
+    pub(super) fn from_body(body: &'a Body) -> Self {
         let (mut rigid, mut skinned, mut largest) = (Vec::new(), Vec::new(), 0.0_f64);
         for surface in &body.surfaces {
             // Coordinates are rounded in the mesh and in the taxels' node.

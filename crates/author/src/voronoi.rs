@@ -40,7 +40,7 @@ const RAYS: u32 = 180;
 
 /// The area of the cell of each of `placed`, m²; coincident taxels share theirs. 0, unknown, if no other taxel is reached.
 pub(super) fn areas(rest_surface: &RestSurface<'_>, placed: &[Placed]) -> Vec<f64> {
-    let sites = Sites::of(rest_surface, placed);
+    let sites = Sites::from_placed(rest_surface, placed);
     let cells: Vec<f64> = (0..sites.places.len()).map(|site| sites.area(site).unwrap_or(0.0)).collect();
     sites.of_taxel.iter().map(|&site| cells[site] / f64::from(sites.taxels[site])).collect()
 }
@@ -56,7 +56,7 @@ struct Sites<'a> {
 }
 
 impl<'a> Sites<'a> {
-    fn of(rest_surface: &'a RestSurface<'_>, placed: &[Placed]) -> Self {
+    fn from_placed(rest_surface: &'a RestSurface<'_>, placed: &[Placed]) -> Self {
         let topology = rest_surface.topology();
         let mut sound = vec![NONE; rest_surface.triangles.len()];
         (0..).zip(&topology.given).for_each(|(index, &given)| sound[given as usize] = index);

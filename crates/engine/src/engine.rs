@@ -234,7 +234,7 @@ impl Engine {
         self.on_skin.iter_mut().filter(|_| are_kept).for_each(OnSkin::keep_taxels);
     }
 
-    /// Tells which board each taxel hangs on: from now on, the drift of one that is touched is that of its board's
+    /// Sets the board of each taxel: from now on, the drift of one that is touched is that of its board's
     /// untouched taxels, where there are three. Without, it is that of its link's, else of the body's. For before the first
     /// frame.
     pub fn wire(&mut self, wiring: &Wiring) {
@@ -256,7 +256,7 @@ impl Engine {
         Frame::missing(t_s, self.ids.len())
     }
 
-    /// Where the taxel with `id` stands in the values of [`Engine::frame`].
+    /// The index of the taxel with `id` in the values of [`Engine::frame`].
     #[must_use]
     pub fn index_of_taxel(&self, id: u32) -> Option<usize> {
         self.ids.binary_search(&id).ok()
@@ -276,8 +276,8 @@ impl Engine {
         Ok(())
     }
 
-    /// What is to be known before the first frame, a line each: taxels that no letter reads, drift that no taxel can tell, edges
-    /// between taxels that are not those of the body's file, and sensors of which nothing says what they cover.
+    /// Remarks before the first frame, a line each: taxels that no letter reads, drift that no taxel can tell, edges
+    /// between taxels that are not those of the body's file, and sensors of unknown area.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let drift = self.drift.as_ref().is_some_and(|kept| kept.cannot_tell_drift(&self.plan)).then(|| {
@@ -339,7 +339,7 @@ impl Engine {
     /// the device was lost.
     pub fn process(&mut self, frames: &[Frame]) -> Result<&Percepts> {
         self.check = None;
-        self.advance(Input::of(frames), None, None)?;
+        self.advance(Input::from_frames(frames), None, None)?;
         Ok(&self.percepts)
     }
 
@@ -364,7 +364,7 @@ impl Engine {
         to.clear();
         for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
             let Some(channel) = self.channel_of_taxel[taxel].map(|channel| channel as usize) else { continue };
-            let curve = self.plan.curves.of(self.plan.taxels[channel].response);
+            let curve = self.plan.curves.table(self.plan.taxels[channel].response);
             let value = self.intake.read(taxel, value);
             let pressure = calibrate::pressure(value, &self.plan.calibrations[channel], curve);
             to.extend(pressure.map(|pressure| (self.ids[taxel], pressure)));
@@ -389,7 +389,7 @@ impl Engine {
             Some(check) => check,
             None => Box::new(Check::new(&self.plan, &self.backend.state()?, &self.post)?),
         };
-        self.advance(Input::of(frames), Some(&mut check), None)?;
+        self.advance(Input::from_frames(frames), Some(&mut check), None)?;
         let names: Vec<String> = (0..self.plan.fields.len()).map(|field| self.plan.label(field)).collect();
         let mut agreement = compare(&check.right, &check.bounds, &self.percepts, &names);
         if let Some(touches) = &mut check.touches {

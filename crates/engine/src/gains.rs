@@ -43,7 +43,7 @@ const WIDTH_ROUNDS: usize = 8;
 const MOST: usize = 6000;
 /// A taxel counts where it feels at least this share of the touch's largest pressure: below, the model is more wrong than gains.
 const LEAST_SHARE: f64 = 0.1;
-/// Touches that a taxel needs for its gain to be told.
+/// Touches that a taxel needs for a gain.
 const LEAST_TOUCHES: u32 = 5;
 /// Touches count as longer than wide where blobs leave less than this share of the variance that round contacts leave, both without
 /// noise. Their two more parameters alone leave 0.87 of it where fifteen taxels are pressed.
@@ -75,7 +75,7 @@ const START: f64 = 0.5;
 /// A place is beyond the sensors where it is farther from all, in distances between taxels.
 const REACH: f64 = 2.0;
 
-/// What touches told.
+/// What touches show.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct GainsEstimate {
@@ -272,8 +272,8 @@ struct Round {
 }
 
 impl Round {
-    /// Of `touches`, which are `explained` under the logarithms `gains`.
-    fn of(touches: &[Observed], explained: Vec<Option<Explained>>, gains: &[f64]) -> Self {
+    /// A round over `touches`, which are `explained` under the logarithms `gains`.
+    fn from_touches(touches: &[Observed], explained: Vec<Option<Explained>>, gains: &[f64]) -> Self {
         let zeros = || vec![0.0; gains.len()];
         let mut round = Self {
             pressed: vec![0; gains.len()],
@@ -334,7 +334,7 @@ fn estimate(
         let fitted: Vec<Touch> = touches.iter().map(|touch| touch.under(&gains, sigma_m)).collect();
         let explained = fit_each(&fitted.iter().collect::<Vec<_>>(), |touch, fits| touch.explained(fits?, as_blobs));
         let Round { pressed: counts, weights, sums, mut widths_m, squares, of_noise, counted } =
-            Round::of(touches, explained, &gains);
+            Round::from_touches(touches, explained, &gains);
         (pressed, used) = (counts, widths_m.len());
         if used < LEAST {
             return Err(failed!("{LEAST} touches must be explained as contacts, and {used} can be"));
@@ -364,8 +364,8 @@ fn estimate(
             return Err(Error::failed("stopped before gains had come to rest"));
         }
     }
-    let told = |(gain, count): (&f64, &u32)| (*count >= LEAST_TOUCHES).then(|| gain.exp());
-    let gains = gains.iter().zip(&pressed).map(told).collect();
+    let gain_of = |(gain, count): (&f64, &u32)| (*count >= LEAST_TOUCHES).then(|| gain.exp());
+    let gains = gains.iter().zip(&pressed).map(gain_of).collect();
     let gain_spread = (unexplained + unknowable).sqrt().max(LEAST_SPREAD);
     Ok((GainsEstimate { gains, pressed, width_m, sigma_m, left, gain_spread, touches: used }, unexplained))
 }

@@ -111,7 +111,7 @@ impl Connection {
         }
     }
 
-    /// When its viewer is to be told of a taxel again, if it has read everything before.
+    /// When its viewer gets the next message about its taxel, if it has read everything before.
     pub(super) fn taxel_due_at(&self, published: u64) -> Option<Instant> {
         match &self.state {
             State::Viewing(socket, viewer) if socket.is_idle() => viewer.taxel_due_at(published),
@@ -174,7 +174,7 @@ impl Connection {
         }
     }
 
-    /// The messages that have come, at most so many at once that others have their turn; whether there may be more.
+    /// Takes the messages that have come; whether there may be more. The number per call is limited so that others get their turn.
     pub(super) fn receive(&mut self, mut each: impl FnMut(&mut Self, String)) -> bool {
         if let State::Greeting(socket) | State::Viewing(socket, _) = &mut self.state {
             socket.begin_turn();

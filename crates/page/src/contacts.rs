@@ -18,7 +18,7 @@ pub(super) struct Contacts {
 }
 
 impl Contacts {
-    /// Of `fields` fields, none of which is touched.
+    /// For `fields` fields without touches.
     pub(super) fn new(fields: usize) -> Self {
         Self { in_contact: vec![false; fields], touching: Vec::new(), jumped: false }
     }

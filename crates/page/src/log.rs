@@ -14,7 +14,7 @@ pub enum EventKind {
     Release,
     /// A board comes, goes, or loses frames.
     Board,
-    /// Something else that a user is told.
+    /// Another message to the user.
     Notice,
 }
 

@@ -53,7 +53,7 @@ pub enum Request {
         /// The time, s.
         t_s: f64,
     },
-    /// Stop, and show the frame so many on.
+    /// Stop, and move by this number of frames.
     Step {
         /// Number of frames, negative for earlier ones.
         frames: i32,

@@ -208,7 +208,7 @@ impl Publisher {
     pub fn ended(&mut self, reason: &str) {
         self.flush();
         self.exchange.lock().ended = Some(reason.to_owned());
-        // Also where nobody looks yet: whoever comes later is told.
+        // Also without viewers: whoever comes later gets it.
         self.exchange.waker().wake();
     }
 

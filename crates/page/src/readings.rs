@@ -64,7 +64,7 @@ pub(super) struct Readings {
 }
 
 impl Readings {
-    /// Of `taxels` taxels, of which `plan` reads some; `value_of` says where frames have the values of its channels.
+    /// For `taxels` taxels; `plan` reads some of them. `value_of` has the index of each channel's value in a frame.
     pub(super) fn new(plan: Plan, taxels: usize, value_of: &[Option<usize>]) -> Self {
         Self {
             is_sent: value_of.iter().map(Option::is_some).collect(),

@@ -37,8 +37,8 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// That of `plan`, or of a recording whose largest pressure is `recorded_max`, or one that grows.
-    pub(super) fn of(plan: &Plan, recorded_max: Option<f64>) -> Self {
+    /// The scale of `plan`, or of a recording whose largest pressure is `recorded_max`, or one that grows.
+    pub(super) fn for_plan(plan: &Plan, recorded_max: Option<f64>) -> Self {
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         let limit = f64::from(f32::MAX);
         let used = || plan.calibrations.iter().filter(|taxel| !taxel.mask);
@@ -105,7 +105,7 @@ mod tests {
         let scale = |text: &str, recorded| {
             let calibration = Calibration::parse(text, &ids).unwrap();
             let fields = FieldSet::new(&body).unwrap();
-            Scale::of(&Plan::new(&body, &fields, &Scene::default(), &calibration).unwrap(), recorded)
+            Scale::for_plan(&Plan::new(&body, &fields, &Scene::default(), &calibration).unwrap(), recorded)
         };
         let from = |max, from| Scale { max, from };
         assert_eq!(scale("[all]\np_max = 7", Some(3.0)), from(7.0, ScaleFrom::Calibration));

@@ -45,7 +45,7 @@ pub struct PageInfo<'a> {
     pub backend: [&'a str; 3],
     /// The ids of a frame's values, in their order.
     pub taxels: &'a [u32],
-    /// Which taxel is on which channel of which board.
+    /// The map from channels of boards to taxels.
     pub wiring: Option<&'a Wiring>,
     /// The largest pressure of the recording, if known.
     pub recorded_max: Option<f64>,
@@ -125,7 +125,7 @@ impl PageScene {
             },
             of_world: plan.fields.iter().map(|field| field.anchor.is_none()).collect(),
             touch_places: TouchPlaces::new(body, plan, origin),
-            scale: Scale::of(plan, info.recorded_max),
+            scale: Scale::for_plan(plan, info.recorded_max),
             plan: plan.clone(),
         }
     }

@@ -108,7 +108,7 @@ impl Serving {
         }
     }
 
-    /// Serves until it is told to stop.
+    /// Serves until it gets the signal to stop.
     pub(super) fn run(mut self, waits: &Waits) {
         Waits::lower_priority();
         loop {
@@ -165,7 +165,7 @@ impl Serving {
                 if let Some(idle) = self.connections.iter().position(|(_, connection)| connection.is_idle(now)) {
                     self.connections.remove(idle);
                 } else if let Some(gone) = self.gone(now) {
-                    // There is room once it has been told so.
+                    // There is room once its viewer has received that.
                     self.connections[gone].1.close(CloseReason::Overload, "nothing was drawn for two minutes");
                     return;
                 } else if self.connections.iter().all(|(_, connection)| connection.seen().is_some()) {
@@ -359,7 +359,7 @@ fn greet(connection: &mut Connection, message: &str, token: &str, run: &str, con
         Ok(Message::Hello { .. }) => {
             return connection.close(CloseReason::Policy, "wrong token; open the address that the server has printed");
         }
-        // That the page is of another version is told.
+        // The viewer gets the reason if its page is of another version.
         Err(reason) if reason.contains("version") => return connection.close(CloseReason::Policy, &reason),
         _ => return connection.close(CloseReason::Policy, "the first message is not a hello"),
     };

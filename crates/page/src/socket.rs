@@ -107,7 +107,7 @@ pub(super) fn accept_key(key: &str) -> String {
 }
 
 impl Socket {
-    /// Goes on with `stream`, of which `received` has been read after the upgrade.
+    /// Continues with `stream`; `received` was read from it after the upgrade.
     pub(super) fn new(stream: TcpStream, received: Vec<u8>) -> Self {
         let config = WebSocketConfig::default()
             .read_buffer_size(4 << 10)

@@ -98,10 +98,10 @@ struct Bench {
 impl Bench {
     /// Without touches of the whole body.
     fn new(outputs: Outputs, letters: &[Receptor], calibration: &str) -> Self {
-        Self::of(Scene::default().outputs(outputs).letters(Letter::all_of(letters, &[])), calibration)
+        Self::with_scene(Scene::default().outputs(outputs).letters(Letter::all_of(letters, &[])), calibration)
     }
 
-    fn of(scene: Scene, calibration: &str) -> Self {
+    fn with_scene(scene: Scene, calibration: &str) -> Self {
         let body = body();
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let options = Options::default()
@@ -203,7 +203,7 @@ fn book() -> Book {
     let letters = Letter::all_of(&ALL_LETTERS, &[]);
     let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION | Outputs::SELF_CONTACTS).letters(letters);
     let scene = scene.touches(touch::Options::default());
-    let mut bench = Bench::of(scene, "[all]\np_max = 100\n[taxel.9]\nmask = true");
+    let mut bench = Bench::with_scene(scene, "[all]\np_max = 100\n[taxel.9]\nmask = true");
     let mut viewer = Viewer::new(0);
     let mut book = Book::default();
     book.add_text(&bench.scene.welcome("00ff", bench.scene.scale).replace(env!("CARGO_PKG_VERSION"), "0.0.0"));
@@ -349,8 +349,8 @@ fn frames_hold_what_the_engine_computed() {
     assert_eq!((&contact["sides"][0]["total"], &contact["sides"][1]["total"]), (&5.0.into(), &3.0.into()));
     let origin = welcome["origin"].as_array().unwrap();
     for (axis, place) in [1.01, 0.0, -0.01].into_iter().enumerate() {
-        let told = contact["position"][axis].as_f64().unwrap() + origin[axis].as_f64().unwrap();
-        assert!((told - place).abs() < 1e-6, "{contact}");
+        let sent = contact["position"][axis].as_f64().unwrap() + origin[axis].as_f64().unwrap();
+        assert!((sent - place).abs() < 1e-6, "{contact}");
     }
     // Its frame has no pose: where touches are in the world is not known.
     assert_eq!((&everything["selfContacts"]["known"], &unchanged["selfContacts"]), (&false.into(), &Value::Null));
@@ -386,7 +386,7 @@ fn a_viewer_has_credit_for_two_frames_and_the_newest_wins() {
 #[test]
 fn the_steady_state_does_not_allocate() {
     let scene = Scene::default().outputs(Outputs::USUAL_AND_MOTION).touches(touch::Options::default());
-    let mut bench = Bench::of(scene, "");
+    let mut bench = Bench::with_scene(scene, "");
     let mut viewer = Viewer::new(0);
     let text = r#"{"type":"series","series":[{"field":1,"column":"total","component":0}]}"#;
     bench.plot(&mut viewer, text);

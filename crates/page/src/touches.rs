@@ -40,7 +40,7 @@ impl TouchPlaces {
     fn write_one(&self, to: &mut Writer, found: &TouchFrame, touch: &Touch, (trails, t_s): (&TouchTrails, f64)) {
         let (taxels, links, fields) = (found.taxels(touch), found.links(touch), found.fields(touch));
         let link = (!touch.in_world).then_some(touch.link);
-        let trail_points = trails.of(touch.id).count();
+        let trail_points = trails.trail(touch.id).count();
         to.u32(touch.id as u32);
         to.u32(touch.link);
         to.u32(self.frame(link));
@@ -80,7 +80,7 @@ impl TouchPlaces {
             to.u32(part.field);
             to.f32(share(part.total));
         }
-        for point in trails.of(touch.id) {
+        for point in trails.trail(touch.id) {
             to.f32((t_s - point.t_s) as f32);
             to.u32(self.frame(point.link));
             self.place(to, point.link, point.position);

@@ -247,8 +247,8 @@ impl Viewer {
         percepts.iter().for_each(|percept| to.u32(percept.field as u32));
         percepts.iter().for_each(|percept| to.u32(percept.flags.bits()));
         for percept in percepts {
-            let of = |(index, column): (usize, &&Column)| percept.value(column).map_or(0, |_| 1 << index);
-            let present: u32 = current.columns().iter().enumerate().map(of).sum();
+            let bit = |(index, column): (usize, &&Column)| percept.value(column).map_or(0, |_| 1 << index);
+            let present: u32 = current.columns().iter().enumerate().map(bit).sum();
             to.u32(present | if current.is_in_world(percept) { IN_WORLD } else { 0 });
         }
         for (index, column) in current.columns().iter().enumerate() {

@@ -35,7 +35,7 @@ struct Cut {
     is_in_summary: bool,
 }
 
-/// What of a [`Summary`] is told.
+/// The part of a [`Summary`] that is reported.
 struct SummaryState {
     trust: Trust,
     shift: i64,
@@ -45,7 +45,7 @@ struct SummaryState {
 }
 
 impl Account {
-    /// Of the file called `name` with `summary`, of which `thing` is read.
+    /// For the file called `name` with `summary`; `thing` is what is read.
     pub(super) fn new(name: &str, thing: &'static str, summary: &Summary) -> Self {
         let Summary { trust, shift, gone, gone_ns, .. } = *summary;
         Self {
@@ -112,9 +112,9 @@ impl Account {
 
     /// What is lost, in a line each.
     pub(super) fn losses(&self) -> Vec<String> {
-        let told = [self.cut_words(), self.damage_words()];
-        let told = told.into_iter().flatten().chain(self.summary_words());
-        told.map(|line| format!("{}: {line}", self.name)).collect()
+        let lines = [self.cut_words(), self.damage_words()];
+        let lines = lines.into_iter().flatten().chain(self.summary_words());
+        lines.map(|line| format!("{}: {line}", self.name)).collect()
     }
 
     fn cut_words(&self) -> Option<String> {
@@ -167,41 +167,41 @@ impl Account {
 
     fn summary_words(&self) -> Vec<String> {
         let Self { thing, summary, strange, .. } = self;
-        let mut told = Vec::new();
+        let mut lines = Vec::new();
         if summary.trust == Trust::Damaged {
-            told.push(format!(
+            lines.push(format!(
                 "its summary is damaged, so nothing says whether {thing}s are missing; {}",
                 self.intact()
             ));
         }
         match summary.shift {
             0 => {}
-            shift if shift < 0 => told.push(format!("{} bytes were cut out of it", shift.unsigned_abs())),
-            shift => told.push(format!("{shift} bytes were put into it")),
+            shift if shift < 0 => lines.push(format!("{} bytes were cut out of it", shift.unsigned_abs())),
+            shift => lines.push(format!("{shift} bytes were put into it")),
         }
         if summary.gone > 0 {
             let when = summary.gone_ns.map_or(String::new(), |[first, last]| {
                 format!(", messages from {} s to {} s", first as f64 / 1e9, last as f64 / 1e9)
             });
-            told.push(format!(
+            lines.push(format!(
                 "{} of the {} chunks that its summary lists are not there{when}",
                 summary.gone, summary.listed
             ));
         }
         match self.counts {
-            Some([counted, read]) if counted < read => told
+            Some([counted, read]) if counted < read => lines
                 .push(format!("{read} {thing}s were read, and its summary counts {counted}: some may be there twice")),
             // Said with the damage.
             Some([counted, read]) if counted > read && self.places == 0 => {
-                told.extend(self.missing().map(|words| format!("{words}, {}", self.intact())));
+                lines.extend(self.missing().map(|words| format!("{words}, {}", self.intact())));
             }
             _ => {}
         }
         if *strange > 0 {
-            told.push(format!(
+            lines.push(format!(
                 "{strange} records of other programs were passed over, and no summary says whether they hold {thing}s"
             ));
         }
-        told
+        lines
     }
 }

@@ -16,7 +16,7 @@ pub struct WantedTopics<'a> {
     pub topics: &'a [String],
     /// The types that their messages may have, such as `sensor_msgs/msg/JointState`.
     pub kinds: &'a [&'a str],
-    /// The type of which several topics are read together; of others, one is.
+    /// The type whose topics are read together, if there are several; of other types one topic is read.
     pub merged: Option<&'a str>,
 }
 
@@ -161,7 +161,7 @@ fn topics_of(files: &[PathBuf]) -> Result<Topics> {
     for file in files {
         let mut reader = Reader::open_any(file)?;
         if !reader.has_summary {
-            // Channels are told where their first messages are.
+            // Channels are described at their first messages.
             while reader.next_message()?.is_some() {}
         }
         if reader.channels.is_empty() && !reader.has_end() {

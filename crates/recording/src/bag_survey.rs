@@ -53,7 +53,7 @@ impl BagSurvey {
     ///
     /// # Errors
     /// It cannot be read, or is not a bag in MCAP.
-    pub fn of(path: &Path, mut progress: impl FnMut(f64)) -> Result<Self> {
+    pub fn read(path: &Path, mut progress: impl FnMut(f64)) -> Result<Self> {
         let files = bag_files(path)?;
         let mut survey = Self { files: files.len(), ..Self::default() };
         let mut topics: BTreeMap<(String, String), SurveyedTopic> = BTreeMap::new();

@@ -234,7 +234,7 @@ impl Chunks {
             compression => Some(unpack::unpacked(compression, packed, size)?),
         };
         let records = unpacked.as_deref().unwrap_or(packed);
-        // The format lets a checksum be 0 for none; then nothing could be told from damage, and our own have one.
+        // The format lets a checksum be 0 for none; then damage could not be detected, and our own files have one.
         let is_whole = crc == 0 && self.takes_unchecked || crc32fast::hash(records) == crc;
         (records.len() as u64 == size && is_whole).then_some((records.len(), unpacked))
     }

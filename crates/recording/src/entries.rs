@@ -31,13 +31,13 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    /// That of frames.
+    /// The channel of frames.
     pub(super) fn of_frames() -> Self {
         Self { schema: 0, topic: FRAMES.to_owned(), encoding: "protobuf".to_owned(), taxels: None, world: None }
     }
 }
 
-/// What stands before all else in a recording.
+/// What precedes all else in a recording.
 pub(super) struct Preface {
     /// The ids of a frame's values, in their order.
     pub(super) taxels: Vec<u32>,

@@ -1,4 +1,4 @@
-//! A recording being read: what is whole in the file, in its order; what is not is counted and told.
+//! Reads a recording: what is whole in the file, in its order. The rest is counted and reported.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -66,13 +66,13 @@ impl Reader {
         let path = path.as_ref();
         let name = path.display().to_string();
         let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-        Self::of(&name, file).map_err(|e| e.at(path))
+        Self::from_file(&name, file).map_err(|e| e.at(path))
     }
 
-    fn of(name: &str, file: File) -> Result<Self, Refusal> {
+    fn from_file(name: &str, file: File) -> Result<Self, Refusal> {
         let (mut reader, head) = Self::begin(name, file, "frame")?;
         if reader.chunks.summary.trust != Trust::Checked {
-            // What stands before the chunks has no checksum, and the first of them says the same.
+            // The records before the chunks have no checksum, and the first chunk repeats them.
             reader.left = reader.chunks.next(&mut reader.chunk, &mut reader.account)?.unwrap_or_default();
             reader.learn_chunk();
         }
@@ -114,11 +114,11 @@ impl Reader {
 
     /// Reads the summary, and what comes before the first chunk. `thing` is what is read.
     fn begin(name: &str, file: File, thing: &'static str) -> Result<(Self, Head), Refusal> {
-        let mut records = Records::of(file)?.map_err(|first| Refusal::Wrong(not_mcap(&first)))?;
+        let mut records = Records::from_file(file)?.map_err(|first| Refusal::Wrong(not_mcap(&first)))?;
         let mut summary = Summary::read(&mut records)?;
         let mut head = Head::read(&mut records, &summary)?;
         records.go_to(8)?;
-        // Each channel is told in the first chunk that has it; should that be damaged, others still make sense.
+        // The first chunk that uses a channel describes it; if that is damaged, the others still make sense.
         let (channels, schemas) = (std::mem::take(&mut summary.channels), std::mem::take(&mut summary.schemas));
         let listed = summary.attached.take();
         let counted = summary.statistics.as_ref().map_or(0, |statistics| statistics.attachments as usize);

@@ -97,7 +97,7 @@ impl Recorder {
             pending: false,
             worth_keeping: false,
         };
-        // Outside of any chunk and before all else: what every frame's meaning hangs on.
+        // Outside of any chunk and before all else: every frame depends on it.
         let preface = [
             (TAXEL_IDS, recorder.taxels.clone()),
             (FRAMES_CHANNEL, FIRST_CHANNEL.to_string()),

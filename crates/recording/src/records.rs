@@ -17,7 +17,7 @@ const END: u64 = HEAD + FOOTER + 8;
 const FOOTER: u64 = 20;
 
 /// Bytes of a record that tell whether it is what its kind says; names are shorter.
-const TOLD: u64 = 4096;
+const PROBED: u64 = 4096;
 
 /// A record whose body is still to be read, or passed over.
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +72,7 @@ pub(super) struct Records<R> {
 
 impl Records<File> {
     /// The file's records; what it begins with where that is not as MCAP does.
-    pub(super) fn of(file: File) -> io::Result<Result<Self, Vec<u8>>> {
+    pub(super) fn from_file(file: File) -> io::Result<Result<Self, Vec<u8>>> {
         let length = file.metadata()?.len();
         Self::new(file, length)
     }
@@ -121,9 +121,9 @@ impl<R: Read + Seek> Records<R> {
 
     /// Passes over the body of `record`, which was next. `false` where it is not what its kind says.
     pub(super) fn pass(&mut self, record: Record) -> io::Result<bool> {
-        let mut told = Vec::new();
-        self.body(record, TOLD, &mut told)?;
-        Ok(is_plausible(record, &told))
+        let mut beginning = Vec::new();
+        self.body(record, PROBED, &mut beginning)?;
+        Ok(is_plausible(record, &beginning))
     }
 
     /// Passes over `count` bytes.
@@ -156,9 +156,9 @@ impl<R: Read + Seek> Records<R> {
     /// Whether a chunk's record begins at `at` that has `length` bytes with its head.
     pub(super) fn has_chunk(&mut self, at: u64, length: u64) -> io::Result<bool> {
         let bytes = self.bytes(at, at.saturating_add(HEAD))?;
-        let Some((&kind, told)) = bytes.split_first() else { return Ok(false) };
-        let told = told.try_into().map(u64::from_le_bytes);
-        Ok(kind == op::CHUNK && length >= HEAD && told.is_ok_and(|told| told == length - HEAD))
+        let Some((&kind, rest)) = bytes.split_first() else { return Ok(false) };
+        let stated = rest.try_into().map(u64::from_le_bytes);
+        Ok(kind == op::CHUNK && length >= HEAD && stated.is_ok_and(|stated| stated == length - HEAD))
     }
 
     /// The end of the file; `None` where it has none.
@@ -175,10 +175,10 @@ impl<R: Read + Seek> Records<R> {
     }
 }
 
-/// Whether what `record` begins with, `told`, has the parts that its kind says, and these its length.
-fn is_plausible(record: Record, told: &[u8]) -> bool {
-    let mut parts = Parts(told);
-    let rest = |parts: &Parts<'_>| record.length - (told.len() - parts.0.len()) as u64;
+/// Whether `beginning`, the first bytes of `record`, has the parts of its kind, and these fit its length.
+fn is_plausible(record: Record, beginning: &[u8]) -> bool {
+    let mut parts = Parts(beginning);
+    let rest = |parts: &Parts<'_>| record.length - (beginning.len() - parts.0.len()) as u64;
     let fits = (|| {
         Some(match record.kind {
             op::HEADER => {
@@ -212,7 +212,7 @@ fn is_plausible(record: Record, told: &[u8]) -> bool {
             }
             op::DATA_END => record.length == 4,
             // One of another program, if it is not a chunk whose kind is damaged.
-            0x80.. => !is_plausible(Record { kind: op::CHUNK, ..record }, told),
+            0x80.. => !is_plausible(Record { kind: op::CHUNK, ..record }, beginning),
             _ => false,
         })
     })();

@@ -1,4 +1,4 @@
-//! What the messages are made of, told in the file itself, so that any viewer can read them: Protocol Buffers' own
+//! The schemas of the messages, written into the file itself, so that any viewer can read them: Protocol Buffers' own
 //! descriptors, made from the tables below. Those of package `foxglove` are the well-known ones that viewers draw.
 
 use super::proto::Writer;

@@ -143,7 +143,7 @@ impl Summary {
 
 /// Where the summary begins, and its bytes, if they are whole.
 fn find<R: Read + Seek>(records: &mut Records<R>, footer: &Footer) -> io::Result<Option<(u64, Vec<u8>)>> {
-    // Where bytes were cut out or put in, it is elsewhere: before its offsets, of which there are few.
+    // If bytes were cut out or put in, it is elsewhere: before its offsets, which are few.
     let before_offsets = footer.offsets.checked_sub(footer.summary);
     let moved = (1..=MAX_GROUPS).filter_map(|groups| {
         footer.at.checked_sub(groups * OFFSET_BYTES).and_then(|offsets| offsets.checked_sub(before_offsets?))
@@ -162,7 +162,7 @@ fn find<R: Read + Seek>(records: &mut Records<R>, footer: &Footer) -> io::Result
     Ok(None)
 }
 
-/// What a summary lists, as it stands there.
+/// What a summary lists, as written.
 #[derive(Default)]
 struct Listed {
     chunks: Vec<ListedChunk>,

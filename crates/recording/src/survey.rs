@@ -116,7 +116,7 @@ impl Survey {
     ///
     /// # Errors
     /// The file cannot be read, or is compressed.
-    pub fn of(reader: &mut Reader, mut progress: impl FnMut(f64)) -> Result<Self> {
+    pub fn read(reader: &mut Reader, mut progress: impl FnMut(f64)) -> Result<Self> {
         let mut survey = Self::default();
         let mut counts: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
         let mut frame = Frame::default();

@@ -103,7 +103,7 @@ impl Error {
         Self { kind, place: None, what, cause: None }
     }
 
-    /// The same error, told to be at `place` (a file, a row, a key). Called again, the outer place comes first.
+    /// The same error at `place` (a file, a row, a key). Called again, the outer place comes first.
     #[must_use]
     pub fn at(mut self, place: impl fmt::Display) -> Self {
         self.place = Some(match self.place.take() {
@@ -204,7 +204,7 @@ pub fn suggestion<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> 
     }
 }
 
-/// What to say of `asked`, which is no `what` among the `known` names: what it is called now, or what to try instead.
+/// The message about `asked`, which is not a `what` among the `known` names: its new name, or what to try instead.
 #[must_use]
 pub fn unknown<'a>(what: &str, asked: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();

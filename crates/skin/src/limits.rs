@@ -131,7 +131,7 @@ pub fn read_to_string(path: impl AsRef<Path>, most: u64) -> io::Result<String> {
     })
 }
 
-/// The file at `path`, of which at most `most` bytes can be read.
+/// The file at `path`; at most `most` bytes of it can be read.
 ///
 /// # Errors
 /// As [`read`].

@@ -1,4 +1,4 @@
-//! What was called otherwise before: whoever gives an old name is told the new one. `CHANGELOG.md` has the same table.
+//! Old names: an error about an old name gives the new one. `CHANGELOG.md` has the same table.
 
 /// Old names and what they are now, flags without their `--`; `*` is the rest of a name. What one name stood for may be called by
 /// several now: which of them is meant follows from what is known where it is given.

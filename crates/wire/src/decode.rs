@@ -334,7 +334,7 @@ fn from_board(packet: &[u8]) -> Option<Event<'_>> {
         }
         _ => {
             let &[request, command, status, v0, v1, v2, v3] = body else { return None };
-            let status = Status::of(status);
+            let status = Status::from_byte(status);
             let answer = Answer { request, command, status, value: u32::from_le_bytes([v0, v1, v2, v3]) };
             Some(Event::Answer { head, order, answer })
         }

@@ -198,7 +198,7 @@ impl Status {
         }
     }
 
-    pub(super) const fn of(byte: u8) -> Self {
+    pub(super) const fn from_byte(byte: u8) -> Self {
         match byte {
             0 => Self::Done,
             1 => Self::Unknown,

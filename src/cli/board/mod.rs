@@ -178,7 +178,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 
     let mut feed = None;
     let (mut row, mut before, mut readings) = (0, Duration::ZERO, vec![None; play.taxels.len()]);
-    let (mut ending, mut told_again, mut pulled_at): (Option<Duration>, _, _) = (None, Duration::ZERO, Duration::ZERO);
+    let (mut ending, mut report_at, mut pulled_at): (Option<Duration>, _, _) = (None, Duration::ZERO, Duration::ZERO);
     while !stop.load(Ordering::Relaxed) {
         let now = start.elapsed();
         if ending.is_none() {
@@ -214,10 +214,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         {
             break;
         }
-        if ending.is_some() && now >= told_again {
+        if ending.is_some() && now >= report_at {
             // Who listens learns how many frames there were; more than once, as its line may be bad.
             stations.iter_mut().for_each(|station| station.board.finish(now));
-            told_again = now + FINAL_REPORT_INTERVAL;
+            report_at = now + FINAL_REPORT_INTERVAL;
         }
         pty::wait(stations.iter().filter_map(|station| station.plug.as_ref()), TIME_STEP);
     }

@@ -8,7 +8,7 @@ use somatic::internal::gains::{GainsEstimate, GainsSurvey};
 use somatic::internal::limits::{self, MAX_TOML_BYTES};
 use somatic::internal::run::left_out;
 use somatic::internal::setup::bodies::in_body;
-use somatic::internal::survey::gains::{layer_under, spread, untold_spread, with_gains};
+use somatic::internal::survey::gains::{layer_under, spread, spread_without_gain, with_gains};
 use somatic::source::{SourceSpec, VendorOptions};
 use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 
@@ -100,17 +100,17 @@ pub(super) fn calibrate(
 }
 
 /// The ids of taxels without a gain.
-fn untold(ids: &[u32], estimate: &GainsEstimate) -> Vec<u32> {
+fn taxels_without_gain(ids: &[u32], estimate: &GainsEstimate) -> Vec<u32> {
     ids.iter().zip(&estimate.gains).filter(|(_, gain)| gain.is_none()).map(|(id, _)| *id).collect()
 }
 
 fn table_of(ids: &[u32], estimate: &GainsEstimate, from: &Path) -> String {
-    let told = estimate.gains.iter().flatten().count();
+    let estimated = estimate.gains.iter().flatten().count();
     let mut table = plain(["", "found"], 0..0);
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     for row in [
         ["touches", &count(estimate.touches as u64, "frame")],
-        ["gains", &format!("of {told} of {} taxels; they differ by {}", ids.len(), percent(spread(estimate)))],
+        ["gains", &format!("of {estimated} of {} taxels; they differ by {}", ids.len(), percent(spread(estimate)))],
         ["left", &format!("{} between taxels and contacts", percent(estimate.left))],
         ["width", &format!("{:.2} mm, of layer and contacts together", estimate.width_m * 1e3)],
         ["sigma_m", &format!("{:.2} mm", estimate.sigma_m * 1e3)],
@@ -127,13 +127,13 @@ fn table_of(ids: &[u32], estimate: &GainsEstimate, from: &Path) -> String {
         );
         text += &format!("{}\n", bullet(&what));
     }
-    let untold = untold(ids, estimate);
-    if !untold.is_empty() {
-        let listed = untold.iter().take(12).map(ToString::to_string).collect::<Vec<_>>().join(", ");
-        let more = if untold.len() > 12 { ", …" } else { "" };
+    let without_gain = taxels_without_gain(ids, estimate);
+    if !without_gain.is_empty() {
+        let listed = without_gain.iter().take(12).map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        let more = if without_gain.len() > 12 { ", …" } else { "" };
         let what = format!(
             "taxels {listed}{more} were pressed too seldom: they keep their gains, each with a gain_spread of {}; touch there, too",
-            percent(untold_spread(estimate))
+            percent(spread_without_gain(estimate))
         );
         text += &format!("{}\n", bullet(&what));
     }

@@ -102,14 +102,14 @@ impl Contacts {
     }
 
     pub(super) fn as_json(&self) -> Vec<Value> {
-        let of = |field: &FieldContacts| {
+        let json_of = |field: &FieldContacts| {
             json!({
                 "field": field.name, "contacts": field.contacts, "longest": field.longest_s,
                 "stance": field.stance_s(), "load_mean": field.load_mean(), "load_peak": field.load_peak,
                 "load_unit": if field.is_force { "N" } else { field.quantity.symbol() },
             })
         };
-        self.fields.iter().filter(|field| field.contacts > 0).map(of).collect()
+        self.fields.iter().filter(|field| field.contacts > 0).map(json_of).collect()
     }
 
     /// A table of the fields that are touched.

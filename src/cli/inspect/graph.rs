@@ -7,7 +7,7 @@ use somatic::body::Body;
 use somatic::internal::field::TaxelGraph;
 use somatic::internal::touch::{Reading, Skin};
 
-/// Neighbours of a taxel of which it has fewer at the end of the skin only.
+/// A taxel has fewer neighbours than this only at the edge of the skin.
 const FEW: usize = 3;
 
 /// Most islands that are named, and most ids.
@@ -55,10 +55,10 @@ impl SkinGraph {
         let mut lines = vec![("edges", text)];
         let several: Vec<&Vec<u32>> = self.islands.iter().filter(|island| island.len() > 1).collect();
         if several.len() > 1 {
-            let told: Vec<String> = several.iter().take(MAX_ISLANDS).map(|island| name(body, island)).collect();
-            let more = several.len() - told.len();
+            let names: Vec<String> = several.iter().take(MAX_ISLANDS).map(|island| name(body, island)).collect();
+            let more = several.len() - names.len();
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            lines.push(("islands", format!("{}: {}{more}", several.len(), told.join(", "))));
+            lines.push(("islands", format!("{}: {}{more}", several.len(), names.join(", "))));
         }
         if !alone.is_empty() {
             lines.push(("alone", format!("{}, without an edge", shown(&alone))));

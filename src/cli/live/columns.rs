@@ -35,7 +35,7 @@ impl PrintedUnit {
     /// Of fields that measure different things.
     pub(in crate::cli) const SI: Self = Self { factor: 1.0, name: "SI" };
 
-    pub(in crate::cli) fn of(quantity: Quantity) -> Self {
+    pub(in crate::cli) fn for_quantity(quantity: Quantity) -> Self {
         match quantity {
             Quantity::Count => Self { factor: 1.0, name: "" },
             Quantity::Pascal => Self { factor: 1e-3, name: "kPa" },
@@ -213,8 +213,13 @@ mod tests {
     fn every_row_fits_whatever_the_width() {
         for width in 0..200 {
             for longest in [1, 8, 30] {
-                let layout =
-                    Layout::new(longest, Outputs::all(), Some("world"), width, PrintedUnit::of(Quantity::Pascal));
+                let layout = Layout::new(
+                    longest,
+                    Outputs::all(),
+                    Some("world"),
+                    width,
+                    PrintedUnit::for_quantity(Quantity::Pascal),
+                );
                 let headings = console::measure_text_width(&layout.headings());
                 assert!(headings <= width.max(5) || layout.columns.is_empty(), "{width}: {headings}");
             }
@@ -223,8 +228,9 @@ mod tests {
 
     #[test]
     fn what_was_not_asked_for_has_no_column_and_a_wide_terminal_has_all() {
-        let headings =
-            |outputs, width| Layout::new(10, outputs, None, width, PrintedUnit::of(Quantity::Pascal)).headings();
+        let headings = |outputs, width| {
+            Layout::new(10, outputs, None, width, PrintedUnit::for_quantity(Quantity::Pascal)).headings()
+        };
         assert!(!headings(Outputs::TOTAL, 200).contains("angle"));
         assert!(
             headings(Outputs::all(), 200).contains("peak kPa") && headings(Outputs::all(), 200).contains("force N")

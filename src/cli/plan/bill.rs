@@ -50,7 +50,7 @@ pub(super) struct Measured {
 }
 
 impl Bill {
-    pub(super) fn of(asked: &Setup, input: Option<&Input>, body: &Body) -> Result<Self> {
+    pub(super) fn for_run(asked: &Setup, input: Option<&Input>, body: &Body) -> Result<Self> {
         let recorded = input.filter(|input| input.is_recording());
         let gather = recorded.is_some() && asked.playback_speed.is_none();
         let batch = asked.batch.map_or(if gather { RECORDED_BATCH } else { 1 }, |batch| batch as usize);
@@ -90,7 +90,9 @@ impl Bill {
         }
         #[cfg(feature = "zenoh")]
         let network = match engines.last_mut() {
-            Some(engine) => super::network::Network::of((asked, body), engine, &played.calls, recorded.is_some())?,
+            Some(engine) => {
+                super::network::Network::for_calls((asked, body), engine, &played.calls, recorded.is_some())?
+            }
             None => None,
         };
         let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;

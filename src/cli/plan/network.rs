@@ -15,8 +15,8 @@ pub(super) struct Network {
 }
 
 impl Network {
-    /// On `body`, of `calls`, which `engine` makes percepts of, if they go over a network. Whether their times are real is `is_recorded`.
-    pub(super) fn of(
+    /// What `calls` on `body` send after `engine` has made percepts of them; `None` without a network. `is_recorded`: their times are real.
+    pub(super) fn for_calls(
         (asked, body): (&Setup, &Body),
         engine: &mut Engine,
         calls: &[Vec<Frame>],
@@ -26,7 +26,7 @@ impl Network {
             return Ok(None);
         }
         let names = FieldNames::all_of(engine.plan());
-        let skin = SkinNames::of(body, engine.plan());
+        let skin = SkinNames::for_plan(body, engine.plan());
         let frame_bytes = limb_frame_bytes(engine.plan()) as f64;
         let (mut bytes, mut frames) = (0, 0);
         for call in calls {

@@ -120,7 +120,7 @@ impl Flags {
             bar.show(source.progress().unwrap_or(0.0));
             source.next_frame(&mut frame).map(|is_there| is_there.then_some(frame)).transpose()
         });
-        let moments = Moments::of(&mut engine, body, times, &input.name, frames)?;
+        let moments = Moments::compute(&mut engine, body, times, &input.name, frames)?;
         source.notices().iter().for_each(|notice| say(notice));
         let mut bar = Bar::new("drawing");
         let progress = |share| {

@@ -84,7 +84,7 @@ impl Console {
         doubts.iter().flat_map(|doubts| doubts.of_frames(plan)).for_each(|doubt| say(&doubt));
     }
 
-    /// Takes the table away, and closes the lines, whose losses are those of the run. The doubts are still to be told.
+    /// Removes the table, and closes the lines, whose losses are those of the run. The doubts are not reported yet.
     ///
     /// # Errors
     /// No board was heard.
@@ -96,7 +96,7 @@ impl Console {
         Ok(self.doubts)
     }
 
-    /// After an error: what was said of the lines tells why.
+    /// After an error: prints the messages about the lines, which say why.
     pub(super) fn leave(self) {
         let Self { view, live, .. } = self;
         drop(view);

@@ -45,7 +45,7 @@ impl Prepared {
         lasts: Option<&str>,
     ) -> Result<Self> {
         let body = input.body(asked)?;
-        // Why a body without a layout cannot be run is said once, by the error.
+        // The error alone says why a body without a layout cannot be run.
         let has_layout = !(body.taxels.is_empty() && body.fields.is_empty());
         for finding in body.findings.iter().filter(|_| !asked.quiet && has_layout) {
             say(&format!("{}: {finding}", body.name));
@@ -54,7 +54,7 @@ impl Prepared {
         if summary.is_some() && !input.is_merged() {
             return Err(Error::usage("--summary is for boards on serial lines; add --source serial:PORT"));
         }
-        let pace = Pace::of(asked, input, input.is_bundled() && at_terminal);
+        let pace = Pace::for_input(asked, input, input.is_bundled() && at_terminal);
         let mut chosen = None;
         let opened = Opened::new(asked, input, body, pace, |body| {
             let Settled { options, why, .. } = settled(asked, Some(input), body, pace.batch)?;

@@ -131,7 +131,7 @@ fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) ->
         let wanted = knobs.arithmetic(arithmetic).coverage(coverage);
         (kind == BackendKind::Auto || kind == combination.backend) && other == wanted
     };
-    let fastest = report.of(way).into_iter().find(alike);
+    let fastest = report.measurements(way).into_iter().find(alike);
     let Some(row) = fastest else { return Settled { options, why: None, measured: None } };
     let measured = Some(format!("{}; {when}", in_words(row)));
     let Ok(combination) = row.combination() else { return Settled { options, why: None, measured } };
@@ -142,13 +142,13 @@ fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) ->
     Settled { options: options.backend(combination.backend), why, measured }
 }
 
-/// Whether its arithmetic is what its backend has unless told otherwise.
+/// Whether its arithmetic is the default of its backend.
 fn is_usual(combination: &Combination) -> bool {
     use somatic::scene::Arithmetic;
     combination.backend == BackendKind::Reference || combination.knobs.arithmetic == Some(Arithmetic::OnePass)
 }
 
-/// The coverage that stands for `auto` among those that are measured.
+/// The measured coverage that `auto` becomes.
 fn usual_coverage(combination: &Combination, way: CallMode) -> Coverage {
     let gated = combination.backend == BackendKind::Cpu && way == CallMode::Live;
     if gated { Coverage::All } else { combination.knobs.coverage }

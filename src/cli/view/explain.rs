@@ -115,7 +115,7 @@ impl<'a> Answering<'a> {
     fn explain(&mut self, field: usize, frame: usize) -> Result<String> {
         self.go_to(frame)?;
         let read = &self.recording.frames[frame..=frame];
-        let recorded = self.differences.of(frame, field);
+        let recorded = self.differences.in_field(frame, field);
         let recorded: Vec<_> = recorded.into_iter().map(|other| (other.column, other.recorded)).collect();
         let explained = explanation(&mut self.engine, read, field, (&self.recording.taxels, &self.ids), &recorded);
         self.done = frame + 1;

@@ -108,7 +108,7 @@ const HIDDEN: [&str; 12] = [
 struct Opening<'a> {
     arguments: &'a Arguments,
     listen: Listen,
-    /// When to stop, if not when told to.
+    /// When to stop by itself.
     until: Option<Instant>,
 }
 

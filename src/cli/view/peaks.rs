@@ -23,14 +23,14 @@ pub(super) struct Peaks {
 }
 
 struct Known {
-    /// Parts of which every frame was seen.
+    /// Parts whose frames have all been seen.
     parts: Vec<Vec<f32>>,
     /// The part that is being filled, and its frames so far.
     filling: (Vec<f32>, usize),
 }
 
 impl Peaks {
-    /// Of `recording` on `body`, of which nothing is known.
+    /// For `recording` on `body`, with no part known.
     pub(super) fn new(body: &Body, recording: &Recording) -> Self {
         let index_of: HashMap<u32, usize> = body.taxels.iter().enumerate().map(|(at, taxel)| (taxel.id, at)).collect();
         let parts = (MAX_VALUES / body.taxels.len().max(1)).clamp(1, MAX_PARTS);

@@ -35,7 +35,7 @@ pub(super) struct Different {
 
 impl Differences {
     /// The recorded quantities that differ in a field of a frame.
-    pub(super) fn of(&self, frame: usize, field: usize) -> Vec<Different> {
+    pub(super) fn in_field(&self, frame: usize, field: usize) -> Vec<Different> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get(&(frame, field)).cloned().unwrap_or_default()
     }
 

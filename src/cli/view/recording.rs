@@ -11,7 +11,7 @@ use super::super::stdio::say;
 
 /// Frames that are processed in one call.
 pub(super) const CHUNK: usize = 256;
-/// Values of which a recording is searched for its largest pressure: a second's work.
+/// Most values that are searched for a recording's largest pressure: a second's work.
 const MAX_SEARCHED: usize = 20_000_000;
 /// Time for which a frame is shown in bins after its own at most, s.
 const MAX_HELD_S: f64 = 1.0;
@@ -38,7 +38,7 @@ impl Recording {
         let taxels = source.taxels().to_vec();
         let (mut frames, mut latest_s) = (Vec::new(), Vec::new());
         let started = std::time::Instant::now();
-        let mut told = 0;
+        let mut shown_s = 0;
         loop {
             let mut frame = Frame::missing(0.0, taxels.len());
             let is_there = source.next_frame(&mut frame)?;
@@ -53,8 +53,8 @@ impl Recording {
                     return Ok(None);
                 }
                 let seconds = started.elapsed().as_secs();
-                if let Some(progress) = source.progress().filter(|_| !quiet && seconds > told) {
-                    told = seconds;
+                if let Some(progress) = source.progress().filter(|_| !quiet && seconds > shown_s) {
+                    shown_s = seconds;
                     say(&format!("reading: {:.0} %", 100.0 * progress));
                 }
             }

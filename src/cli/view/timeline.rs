@@ -33,7 +33,7 @@ struct Known {
 }
 
 impl Timeline {
-    /// Of a recording of which nothing has been computed.
+    /// For a recording before anything has been computed.
     pub(super) fn new(recording: &Recording) -> Self {
         let [start_s, end_s] = recording.span_s();
         let known = Mutex::new(Known { until_s: start_s, peaks: vec![None; BINS], differing: None });
@@ -114,7 +114,7 @@ fn pass(
     let mut engine = shared.engine()?;
     let (mut done, mut first_bin) = (0, 0);
     let mut state_at_s = timeline.start_s;
-    let mut told = Instant::now();
+    let mut sent_at = Instant::now();
     for frames in recording.frames.chunks(CHUNK) {
         let percepts = engine.process(frames)?;
         timeline.add(percepts, recording, done);
@@ -129,8 +129,8 @@ fn pass(
             state_at_s = now_s;
             checkpoints.push(engine.state()?);
         }
-        if told.elapsed() >= INTERVAL || done == recording.frames.len() {
-            told = Instant::now();
+        if sent_at.elapsed() >= INTERVAL || done == recording.frames.len() {
+            sent_at = Instant::now();
             replies.all(timeline.message(first_bin));
             first_bin = timeline.bin(now_s);
         }

@@ -29,8 +29,8 @@ impl ChartNotes {
         }
         let mut rest: Vec<&(String, NoChart, bool)> = self.bare.iter().collect();
         while let Some(&(_, why, is_parent)) = rest.first() {
-            let kind = (Kind::of(why), *is_parent);
-            let (alike, others) = rest.into_iter().partition(|one| (Kind::of(&one.1), one.2) == kind);
+            let kind = (Kind::from_reason(why), *is_parent);
+            let (alike, others) = rest.into_iter().partition(|one| (Kind::from_reason(&one.1), one.2) == kind);
             let alike: Vec<&(String, NoChart, bool)> = alike;
             rest = others;
             let advice = match kind {
@@ -76,7 +76,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(why: &NoChart) -> Self {
+    fn from_reason(why: &NoChart) -> Self {
         match why {
             NoChart::SeveralLinks(_) => Self::Links,
             NoChart::NoSurface => Self::Surface,

@@ -219,7 +219,7 @@ impl Grouper<'_> {
             Some(((taxel.position_in_link, taxel.normal_in_link), DVec2::from_array(member.uv?)))
         };
         let (members, places): (Vec<_>, Vec<_>) = unrolled.members.iter().filter_map(of_member).unzip();
-        Distortion::of(&members, &places).largest
+        Distortion::measure(&members, &places).largest
     }
 
     /// The taxels of a field that is on one half of a mirrored layout, or their images, whichever are on the left; ascending.
@@ -236,7 +236,7 @@ impl Grouper<'_> {
         taxels
     }
 
-    /// `whole` in parts that are the mirror images of others, of which `on_left` has the taxels on the left: without a chart where
+    /// `whole` in parts that mirror those of the other side; `on_left` has their taxels on the left. A part has no chart if
     /// this side has none.
     fn parts_like(
         &mut self,
@@ -281,7 +281,7 @@ impl Grouper<'_> {
         taxels: &[usize],
         most: usize,
     ) -> Option<Vec<FieldSpec>> {
-        let halves = self.halves.of(taxels);
+        let halves = self.halves.split(taxels);
         if halves.iter().all(|half| !half.is_empty()) {
             // A mirrored layout is divided where it is mirrored.
             let mut parts = Vec::new();

@@ -63,7 +63,7 @@ impl Grouper<'_> {
         Ok(chosen)
     }
 
-    /// The taxels with the ids in `lists`, each of which has one at least: indices into the body's taxels, ascending.
+    /// The taxels with the ids in `lists`, as indices into the body's taxels, ascending. Each list has at least one.
     pub(super) fn listed(&self, lists: &[Ids]) -> Result<Vec<usize>> {
         let taxels = &self.body.taxels;
         let mut ranges = Vec::with_capacity(lists.len());
@@ -92,15 +92,15 @@ impl Grouper<'_> {
 
     /// Keeps the taxels of the rule's modality; by default pressure taxels if there are any, unless the rule lists ids.
     fn keep_modality(&self, rule: &FieldRule, chosen: &mut Vec<usize>) -> Result<()> {
-        let of = |taxel: usize| self.body.taxels[taxel].modality;
+        let modality = |taxel: usize| self.body.taxels[taxel].modality;
         if let Some(wanted) = &rule.modality {
             let names: BTreeSet<String> = self.body.taxels.iter().map(|t| t.modality.name()).collect();
             if !names.contains(wanted) {
                 return Err(unknown("modality", wanted, "modality of its taxels", names.iter().map(String::as_str)));
             }
-            chosen.retain(|&taxel| of(taxel).name() == *wanted);
-        } else if rule.taxels.is_none() && chosen.iter().any(|&taxel| of(taxel) == Modality::Pressure) {
-            chosen.retain(|&taxel| of(taxel) == Modality::Pressure);
+            chosen.retain(|&taxel| modality(taxel).name() == *wanted);
+        } else if rule.taxels.is_none() && chosen.iter().any(|&taxel| modality(taxel) == Modality::Pressure) {
+            chosen.retain(|&taxel| modality(taxel) == Modality::Pressure);
         }
         Ok(())
     }

@@ -118,7 +118,7 @@ impl Grouper<'_> {
         chosen: &[usize],
         mut divide: impl FnMut(&mut Self, &[usize]) -> Vec<Vec<usize>>,
     ) -> Vec<Vec<usize>> {
-        let [left, right] = self.halves.of(chosen);
+        let [left, right] = self.halves.split(chosen);
         if right.is_empty() {
             return divide(self, chosen);
         }

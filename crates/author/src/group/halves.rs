@@ -12,7 +12,7 @@ pub(super) struct Halves {
 }
 
 impl Halves {
-    /// Those of `body` with the ids `pairs`, each the left one and the right one.
+    /// The halves of `body`; `pairs` are ids of its taxels, each the left one and the right one.
     pub(super) fn new(body: &Body, pairs: &[[u32; 2]]) -> Self {
         let indices =
             pairs.iter().filter_map(|&[left, right]| Some([body.taxel_index(left)?, body.taxel_index(right)?]));
@@ -34,8 +34,8 @@ impl Halves {
         images
     }
 
-    /// `taxels` on the left, with those that have no image, and those on the right.
-    pub(super) fn of(&self, taxels: &[usize]) -> [Vec<usize>; 2] {
+    /// Splits `taxels` into those on the left, with those that have no image, and those on the right.
+    pub(super) fn split(&self, taxels: &[usize]) -> [Vec<usize>; 2] {
         let (right, left) = taxels.iter().partition(|taxel| self.image_of.get(taxel).is_some_and(|(_, right)| *right));
         [left, right]
     }

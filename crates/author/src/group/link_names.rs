@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::body::Body;
 
-/// The prefix of Mixamo's skeletons, of which some exporters leave out the colon.
+/// The prefix of Mixamo's skeletons; some exporters leave out its colon.
 const MIXAMO: &str = "mixamorig";
 
 /// Per link of `body` the name of its field.

@@ -29,7 +29,7 @@ use crate::recipe_values::{Globs, Ids, Length};
 pub struct FieldRule {
     /// Name of the field, or of what its children stand below.
     pub name: Option<String>,
-    /// The field that the topmost level of its names stands below.
+    /// The parent of the topmost level of its names.
     pub parent: Option<String>,
     /// Fields to apply the rule in.
     pub within: Option<Globs>,

@@ -31,7 +31,7 @@ enum Side {
 
 impl Side {
     /// The side that `normal`, the mean of unit normals in the world, looks to.
-    fn of(normal: DVec3) -> Self {
+    fn from_normal(normal: DVec3) -> Self {
         if normal.length() < LEAST_NORMAL {
             return Self::Around;
         }
@@ -104,7 +104,7 @@ impl Grouper<'_> {
             position += WORLD_FROM_BODY.transform_point3(body_from_link.transform_point3(taxel.position_in_link));
         }
         let count = taxels.len().max(1) as f64;
-        let (side, at) = (Side::of(normal / count), position / count);
+        let (side, at) = (Side::from_normal(normal / count), position / count);
         // The left half of a mirrored layout has the mirror plane on its right, as a left link of a pair has.
         let is_left = match is_right {
             Some(_) => Some(true),

@@ -113,7 +113,7 @@ pub(in super::super) struct SurfaceFit {
 }
 
 impl SurfaceFit {
-    pub(in super::super) fn of(body: &Body, surface_search: &SurfaceSearch<'_>, taxel: &Taxel) -> Option<Self> {
+    pub(in super::super) fn for_taxel(body: &Body, surface_search: &SurfaceSearch<'_>, taxel: &Taxel) -> Option<Self> {
         let body_from_link = body.links[taxel.link].body_from_link;
         let p = body_from_link.transform_point3(taxel.position_in_link);
         let normal = body_from_link.transform_vector3(taxel.normal_in_link);
@@ -139,13 +139,13 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
 
 /// Taxels off the surface, with normals that point inward, and with normals that are not the surface's.
 fn against_surface(body: &Body) -> Vec<Finding> {
-    let surface_search = SurfaceSearch::of(body);
+    let surface_search = SurfaceSearch::from_body(body);
     if surface_search.is_empty() {
         return Vec::new();
     }
     let (mut off, mut inward, mut stale) = (Worst::default(), Worst::default(), Worst::default());
     for taxel in &body.taxels {
-        let Some(fit) = SurfaceFit::of(body, &surface_search, taxel) else { continue };
+        let Some(fit) = SurfaceFit::for_taxel(body, &surface_search, taxel) else { continue };
         if fit.off_m > surface_search.tolerance_m() {
             off.take(taxel, fit.off_m);
         }

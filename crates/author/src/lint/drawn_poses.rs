@@ -21,7 +21,7 @@ pub struct DrawnPoses {
 }
 
 impl DrawnPoses {
-    /// Those of `body` with its own joints, drawn evenly within their limits by a fixed seed. A joint that turns and has no
+    /// Poses of `body` with its own joints, drawn evenly within their limits by a fixed seed. A joint that turns and has no
     /// limits is within ±π, one that slides and has none stays at 0. `None` if it keeps no joints.
     #[must_use]
     pub fn of_own_joints(body: &Body) -> Option<Self> {
@@ -43,8 +43,8 @@ impl DrawnPoses {
         }))
     }
 
-    /// Those of `body` with its own joints; rest alone if it keeps none.
-    pub(crate) fn of(body: &Body) -> Self {
+    /// Poses of `body` with its own joints; rest alone if it keeps none.
+    pub(crate) fn from_body(body: &Body) -> Self {
         Self::of_own_joints(body).unwrap_or_else(|| Self::at_rest(body))
     }
 
@@ -58,7 +58,7 @@ impl DrawnPoses {
         Self { body_from_link: vec![body.links.iter().map(|link| link.body_from_link).collect()] }
     }
 
-    /// Those of `body` that `draw` gives: body_from_link of every link.
+    /// The poses of `body` that `draw` gives: body_from_link of every link.
     pub fn draw(body: &Body, mut draw: impl FnMut(&mut Random) -> Vec<DAffine3>) -> Self {
         let mut random = Random::new(SEED);
         let at_rest = body.links.iter().map(|link| link.body_from_link).collect();

@@ -109,7 +109,7 @@ pub(super) fn find(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn F
         let Some(mut seen) = seen else { continue };
         let taxel = &body.taxels[index];
         if seen.reach == Reach::CoveredAtRest
-            && !shells.of(taxel.link).is_open_at(points[index].position, &surface, &search.directions)
+            && !shells.for_link(taxel.link).is_open_at(points[index].position, &surface, &search.directions)
         {
             seen.reach = Reach::Hidden;
         }
@@ -190,11 +190,11 @@ impl Search<'_> {
 
     /// The mean over every `step`th ray of ways out of `parts` less ways in: how often these wind around `start`.
     fn winding(&self, pose: usize, parts: &[usize], start: DVec3, step: usize) -> f64 {
-        let of = |&direction: &DVec3| {
+        let crossings = |&direction: &DVec3| {
             parts.iter().map(|&part| self.surface.crossings(pose, part, start, direction)).sum::<i64>()
         };
         let rays = self.directions.iter().step_by(step);
-        rays.clone().map(of).sum::<i64>() as f64 / rays.len() as f64
+        rays.clone().map(crossings).sum::<i64>() as f64 / rays.len() as f64
     }
 
     /// The links, neither the taxel's nor next to it, that the start is inside at rest and, with joints, outside in a pose.
@@ -216,7 +216,7 @@ impl Search<'_> {
         links
     }
 
-    /// Whether no other link with a surface is between these two, of which one is above the other; or they are one.
+    /// Whether one of these links is above the other, with no other surface's link between them, or they are the same link.
     fn is_next_to(&self, one: usize, other: usize) -> bool {
         let above = |link: usize| {
             let ancestors = std::iter::successors(self.body.links[link].parent, |&up| self.body.links[up].parent);

@@ -1,4 +1,4 @@
-//! What is said about taxels that nothing can touch.
+//! Findings about taxels that nothing can touch.
 
 use std::collections::BTreeMap;
 
@@ -13,16 +13,17 @@ const MAX_RUNS: usize = 6;
 /// Findings on hidden taxels of `body`, in the poses of its joints if there are any. `progress` gets the share that is done.
 pub(super) fn hidden(body: &Body, poses: Option<&DrawnPoses>, progress: &mut dyn FnMut(f64)) -> Vec<Finding> {
     let seen = find(body, poses, progress);
-    let of = |reach: Reach| seen.checked.iter().filter(|(_, own)| *own == reach).map(|(index, _)| *index).collect();
+    let with_reach =
+        |reach: Reach| seen.checked.iter().filter(|(_, own)| *own == reach).map(|(index, _)| *index).collect();
     let where_looked = match seen.other_poses {
         Some(poses) => format!(" at rest and in {poses} other poses"),
         None => String::new(),
     };
     let mut findings = Vec::new();
-    let hidden: Vec<usize> = of(Reach::Hidden);
+    let hidden: Vec<usize> = with_reach(Reach::Hidden);
     let what = format!("hidden, where nothing can touch them{where_looked}");
     findings.extend(finding(body, &seen, FindingKind::HiddenTaxel, &hidden, &what));
-    let covered: Vec<usize> = of(Reach::CoveredAtRest);
+    let covered: Vec<usize> = with_reach(Reach::CoveredAtRest);
     let what = "covered at rest by another link, so that only another pose can uncover them";
     findings.extend(finding(body, &seen, FindingKind::CoveredAtRest, &covered, what));
     let what = "on faces that point into their own link";

@@ -50,7 +50,7 @@ pub(super) struct PosedSurface<'a> {
 }
 
 impl<'a> PosedSurface<'a> {
-    /// Of `body` in `poses`, the first of which is rest. A vertex of a skinned mesh is at rest where the weights of its joints put it, and
+    /// For `body` in `poses`; the first is rest. A vertex of a skinned mesh is at rest where the weights of its joints put it, and
     /// moves with the heaviest of them.
     pub(super) fn new(body: &Body, poses: &'a DrawnPoses) -> Self {
         let poses = &poses.body_from_link[..];

@@ -34,7 +34,7 @@ impl<'a> ShellsOfLinks<'a> {
         Self { body, known: BTreeMap::new() }
     }
 
-    pub(super) fn of(&mut self, link: usize) -> &Shells {
+    pub(super) fn for_link(&mut self, link: usize) -> &Shells {
         self.known.entry(link).or_insert_with(|| Shells::of_link(self.body, link))
     }
 }

@@ -36,7 +36,7 @@ const MAX_COINCIDENT: usize = 16;
 
 /// Taxels at one place, too near to each other, and too far from all others.
 pub(super) fn findings(body: &Body) -> Vec<Finding> {
-    let spacing = Spacing::of(body);
+    let spacing = Spacing::from_body(body);
     let mut findings = Vec::new();
     findings.extend(spacing.coincident());
     findings.extend(spacing.crowded());
@@ -67,7 +67,7 @@ struct Spacing<'a> {
 }
 
 impl<'a> Spacing<'a> {
-    fn of(body: &'a Body) -> Self {
+    fn from_body(body: &'a Body) -> Self {
         let in_body = |taxel: usize| body.links[body.taxels[taxel].link].body_from_link;
         let all = || 0..body.taxels.len();
         let places: Vec<DVec3> =

@@ -13,7 +13,7 @@ use crate::field::geodesic::barycentric;
 /// where its own link alone would.
 pub(super) fn taxels_at_rest(body: &Body) -> Vec<BodyPoint> {
     let rest: Vec<DAffine3> = body.links.iter().map(|link| link.body_from_link).collect();
-    let skins: Vec<Skin<'_>> = body.surfaces.iter().filter_map(|surface| Skin::of(surface, &rest)).collect();
+    let skins: Vec<Skin<'_>> = body.surfaces.iter().filter_map(|surface| Skin::at_rest(surface, &rest)).collect();
     let point = |taxel: &Taxel| {
         let on_skin = skins.iter().filter_map(|skin| skin.point(taxel));
         let nearest = on_skin.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point);
@@ -38,7 +38,7 @@ struct Skin<'a> {
 }
 
 impl<'a> Skin<'a> {
-    fn of(surface: &'a Surface, rest: &[DAffine3]) -> Option<Self> {
+    fn at_rest(surface: &'a Surface, rest: &[DAffine3]) -> Option<Self> {
         let Home::Skinned { joints, at_rest, .. } = &surface.home else { return None };
         let is_mirrored = is_skin_mirrored(joints, rest);
         Some(Self { surface, joints, at_rest, is_mirrored, index: OnceCell::new() })

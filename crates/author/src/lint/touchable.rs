@@ -25,7 +25,7 @@ pub(crate) struct Touchable<'a> {
 }
 
 impl<'a> Touchable<'a> {
-    /// For `body` in `poses`, the first of which is rest.
+    /// For `body` in `poses`; the first is rest.
     pub(crate) fn new(body: &'a Body, poses: &'a DrawnPoses) -> Self {
         Self { body, surface: PosedSurface::new(body, poses), directions: directions() }
     }

@@ -45,7 +45,7 @@ impl MeshOptions {
         self
     }
 
-    /// The axis that points up in the file of a robot, and what is said where it is not given.
+    /// The axis that points up in a robot's file, and the message if it is not given.
     pub(super) fn robot_up(&self) -> (Up, Option<String>) {
         let assumed = || "the file's z counts as up, its x as forward, as in REP 103; if its y is up, give --up y";
         (self.up.unwrap_or(Up::Z), self.up.is_none().then(assumed).map(str::to_owned))

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::triangles::Triangles;
 use crate::error::{Error, Result, failed};
 
-/// Bytes before the triangles of a binary file, the last four of which are their number.
+/// Bytes before the triangles of a binary file; the last four are the number of triangles.
 const HEADER: usize = 84;
 /// Bytes of a triangle: a normal, three corners, and two bytes that say nothing.
 const TRIANGLE: usize = 50;

@@ -176,7 +176,7 @@ fn read(text: &str, path: &Path, folder: &Path, options: &MeshOptions) -> Result
         return Err(Error::failed(what));
     }
     let document = xml::parse(text)?;
-    Reader { folder, options, lines: Lines::of(&document) }.robot(&document)
+    Reader { folder, options, lines: Lines::from_document(&document) }.robot(&document)
 }
 
 struct Reader<'a> {

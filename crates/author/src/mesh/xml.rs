@@ -127,7 +127,7 @@ impl Tag {
 pub(super) struct Lines(Vec<usize>);
 
 impl Lines {
-    pub(super) fn of(document: &Document<'_>) -> Self {
+    pub(super) fn from_document(document: &Document<'_>) -> Self {
         let ends = document.input_text().bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
         Self(std::iter::once(0).chain(ends).collect())
     }
@@ -173,7 +173,7 @@ mod tests {
     fn a_line_is_that_of_the_parser() {
         let text = "<a>\n <b/>\n\n <c\n d='1'/><e/>\n</a>";
         let document = parse(text).unwrap();
-        let lines = Lines::of(&document);
+        let lines = Lines::from_document(&document);
         for node in document.descendants() {
             assert_eq!(lines.line(node), document.text_pos_at(node.range().start).row, "{node:?}");
         }

@@ -53,7 +53,7 @@ impl SheetGrid {
     }
 
     /// The same with the cells of a mask: a line for each row, with 1 for a cell that is there and 0 or nothing for one that
-    /// is not, between commas, semicolons, tabs or spaces. `name` stands in messages.
+    /// is not, between commas, semicolons, tabs or spaces. Messages use `name`.
     ///
     /// # Errors
     /// It does not have as many rows and columns, or something else than 0 and 1; with the line.

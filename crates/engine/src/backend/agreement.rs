@@ -195,7 +195,7 @@ pub(crate) fn compare_columns(right: &Percept, bound: &CellBound, got: &Percept)
     let mut quantities = BTreeMap::new();
     Cell { quantities: &mut quantities, failure: None }.compare(right, bound, got);
     let compared = |column: &'static Column| {
-        let of = quantities.get(column.name).filter(|of| of.values() > 0)?;
+        let comparison = quantities.get(column.name).filter(|comparison| comparison.values() > 0)?;
         let limit = match (column.measure, bound.centroid) {
             (Measure::Place, Limit::Within([u, v])) => Limit::Within(u.max(v)),
             (Measure::Place, _) => Limit::TooClose,
@@ -206,10 +206,10 @@ pub(crate) fn compare_columns(right: &Percept, bound: &CellBound, got: &Percept)
             value: got.value(column),
             reference: right.value(column),
             bound: if let Limit::Within(bound) = limit { Some(bound) } else { None },
-            verdict: match of {
+            verdict: match comparison {
                 Comparison { too_close: 1.., .. } => Verdict::TooClose,
                 Comparison { not_compared: 1.., .. } => Verdict::NotCompared,
-                _ if of.agreeing == of.compared => Verdict::Agrees,
+                _ if comparison.agreeing == comparison.compared => Verdict::Agrees,
                 _ => Verdict::Differs,
             },
         })
@@ -306,7 +306,7 @@ impl Cell<'_> {
         self.quantity(column.name, right, got, far(limit, right), between);
     }
 
-    /// Coordinates are held to a bound each; what a centroid is off by is the distance, up to √2 times as much.
+    /// Each coordinate has a bound; the error of a centroid is the distance, up to √2 times as much.
     fn centroid_is_apart(&mut self, right: &Percept, bound: &CellBound, got: &Percept) {
         if let (Some(right), Some(got), Limit::Within(_)) = (&right.centroid, &got.centroid, bound.centroid) {
             let comparison = self.quantities.entry(name(Outputs::CENTROID)).or_default();
@@ -453,7 +453,7 @@ mod tests {
         );
     }
 
-    // That each quantity is held to its bound, and each choice to the reference's, is a test of the engine's comparison.
+    // A test of the engine's comparison checks that each quantity keeps its bound, and each choice is the reference's.
     #[test]
     fn what_is_absent_or_no_number_fails() {
         type Change = fn(&mut Percepts, &mut Components<f64>);

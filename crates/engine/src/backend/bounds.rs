@@ -29,7 +29,7 @@ pub(crate) struct CellBound {
 /// What of a field's state may differ after a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct MayRemember {
-    /// Whether there was contact, and where: the rest hangs on that too.
+    /// Whether there was contact, and where: the rest depends on that too.
     pub(crate) contact: bool,
     /// The last centroid that counted.
     pub(crate) filter: bool,
@@ -47,7 +47,7 @@ impl Default for CellBound {
 }
 
 impl CellBound {
-    /// Of a cell of which not even contact is certain, nor are the flags `flags`.
+    /// For a cell whose contact is not certain, nor its flags `flags`.
     fn of_contact(flags: Flags) -> Self {
         Self {
             in_doubt: (Flags::all() - INPUT) | flags,
@@ -57,7 +57,7 @@ impl CellBound {
         }
     }
 
-    /// That of one output but the centroid.
+    /// The limit of one output other than the centroid.
     pub(crate) fn limit(&self, output: Outputs) -> Limit {
         self.limits[output.bits().ilog2() as usize]
     }
@@ -75,7 +75,7 @@ const INPUT: Flags = Flags::SATURATED
     .union(Flags::NO_UNIT)
     .union(Flags::NO_CHART);
 
-/// What a field's next bound hangs on, beside what its next percept does.
+/// What a field's next bound depends on, besides what its next percept depends on.
 #[derive(Clone, Debug, Default)]
 struct Doubt {
     /// How far the centroid of the frame before may be off, as a distance in the unit.
@@ -106,7 +106,7 @@ pub(crate) struct BoundedReference {
     reference: Reference,
     /// Per field, how far what the frame before left may be off in single precision.
     doubts: Vec<Doubt>,
-    /// Those of the last frame, slot by slot.
+    /// The pressures of the last frame, slot by slot.
     pressures: Vec<Pressure>,
 }
 

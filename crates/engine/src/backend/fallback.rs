@@ -157,10 +157,10 @@ mod tests {
         assert_eq!(fallback.name(), "cpu");
         for (call, ((found, notice), (right, _))) in found.iter().zip(&right).enumerate() {
             assert!(found == right, "call {call}");
-            let told = notice.as_deref().unwrap_or_default();
+            let notice = notice.as_deref().unwrap_or_default();
             assert_eq!(
                 (call == 3, call == 3),
-                (told.contains("stopped answering"), told.contains("continues on the CPU"))
+                (notice.contains("stopped answering"), notice.contains("continues on the CPU"))
             );
         }
         // Asked for by name it is an error of its own kind.

@@ -9,7 +9,7 @@ use crate::stage::motion::SHORTEST_STEP_S;
 /// A batch of raw values, frame by frame.
 #[derive(Clone, Copy)]
 pub(crate) struct RawBatch<'a> {
-    /// Where its first frame stands in the percepts.
+    /// The index of its first frame in the percepts.
     pub(crate) first: usize,
     pub(crate) frames: usize,
     pub(crate) rows: Rows<'a>,
@@ -100,7 +100,7 @@ pub(crate) enum Near {
 }
 
 impl Picks {
-    /// For frames of `width` values, of which the channels' are at `channels`; `calibrated` slots are made of them.
+    /// For frames of `width` values, with the channels' values at `channels`; `calibrated` slots are made of them.
     pub(crate) fn new(channels: &[u32], calibrated: usize, width: usize) -> Self {
         let places: Vec<u32> = channels.iter().copied().cycle().take(calibrated).collect();
         // Places beyond are none.

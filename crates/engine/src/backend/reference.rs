@@ -1,4 +1,4 @@
-//! Backend `reference`: the stages' own f64, one cell after the other, and the bounds that the others are held to.
+//! Backend `reference`: the stages' own f64, one cell after the other, and the bounds for the others.
 
 use super::{Backend, BackendState, FieldState, RawBatch, Step};
 use crate::error::Result;
@@ -20,7 +20,7 @@ pub(crate) struct Reference {
     raw_before: Vec<RawValue>,
 }
 
-/// What a field's next percept hangs on.
+/// What a field's next percept depends on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Before {
     pub(super) contact: bool,
@@ -127,7 +127,7 @@ impl Reference {
         (pressures, present)
     }
 
-    /// Makes a cell; what the field's next one hangs on.
+    /// Makes a cell; gives what the field's next one depends on.
     fn cell(&self, index: usize, pressures: &[Pressure], step: &Step, made: &mut Cell<'_>) -> Before {
         let (field, before) = (&self.plan.fields[index], self.before[index]);
         let statuses = self.plan.members_of(field).iter().map(|member| pressures[member.slot as usize].status);

@@ -21,7 +21,7 @@ pub(super) struct Check {
     post: PostState,
     pub(super) right: Percepts,
     pub(super) bounds: Vec<CellBound>,
-    /// Those of the last frame, where percepts may be kept.
+    /// The bounds of the last frame, where percepts may be kept.
     last_bounds: Vec<CellBound>,
     /// By field, how far its position in the last frame may be off, m, where motion in the world is asked for.
     position_off: Vec<f64>,
@@ -115,7 +115,7 @@ impl Check {
         }
     }
 
-    /// Adds the bounds of motion in the world, which hang on those of positions, to `bounds`. `before` is what was kept of each
+    /// Adds the bounds of motion in the world, which depend on the bounds of positions, to `bounds`. `before` is what was kept of each
     /// field's position before this frame.
     fn bound_world_motion(&mut self, dt_s: f64, before: &[world_motion::Memory], bounds: &mut [CellBound]) {
         for (field, bound) in bounds.iter_mut().enumerate() {
@@ -274,8 +274,8 @@ mod tests {
                 let agreement = with(over);
                 assert!(!agreement.holds(), "{backend:?}, {name} over its bound: {agreement}");
                 assert!(agreement.failures[0].contains(&format!(": {name} is")), "{name}: {agreement}");
-                let of = agreement.quantities[name];
-                assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
+                let comparison = agreement.quantities[name];
+                assert_eq!(comparison.compared - comparison.agreeing, 1, "{name}: {agreement}");
             };
             let has_bound = |column: &&Column| column.store != Store::Active;
             for column in COLUMNS.iter().filter(has_bound) {
@@ -305,8 +305,11 @@ mod tests {
                 let mut percepts = compared.engine.percepts.clone();
                 change(&mut percepts);
                 let agreement = compared.with(&percepts);
-                let of = agreement.quantities[name];
-                assert!(!agreement.holds() && of.compared - of.agreeing == 1, "{backend:?}, {name}: {agreement}");
+                let comparison = agreement.quantities[name];
+                assert!(
+                    !agreement.holds() && comparison.compared - comparison.agreeing == 1,
+                    "{backend:?}, {name}: {agreement}"
+                );
             }
         }
         assert!(backends > 0);

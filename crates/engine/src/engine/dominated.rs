@@ -1,8 +1,8 @@
-//! Orientations of touches of which one taxel is nearly all, in double precision on every backend.
+//! Orientations of touches that one taxel dominates, in double precision on every backend.
 //!
 //! The point of a taxel that is nearly all of S is q(x − c), a difference of nearly equal numbers: with ρ the share of all
 //! others it is about ρ long, and single precision puts it off by some u·n. Where ρ is under [`SHARE`] that may choose other points,
-//! and turn the line anyhow, so the host computes it from the raw values: [`crate::stage::orientation::reference`]. Above, the
+//! and turn the line arbitrarily, so the host computes it from the raw values: [`crate::stage::orientation::reference`]. Above, the
 //! pair of points is off by n²·u/ρ of its length at most, a hundredth for a dozen taxels.
 
 use std::f64::consts::PI;

@@ -14,7 +14,7 @@ pub(super) struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// Frames that have their values.
-    pub(super) fn of(frames: &'a [Frame]) -> Self {
+    pub(super) fn from_frames(frames: &'a [Frame]) -> Self {
         Self { frames, values: Delivered::Frames(frames) }
     }
 }

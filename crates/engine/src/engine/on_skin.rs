@@ -21,7 +21,7 @@ use crate::stage::self_contacts::Memory;
 use crate::stage::{calibrate, force};
 use crate::touch::{Input, Reading, Skin, SkinTaxel, TouchState, Touches};
 
-/// Flags of a field that holds a taxel without a value, or with one of which something is to be said.
+/// Flags of a field that holds a taxel without a value, or with a flagged one.
 const OF_VALUES: Flags =
     Flags::INCOMPLETE.union(Flags::FAULTY_INPUT).union(Flags::OUT_OF_RANGE).union(Flags::SATURATED).union(Flags::STALE);
 
@@ -61,7 +61,7 @@ impl OnSkin {
     /// `None` where touches of the whole body are not asked for.
     pub(super) fn new(body: &Body, plan: &Plan, scene: &Scene, layer: Option<LayerResponse>) -> Option<Self> {
         let (mut options, first_slot) = scene.asked_touches().zip(plan.touched_from)?;
-        let (graph, note) = TaxelGraph::of(body);
+        let (graph, note) = TaxelGraph::from_body(body);
         let mut skin = Skin::new(body, &graph, |taxel| {
             let channel = plan.body_taxels.binary_search(&taxel);
             channel.map_or(Reading::default(), |channel| reading(plan, channel))
@@ -102,7 +102,7 @@ impl OnSkin {
         self.touches.keep_taxels();
     }
 
-    /// What is to be known before the first frame, a line each: why the edges that the body's file holds are not used, and that
+    /// Remarks before the first frame, a line each: why the edges that the body's file holds are not used, and that
     /// nothing says what its sensors cover.
     pub(super) fn remarks(&self) -> &[String] {
         &self.remarks
@@ -132,7 +132,7 @@ impl OnSkin {
     }
 
     /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `stale` has the taxels of the
-    /// body that are stale, by frame of the call. With `check`, touches are held to their definition.
+    /// body that are stale, by frame of the call. With `check`, touches are compared with their definition.
     pub(super) fn find(
         &mut self,
         (plan, links): (&Plan, &Links),
@@ -201,7 +201,7 @@ impl OnSkin {
             let node = channel as u32;
             let has_value = has_value(value, calibration, || {
                 let response = plan.taxels[self.first_slot + channel].response;
-                calibrate::pressure(value, calibration, plan.curves.of(response)).is_some()
+                calibrate::pressure(value, calibration, plan.curves.table(response)).is_some()
             });
             let mut note = TouchFlags::empty();
             if !has_value {
@@ -300,7 +300,7 @@ fn sigma(plan: &Plan, channel: usize) -> f64 {
     const HALF_A_COUNT: f64 = 0.5;
     let calibration = &plan.calibrations[channel];
     let slot = plan.touched_from.unwrap_or(0) + channel;
-    let knots = plan.curves.of(plan.taxels[slot].response).written;
+    let knots = plan.curves.table(plan.taxels[slot].response).written;
     let slope = match (knots.first(), knots.last()) {
         (Some(first), Some(last)) if last[0] > first[0] => ((last[1] - first[1]) / (last[0] - first[0])).abs(),
         _ => calibration.gain.abs(),

@@ -106,11 +106,11 @@ impl Post<'_> {
         state: &PostState,
     ) {
         if self.plan.stages().position {
-            place::all_frames(self.of(frames, raw, offset, &state.raw_before), percepts);
+            place::all_frames(self.frames(frames, raw, offset, &state.raw_before), percepts);
         }
     }
 
-    fn of<'f>(
+    fn frames<'f>(
         &'f self,
         frames: &'f [Frame],
         raw: &'f RawBatch<'f>,
@@ -160,8 +160,8 @@ impl Post<'_> {
                 self.filter(field, step, cell, percepts, before);
             }
             if stages.world_motion {
-                let of = self.of(alone, raw, offset, &state.raw_before);
-                self.world_motion(field, (of, &mut now), step, cell, percepts, &mut before.world_motion);
+                let own_frame = self.frames(alone, raw, offset, &state.raw_before);
+                self.world_motion(field, (own_frame, &mut now), step, cell, percepts, &mut before.world_motion);
             }
             if stages.sigma && contact {
                 self.sigmas(field, raw, offset, cell, percepts);
@@ -250,14 +250,14 @@ impl Post<'_> {
     /// Adds up a cell's force.
     fn force(&self, field: &PlanField, frame: usize, cell: usize, percepts: &mut Percepts) {
         let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
-        let of = |member: &Member| {
+        let pressure_and_area = |member: &Member| {
             let slot = member.slot as usize;
             (pressures[slot], self.plan.areas[self.plan.channel_of(slot)])
         };
         // Of a change there is none.
         let is_change = self.plan.letters()[field.letter].receptor == Receptor::Change;
         let quantity = if is_change { Quantity::Count } else { field.quantity };
-        match force::reference(quantity, self.plan.members_of(field).iter().map(of)) {
+        match force::reference(quantity, self.plan.members_of(field).iter().map(pressure_and_area)) {
             Some(newtons) => {
                 percepts.add_present(cell, Outputs::FORCE);
                 percepts.set_host(Host::Force, cell, &[newtons]);

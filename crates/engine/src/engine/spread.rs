@@ -30,7 +30,7 @@ pub(super) struct Frames<'a> {
 /// What is known of one frame: found when the first field asks.
 #[derive(Default)]
 pub(super) struct Now {
-    /// Of which frame the poses are, and of which the pressures.
+    /// The frame of the poses, and that of the pressures.
     posed: Option<usize>,
     pressed: Option<usize>,
     /// By link, world_from_link.
@@ -94,13 +94,14 @@ impl Frames<'_> {
             pressures[slot] = if slot < plan.calibrated() {
                 calibrate::pressure(raw, &plan.calibrations[channel], plan.curve_of(slot)).unwrap_or(0.0)
             } else {
-                let of = plan.taxels[slot].response as usize;
+                let response = plan.taxels[slot].response as usize;
                 let before = match frame.checked_sub(1) {
                     Some(before) => rows.value(before, channel),
                     None => self.before.get(channel).copied().unwrap_or_default(),
                 };
                 let Step { dt_s, flags } = self.raw.steps[frame];
-                change::reference(heard(raw, of), heard(before, of), dt_s, flags, plan.change_dead_band).value
+                change::reference(heard(raw, response), heard(before, response), dt_s, flags, plan.change_dead_band)
+                    .value
             };
         }
     }

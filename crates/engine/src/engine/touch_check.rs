@@ -1,10 +1,10 @@
-//! Holding touches of the whole body to their definition.
+//! Compares touches of the whole body with their definition.
 //!
 //! Touches are found in double precision from the backend's pressures. Here the same frame's right pressures go through the definition
-//! ([`crate::touch::reference`]), which starts from what the engine kept of the frame before: each frame is held to the one before, and
+//! ([`crate::touch::reference`]), which starts from what the engine kept of the frame before: each frame is compared from the one before, and
 //! what was too close to call there does not go on. How far the backend's pressures may be off is the largest share of itself by which
-//! a taxel's P may be; from it follow the bounds of a touch (`touch/bound.rs`). A touch whose taxels or identity hang on a choice
-//! that is nearer than that is not compared, and counted.
+//! a taxel's P may be; from it follow the bounds of a touch (`touch/bound.rs`). A touch whose taxels or identity depend on a choice
+//! that is closer than this is counted, and not compared.
 //!
 //! The normal, standard deviations and fits are not compared: `tests/it` holds them to their equations.
 
@@ -221,31 +221,31 @@ impl Beside<'_> {
         }
     }
 
-    fn of(&mut self, name: &str) -> &mut Comparison {
+    fn comparison(&mut self, name: &str) -> &mut Comparison {
         self.quantities.entry(name.to_owned()).or_default()
     }
 
     fn agrees(&mut self, name: &str) {
-        let of = self.of(name);
-        (of.compared, of.agreeing) = (of.compared + 1, of.agreeing + 1);
+        let comparison = self.comparison(name);
+        (comparison.compared, comparison.agreeing) = (comparison.compared + 1, comparison.agreeing + 1);
     }
 
     fn too_close(&mut self, name: &str) {
-        self.of(name).too_close += 1;
+        self.comparison(name).too_close += 1;
     }
 
     fn fails(&mut self, name: &str, what: String) {
-        self.of(name).compared += 1;
+        self.comparison(name).compared += 1;
         self.failure.get_or_insert(what);
     }
 
     /// A quantity that is off by `error`, and may be by `bound`; `None`: too close to call.
     fn off(&mut self, name: &str, error: f64, bound: Option<f64>, shown: impl Fn() -> String) {
         let Some(bound) = bound else { return self.too_close(name) };
-        let of = self.of(name);
+        let comparison = self.comparison(name);
         let share = if error == 0.0 { 0.0 } else { error / bound };
-        of.worst_error = of.worst_error.max(error);
-        of.worst_share = of.worst_share.max(share);
+        comparison.worst_error = comparison.worst_error.max(error);
+        comparison.worst_share = comparison.worst_share.max(share);
         if share <= 1.0 {
             self.agrees(name);
         } else {
@@ -322,17 +322,17 @@ mod tests {
         Arc::new(Skin::from_parts(parts))
     }
 
-    /// Pressures of two bumps, the second of which is `height` high.
+    /// Pressures of two bumps; the second is `height` high.
     fn bumps(height: f64) -> Vec<f64> {
-        let of = |x: f64, y: f64, node: u32| {
+        let bump = |x: f64, y: f64, node: u32| {
             let [u, v] = [f64::from(node % 12), f64::from(node / 12)];
             (-((u - x).powi(2) / 2.2 + (v - y).powi(2) / 1.4)).exp()
         };
-        let pressure = |node| 10.0 * of(2.7, 3.1, node) + height * of(8.4, 8.2, node);
+        let pressure = |node| 10.0 * bump(2.7, 3.1, node) + height * bump(8.4, 8.2, node);
         (0..144).map(|node| if pressure(node) > 0.1 { pressure(node) } else { 0.0 }).collect()
     }
 
-    /// What comes of comparing the touches of three frames, of which the last is changed by `change`.
+    /// Compares the touches of three frames; `change` changes those of the last frame.
     fn compared(right: impl Fn(&mut [Pressure]), change: impl Fn(&mut TouchFrame)) -> Agreement {
         let (mut touches, mut check) = (Touches::new(skin(), Options::default()), TouchCheck::default());
         for index in 0..14_u32 {
@@ -341,8 +341,8 @@ mod tests {
             let mut found = TouchFrame::default();
             let before = touches.state();
             touches.step(input, &mut found);
-            let of = |&value: &f64| Pressure { value, bound: BOUND * value, ..Pressure::default() };
-            let mut all: Vec<Pressure> = pressures.iter().map(of).collect();
+            let pressure = |&value: &f64| Pressure { value, bound: BOUND * value, ..Pressure::default() };
+            let mut all: Vec<Pressure> = pressures.iter().map(pressure).collect();
             if index == 13 {
                 right(&mut all);
                 change(&mut found);
@@ -376,8 +376,8 @@ mod tests {
         for (name, change) in changes {
             let agreement = compared(|_| {}, |found| change(&mut found.touches[0]));
             assert!(!agreement.holds() && agreement.failures[0].contains("frame 13"), "{name}: {agreement}");
-            let of = agreement.quantities[name];
-            assert_eq!(of.compared - of.agreeing, 1, "{name}: {agreement}");
+            let comparison = agreement.quantities[name];
+            assert_eq!(comparison.compared - comparison.agreeing, 1, "{name}: {agreement}");
         }
         let other_id = compared(|_| {}, |found| found.touches[1].id = 7);
         assert!(!other_id.holds() && other_id.quantities["touches"].compared == 28, "{other_id}");

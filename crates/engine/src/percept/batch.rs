@@ -112,7 +112,7 @@ impl Percepts {
         }
     }
 
-    /// The same, for fields of which each stands there in `letters` letters, one after the other.
+    /// The same, for fields that each have `letters` letters, one after the other.
     pub(crate) fn with_letters(mut self, letters: usize) -> Self {
         self.letters = letters.max(1);
         self
@@ -167,14 +167,14 @@ impl Percepts {
         self.flags.resize(cells, Flags::empty());
         self.reset_presence(cells);
         self.active.resize(if self.columns.contains(Outputs::ACTIVE) { cells } else { 0 }, 0);
-        for (host, column) in Host::ALL.iter().zip(&mut self.host) {
-            let of = host.column();
-            let numbers = if self.outputs.contains(of.output) { cells * of.components } else { 0 };
+        for (host, values) in Host::ALL.iter().zip(&mut self.host) {
+            let column = host.column();
+            let numbers = if self.outputs.contains(column.output) { cells * column.components } else { 0 };
             // What the stage *position* gives it gives in every cell.
-            if of.stage == "position" {
-                column.resize(numbers, 0.0);
+            if column.stage == "position" {
+                values.resize(numbers, 0.0);
             } else {
-                refill(column, numbers, 0.0);
+                refill(values, numbers, 0.0);
             }
         }
         refill(&mut self.pressures, frames * self.slots, 0.0);
@@ -257,15 +257,15 @@ impl Percepts {
 
     /// The components of `column` in a cell, then zeros.
     fn components(&self, column: &Column, cell: usize) -> [f64; 3] {
-        fn of<T: Copy + Into<f64>>(parts: &Components<T>, which: &[Component], cell: usize) -> [f64; 3] {
+        fn read<T: Copy + Into<f64>>(parts: &Components<T>, which: &[Component], cell: usize) -> [f64; 3] {
             let mut components = [0.0; 3];
             components.iter_mut().zip(which).for_each(|(component, &part)| *component = parts[part][cell].into());
             components
         }
         match (column.store, &self.values) {
             (Store::Active, _) => [self.active[cell].into(), 0.0, 0.0],
-            (Store::Backend(which), Values::F32(parts)) => of(parts, which, cell),
-            (Store::Backend(which), Values::F64(parts)) => of(parts, which, cell),
+            (Store::Backend(which), Values::F32(parts)) => read(parts, which, cell),
+            (Store::Backend(which), Values::F64(parts)) => read(parts, which, cell),
             (Store::Host(host), _) => {
                 let mut components = [0.0; 3];
                 components[..column.components].copy_from_slice(self.host(host, cell));

@@ -155,12 +155,12 @@ impl PlaceCells<'_> {
     #[inline(always)]
     pub(crate) fn centroid(&self, cell: usize) -> DVec3 {
         #[inline(always)]
-        fn of<T: Copy + Default + Into<f64>>([u, v, depth]: &[&[T]; 3], cell: usize) -> DVec3 {
+        fn read<T: Copy + Default + Into<f64>>([u, v, depth]: &[&[T]; 3], cell: usize) -> DVec3 {
             DVec3::new(u[cell].into(), v[cell].into(), depth.get(cell).copied().unwrap_or_default().into())
         }
         match &self.centroids {
-            Centroids::F32(columns) => of(columns, cell),
-            Centroids::F64(columns) => of(columns, cell),
+            Centroids::F32(columns) => read(columns, cell),
+            Centroids::F64(columns) => read(columns, cell),
         }
     }
 

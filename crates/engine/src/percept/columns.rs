@@ -159,7 +159,7 @@ macro_rules! columns {
                     field,
                     letter,
                     contact: !flags.contains(Flags::NO_CONTACT),
-                    $($name: next().map(Typed::of),)*
+                    $($name: next().map(Typed::from_components),)*
                     flags,
                     in_world,
                 }

@@ -1,4 +1,4 @@
-//! The kinds of contact that are told apart.
+//! The kinds of contact that are distinguished.
 
 use serde::Serialize;
 

@@ -25,8 +25,8 @@ impl Percepts {
         let cells = self.frames() * self.fields;
         Some(match (column.store, &self.values) {
             (Store::Active, _) => {
-                let of = |cell: usize| if is_there(cell) { self.active[cell] } else { 0 };
-                ColumnValues::U32((0..cells).map(of).collect())
+                let active_in = |cell: usize| if is_there(cell) { self.active[cell] } else { 0 };
+                ColumnValues::U32((0..cells).map(active_in).collect())
             }
             (Store::Backend(parts), Values::F32(kept)) => {
                 ColumnValues::F32(side_by_side(kept, parts, cells, is_there, f32::NAN))

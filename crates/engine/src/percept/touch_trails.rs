@@ -65,7 +65,7 @@ impl TouchTrails {
     }
 
     /// The trail of the touch `id`, the oldest place first.
-    pub fn of(&self, id: u64) -> impl Iterator<Item = &TrailPoint> {
+    pub fn trail(&self, id: u64) -> impl Iterator<Item = &TrailPoint> {
         self.points.iter().filter(move |point| point.id == id)
     }
 }
@@ -87,11 +87,11 @@ mod tests {
                 add(&mut trails, t_s, t_s, if t_s < 1.5 { &[4] } else { &[4, 5] });
             }
             let last_s = 2999.0 / rate_hz;
-            let times: Vec<f64> = trails.of(4).map(|point| point.t_s).collect();
+            let times: Vec<f64> = trails.trail(4).map(|point| point.t_s).collect();
             assert!(times.is_sorted() && times.len() <= 34, "{rate_hz} Hz: {}", times.len());
             assert!(times[0] >= last_s - 1.0 && times[0] <= last_s - 1.0 + 1.0 / 7.0 + 1e-9, "{rate_hz} Hz: {times:?}");
-            assert!(trails.of(4).all(|point| point.position.x == point.t_s && point.link == Some(3)));
-            assert_eq!((trails.of(5).count(), trails.of(6).count()), (times.len(), 0));
+            assert!(trails.trail(4).all(|point| point.position.x == point.t_s && point.link == Some(3)));
+            assert_eq!((trails.trail(5).count(), trails.trail(6).count()), (times.len(), 0));
         }
     }
 
@@ -102,14 +102,14 @@ mod tests {
             add(&mut trails, f64::from(frame) * 0.125, 0.0, &[1]);
         }
         add(&mut trails, 12.0, 0.5, &[1]);
-        let points: Vec<&TrailPoint> = trails.of(1).collect();
+        let points: Vec<&TrailPoint> = trails.trail(1).collect();
         assert!(points.is_sorted_by(|a, b| a.t_s < b.t_s) && points[0].t_s == 11.375, "{points:?}");
         assert_eq!((points.len(), points[5].t_s, points[5].position.x), (6, 12.0, 0.5));
         add(&mut trails, 3.0, 0.6, &[1]);
-        assert!(trails.of(1).map(|point| point.t_s).eq([3.0]));
+        assert!(trails.trail(1).map(|point| point.t_s).eq([3.0]));
         // A gap of over a second leaves the newest place alone.
         add(&mut trails, 20.0, 0.7, &[1]);
-        assert_eq!(trails.of(1).count(), 1);
+        assert_eq!(trails.trail(1).count(), 1);
         // Nothing is touched: there is nothing to add, and the old places go.
         add(&mut trails, 22.0, 0.7, &[]);
         assert_eq!(trails, TouchTrails::default());

@@ -2,12 +2,12 @@
 
 /// The type of a percept's quantity, made of its components.
 pub(super) trait Typed {
-    fn of(components: [f64; 3]) -> Self;
+    fn from_components(components: [f64; 3]) -> Self;
     fn components(self) -> [f64; 3];
 }
 
 impl Typed for f64 {
-    fn of([value, ..]: [f64; 3]) -> Self {
+    fn from_components([value, ..]: [f64; 3]) -> Self {
         value
     }
 
@@ -17,7 +17,7 @@ impl Typed for f64 {
 }
 
 impl Typed for u32 {
-    fn of([value, ..]: [f64; 3]) -> Self {
+    fn from_components([value, ..]: [f64; 3]) -> Self {
         value as Self
     }
 
@@ -28,7 +28,7 @@ impl Typed for u32 {
 
 /// Two or three.
 impl<const N: usize> Typed for [f64; N] {
-    fn of(components: [f64; 3]) -> Self {
+    fn from_components(components: [f64; 3]) -> Self {
         std::array::from_fn(|index| components[index])
     }
 

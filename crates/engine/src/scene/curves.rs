@@ -60,7 +60,7 @@ impl Curves {
     }
 
     /// The curve of a taxel that responds by `response`; without knots for a straight line.
-    pub(crate) fn of(&self, response: u32) -> Table<'_> {
+    pub(crate) fn table(&self, response: u32) -> Table<'_> {
         let index = response.checked_sub(layout::FIRST_CURVE).map(|index| index as usize);
         let Some(curve) = index.map(|index| self.curves[index]) else { return Table::default() };
         let range = curve.first as usize..(curve.first + curve.count) as usize;
@@ -85,11 +85,11 @@ mod tests {
         let codes: Vec<u32> = calibration.taxels.iter().map(|taxel| response(&mut curves, taxel, None)).collect();
         assert_eq!(codes, [2, 3, 4, 5, 3, layout::MASKED, layout::STRAIGHT]);
         assert_eq!((curves.curves.len(), curves.knots.len()), (4, 2 * 1024 + 4));
-        assert_eq!(curves.of(4).rounded[0], layout::Knot { raw: 0.0, p: 0.0, slope: 4.0 });
-        assert_eq!(curves.of(5).rounded.iter().map(|knot| knot.raw).collect::<Vec<_>>(), [-2.0, 0.0]);
-        assert!([layout::STRAIGHT, layout::MASKED].iter().all(|&response| curves.of(response).written.is_empty()));
+        assert_eq!(curves.table(4).rounded[0], layout::Knot { raw: 0.0, p: 0.0, slope: 4.0 });
+        assert_eq!(curves.table(5).rounded.iter().map(|knot| knot.raw).collect::<Vec<_>>(), [-2.0, 0.0]);
+        assert!([layout::STRAIGHT, layout::MASKED].iter().all(|&response| curves.table(response).written.is_empty()));
         // The other signal is another curve.
         assert_eq!(response(&mut curves, &calibration.taxels[0], Some(FsrSignal::Raw)), 6);
-        assert_eq!(curves.of(6).rounded[500].p, crate::signal::FsrCircuit::default().logarithmic(500) as f32);
+        assert_eq!(curves.table(6).rounded[500].p, crate::signal::FsrCircuit::default().logarithmic(500) as f32);
     }
 }

@@ -61,7 +61,7 @@ struct FieldSummary<'a> {
 }
 
 impl<'a> FieldSummary<'a> {
-    fn of(field: &'a PlanField) -> Self {
+    fn from_field(field: &'a PlanField) -> Self {
         let PlanField { name, link, letter, count, charted, .. } = field;
         Self { field: name, link, letter: *letter, members: *count, chart: *charted }
     }
@@ -77,7 +77,7 @@ impl Serialize for Plan {
             memberships: self.memberships(),
             bytes_up: self.bytes_up(),
             bytes_down: self.bytes_down(),
-            fields: self.fields.iter().map(FieldSummary::of).collect(),
+            fields: self.fields.iter().map(FieldSummary::from_field).collect(),
             stages: self.explain(),
         };
         summary.serialize(serializer)
@@ -94,28 +94,28 @@ impl Plan {
         let stages = self.stages();
         let all = |_: &PlanField| true;
         let charted = |field: &PlanField| field.charted;
-        let of = |which: &dyn Fn(&PlanField) -> bool| {
+        let counts = |which: &dyn Fn(&PlanField) -> bool| {
             let chosen = self.fields.iter().filter(|field| which(field));
             chosen.fold((0, 0), |(fields, memberships), field| (fields + 1, memberships + field.count))
         };
         let slots = (self.calibrated(), 0);
-        let found = (of(&all).0, 0);
-        let found_charted = (of(&charted).0, 0);
+        let found = (counts(&all).0, 0);
+        let found_charted = (counts(&charted).0, 0);
         // Of each stage whether it runs, what it goes over, and why it might not.
         let rows = [
             ("calibrate", true, slots, ""),
             ("change", self.has_changes(), (self.slots() - slots.0, 0), "no letter is `change`"),
-            ("contact", true, of(&all), ""),
-            ("centroid", stages.centroid, of(&all), ""),
-            ("orientation", stages.orientation, of(&charted), ""),
-            ("principal_axis", stages.principal_axis, of(&charted), ""),
+            ("contact", true, counts(&all), ""),
+            ("centroid", stages.centroid, counts(&all), ""),
+            ("orientation", stages.orientation, counts(&charted), ""),
+            ("principal_axis", stages.principal_axis, counts(&charted), ""),
             ("hysteresis", stages.hysteresis, found, "the calibration has no thresholds"),
             ("motion", stages.motion, found_charted, ""),
             ("position", stages.position, found, ""),
             ("world_motion", stages.world_motion, found, ""),
             ("touches", self.touched_from.is_some(), (self.channels(), 0), ""),
             ("self_contacts", stages.self_contacts, found, ""),
-            ("force", stages.force, of(&all), ""),
+            ("force", stages.force, counts(&all), ""),
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
             ("fit", self.fits(), (self.channels(), 0), ""),
@@ -188,7 +188,7 @@ impl Plan {
     }
 }
 
-/// The numbers that a field's percept takes on the way back from a device: of which stage, and for which outputs.
+/// The numbers of a field's percept that come back from a device: each with its stage, and the outputs that need it.
 fn numbers() -> impl Iterator<Item = (&'static str, Outputs)> {
     let of_parts = Component::ALL.iter().map(|part| match part {
         Component::CentroidU | Component::CentroidV => ("centroid", part.wanted_for() | Outputs::FILTERED),

@@ -77,10 +77,10 @@ impl Plan {
     /// Notes from when on each slot's taxel feels anything, where contacts are fitted.
     pub(super) fn note_what_is_felt(&mut self) {
         if self.fits() {
-            let of = |slot: usize| {
+            let threshold = |slot: usize| {
                 calibrate::threshold(&self.calibrations[slot % self.calibrations.len()], self.curve_of(slot))
             };
-            self.feels_from = (0..self.calibrated()).map(of).collect();
+            self.feels_from = (0..self.calibrated()).map(threshold).collect();
         }
     }
 }

@@ -17,8 +17,8 @@ pub(crate) struct LeftOut {
 }
 
 impl LeftOut {
-    /// Of the fields `chosen` of `fields`.
-    pub(super) fn of(body: &Body, chosen: &[usize], fields: &FieldSet) -> Self {
+    /// What the fields `chosen` of `fields` leave out.
+    pub(super) fn from_fields(body: &Body, chosen: &[usize], fields: &FieldSet) -> Self {
         let mut taxels: BTreeMap<String, Vec<u32>> = BTreeMap::new();
         let chosen = || chosen.iter().map(|&field| &fields.fields[field]);
         for member in chosen().flat_map(|field| &field.members).filter(|member| !is_pressure(body, member.taxel)) {
@@ -33,7 +33,7 @@ impl LeftOut {
         Self { taxels, fields: chosen().filter(feels_nothing).map(|field| field.name.clone()).collect() }
     }
 
-    /// Those of `chosen` that have a taxel of pressure.
+    /// The fields of `chosen` that have a taxel of pressure.
     ///
     /// # Errors
     /// None has.

@@ -139,7 +139,7 @@ pub struct PlannedField<'a> {
 }
 
 impl Plan {
-    /// What places in the world are said to be in: `world`, or the link of [`Scene::relative_to`](super::Scene::relative_to).
+    /// The frame of places in the world: `world`, or the link of [`Scene::relative_to`](super::Scene::relative_to).
     #[must_use]
     pub fn world(&self) -> &str {
         self.relative_to().unwrap_or(WORLD)
@@ -251,7 +251,7 @@ impl Plan {
         self.members.len()
     }
 
-    /// The fields, in the order of the percepts. A field stands there once for each of [`Plan::letters`], in their order.
+    /// The fields, in the order of the percepts. A field is in the list once for each of [`Plan::letters`], in their order.
     pub fn fields(&self) -> impl ExactSizeIterator<Item = PlannedField<'_>> {
         self.fields.iter().map(|field| PlannedField { name: &field.name, link: &field.link })
     }

@@ -1,4 +1,4 @@
-//! A plan's slots: what of which taxel a frame is made into. First every channel's pressure in each signal that a letter
+//! A plan's slots: the calibrated values of a frame. First every channel's pressure in each signal that a letter
 //! needs, signal by signal; then every channel's change in each letter that is one.
 
 use super::Plan;

@@ -22,7 +22,7 @@ pub(crate) struct Stages {
 
 impl Stages {
     /// The stages that `outputs` need. Whether there is hysteresis is the calibration's to say.
-    pub(super) fn of(outputs: Outputs) -> Self {
+    pub(super) fn for_outputs(outputs: Outputs) -> Self {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
         let world_motion = wants("world_motion");
         let position = wants("position") || world_motion;

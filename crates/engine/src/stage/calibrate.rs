@@ -235,8 +235,8 @@ fn interpolate<K>(knots: &[K], of: impl Fn(&K) -> [f64; 2], x: f64) -> (f64, [f6
     ((low + rise).clamp(low.min(high), low.max(high)), [run, slope, rise])
 }
 
-/// How many of `knots`, of which `raw` gives a knot's place, lie up to x. Most sensors' tables have them evenly: x is looked for first where
-/// it then is.
+/// How many of `knots` lie up to x; `raw` gives a knot's place. Most sensors' tables have evenly spaced
+/// knots: the search for x begins where it would then be.
 fn knots_up_to<K>(knots: &[K], raw: impl Fn(&K) -> f64, x: f64) -> usize {
     let last = knots.len() - 1;
     let (from, to) = (raw(&knots[0]), raw(&knots[last]));

@@ -172,7 +172,7 @@ impl Doubt {
         let has_direction = filtered.present.contains(Outputs::FILTERED_DIRECTION);
         let near = (length - settings.still_within(then.centroid, centroid)).abs() <= moved;
         let turned = (moved < length).then(|| (moved / length).asin() + U * U);
-        bound.direction = Limit::of(turned, has_direction, near);
+        bound.direction = Limit::from_bound(turned, has_direction, near);
         if near {
             bound.in_doubt |= Flags::STILL;
         }

@@ -244,7 +244,7 @@ pub(crate) struct FilterBound {
     pub(crate) may_remember: bool,
 }
 
-/// What the bound of a field's next frame hangs on.
+/// What the bound of a field's next frame depends on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Doubt {
     right: Memory,
@@ -314,7 +314,7 @@ impl Doubt {
         if let Some(length) = self.right.heading.map(DVec2::length) {
             let near = (length - LEAST_HEADING).abs() <= self.heading;
             let angle = (self.heading < 0.5 * length).then(|| (self.heading / length).asin() + U * U);
-            bound.direction = Limit::of(angle, length > LEAST_HEADING, near);
+            bound.direction = Limit::from_bound(angle, length > LEAST_HEADING, near);
             if near {
                 bound.in_doubt |= Flags::STILL;
             }

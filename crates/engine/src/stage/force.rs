@@ -32,11 +32,11 @@ pub(crate) fn reference(quantity: Quantity, taxels: impl Iterator<Item = (f64, f
 /// How far that may be off for what single precision makes of the `pressed` taxels.
 pub(crate) fn bound(quantity: Quantity, pressed: &[Pressed]) -> f64 {
     let n = pressed.len() as f64;
-    let of = |taxel: &Pressed| {
+    let bound_of = |taxel: &Pressed| {
         let newtons = newtons_per_p(quantity, taxel.area).unwrap_or(0.0);
         newtons * (2.0 * U * taxel.pressure + taxel.excess + n * f64::EPSILON * taxel.pressure)
     };
-    SLACK * pressed.iter().map(of).sum::<f64>()
+    SLACK * pressed.iter().map(bound_of).sum::<f64>()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! A field that is pressed and not in contact keeps its sums, and loses what needs a touch.
 //!
 //! **Bound.** S carries the bound of its sum, and the threshold its rounding to single precision. A decision whose margin
-//! is below these is in doubt. What hangs on it in the next frame is compared from the state that the backend took.
+//! is below these is in doubt. What depends on it in the next frame is compared from the backend's state.
 
 /// The sums at which a field's contact begins and ends, in the unit of S.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 pub(crate) const PRESENT: u32 = 16;
 
 /// A field of more members than this, or each of its parts, is taken by a whole group of the GPU's invocations. lavapipe ends
-/// an invocation's loops after 65,535 rounds in all, of which a field that is not wide makes three a member at most.
+/// an invocation's loops after 65,535 rounds in all; a field that is not wide makes three rounds a member at most.
 pub(crate) const WIDE: usize = 4096;
 
 /// Memberships that a uniform binding holds, as `shaders/shared/few_members.wgsl` says: 64 KiB, which every device can bind.

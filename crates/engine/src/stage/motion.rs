@@ -81,7 +81,7 @@ impl MotionBound {
         let rate = |output, right, bound| (output, Limit::Within(rate_bound(right, bound, dt_s) * unit_m));
         [
             length(Outputs::DISPLACEMENT, self.displacement),
-            (Outputs::DIRECTION, Limit::of(self.direction, right.direction.is_some(), self.still_in_doubt)),
+            (Outputs::DIRECTION, Limit::from_bound(self.direction, right.direction.is_some(), self.still_in_doubt)),
             length(Outputs::DISTANCE, self.distance),
             length(Outputs::RADIAL_DISTANCE, self.radial_distance),
             rate(Outputs::SPEED, right.distance, self.distance),

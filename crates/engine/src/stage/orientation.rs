@@ -9,7 +9,7 @@
 //! * ‖e₁ − e₂‖ ≤ 2⁻¹⁴ R₁: absent, `coincident`.
 //! * A third point with R₂ − R₃ ≤ 2⁻¹⁴ R₁: given, with `tie`.
 //!
-//! Of a touch of which one taxel is nearly all, single precision does not do: the host computes it (`engine/dominated.rs`).
+//! If one taxel dominates a touch, single precision is not enough: the host computes it (`engine/dominated.rs`).
 //!
 //! **Bound.** A point's own error is ε = q(‖δc‖ + u‖x‖ + 9u‖x − c‖) plus 2⁻⁶², where its square underflows: the
 //! centroid's error, the coordinate's rounding, then 3u in q, u each in the difference and the product, and the sum of
@@ -58,7 +58,7 @@ impl LineBound {
     /// The outputs' limits; `present` says which the reference has.
     pub(crate) fn limits(&self, present: Outputs) -> [GivenLimit; 1] {
         let in_doubt = self.in_doubt.contains(Flags::COINCIDENT);
-        [(Outputs::ORIENTATION, Limit::of(self.angle, present.contains(Outputs::ORIENTATION), in_doubt))]
+        [(Outputs::ORIENTATION, Limit::from_bound(self.angle, present.contains(Outputs::ORIENTATION), in_doubt))]
     }
 }
 

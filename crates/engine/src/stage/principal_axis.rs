@@ -51,7 +51,7 @@ impl AxisBound {
     pub(crate) fn limits(&self, present: Outputs) -> [GivenLimit; 2] {
         let together = self.line.in_doubt.contains(Flags::COINCIDENT);
         let in_doubt = together || self.line.in_doubt.contains(Flags::ISOTROPIC);
-        let limit = |output, bound, in_doubt| (output, Limit::of(bound, present.contains(output), in_doubt));
+        let limit = |output, bound, in_doubt| (output, Limit::from_bound(bound, present.contains(output), in_doubt));
         [
             limit(Outputs::PRINCIPAL_AXIS, self.line.angle, in_doubt),
             limit(Outputs::ANISOTROPY, self.anisotropy, together),

@@ -90,7 +90,7 @@ impl Memory {
         self.known.clear();
     }
 
-    /// Forgets self-contacts of which a touch has ended: those for which `lasts` does not hold.
+    /// Forgets self-contacts with an ended touch: `lasts` is false for it.
     pub(crate) fn release(&mut self, lasts: impl Fn(u64) -> bool) {
         self.known.retain(|known| known.sides.iter().all(|&touch| lasts(touch)));
     }

@@ -15,7 +15,7 @@
 //! squares of what such jumps make of it add up to more than [`NEAR_SHARE`] of its variance. A soft onset does not jump, and what
 //! it cuts off is too little to tell, unless the threshold is under [`LEAST_THRESHOLD`] σ: then the noise of untouched taxels,
 //! cut off below 0, adds up to a bias, [`RECTIFIED`] σ each, which is held to the same share. Nothing has a sigma where no taxel is
-//! [`LEAST_PEAK`] σ over its threshold, nor an axis of which sigma is over [`MAX_TURN`]: one that may come of noise alone. These
+//! [`LEAST_PEAK`] σ over its threshold, nor an axis whose sigma is over [`MAX_TURN`]: noise alone may cause one. These
 //! numbers are fitted to simulations. One pressed taxel, `one_taxel`, tells nothing of how its neighbours stray; without `noise` of
 //! every pressed taxel all is absent, `noise_unknown`, as it is for changes of pressure. What noise does not explain is not part of
 //! it: few sensors, and the pressure at which they begin to feel, shift a quantity by as much in every frame.
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn variances_are_those_of_the_quantities_own_slopes() {
-        let of = |taxels: &[(f64, f64, f64)]| {
+        let quantities = |taxels: &[(f64, f64, f64)]| {
             let pressed = pressed_at(taxels);
             let c = centroid::reference(&pressed).truncate();
             let angle = principal_axis::reference(&pressed, c).line.angle.unwrap();
@@ -207,7 +207,7 @@ mod tests {
             let [less, more] = [-step, step].map(|step| {
                 let mut moved = TOUCH;
                 moved[index].2 += step;
-                of(&moved)
+                quantities(&moved)
             });
             let sigma = 0.01 * (1.0 + TOUCH[index].0);
             for (variance, (more, less)) in variances.iter_mut().zip(more.into_iter().zip(less)) {

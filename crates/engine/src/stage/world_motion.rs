@@ -76,8 +76,10 @@ mod tests {
             let (before, now) = (DVec3::new(1e3, 2.0, f64::from(step)), DVec3::new(1e3, 2.001, f64::from(step)));
             let right = (now - before).length() / 0.01;
             let got = (now + 1e-6 * way - (before - 2e-6 * way)).length() / 0.01;
-            let of = |position| Memory { position_in_world: Some(position) };
-            let Limit::Within(bound) = of(before).bound(0.01, of(now), [2e-6, 1e-6]) else { panic!("no bound") };
+            let memory = |position| Memory { position_in_world: Some(position) };
+            let Limit::Within(bound) = memory(before).bound(0.01, memory(now), [2e-6, 1e-6]) else {
+                panic!("no bound")
+            };
             worst = worst.max((got - right).abs() / bound);
         }
         // Both are off by all they may be, but not always along the way.

@@ -61,8 +61,8 @@ fn share_of_size(places: &[(DVec3, f64)], mean: DVec3) -> f64 {
     ROUNDING * places.iter().map(|(place, _)| place.distance(mean)).fold(0.0, f64::max)
 }
 
-/// How far the nearest point of a surface may be off: `nearest` are the nearest points of its triangles to the mean, each with its
-/// distance, of which `position` is the nearest.
+/// The error bound of the nearest point of a surface. `nearest` are the points of its triangles nearest to the mean, each with its
+/// distance; `position` is the nearest of them.
 pub(super) fn of_position(
     nearest: impl Iterator<Item = (DVec3, f64)>,
     position: DVec3,

@@ -205,8 +205,8 @@ mod tests {
             let pressed = || digits.iter().zip(pressures).filter_map(|(digit, &p)| Some(((*digit)?, p)));
             let mut totals = vec![0.0; count];
             pressed().for_each(|(region, pressure)| totals[region as usize] += pressure);
-            let of = |node: u32| digits[node as usize].map(|region| (region, pressures[node as usize]));
-            let named = self.identities.name(&mut self.memory, &totals, &self.options, of).to_vec();
+            let region_at = |node: u32| digits[node as usize].map(|region| (region, pressures[node as usize]));
+            let named = self.identities.name(&mut self.memory, &totals, &self.options, region_at).to_vec();
             self.memory.touches =
                 named.iter().map(|n| Kept { id: n.id, began_s: 0.0, link: 0, trail: Trail::default() }).collect();
             self.memory.taxels.clear();

@@ -84,7 +84,7 @@ mod tests {
     fn a_press_anywhere_on_bundled_bodies_is_one_touch_on_its_taxels_surface() {
         for (name, bytes) in [("hand", bundled::HAND), ("humanoid", bundled::HUMANOID)] {
             let body = Body::from_bytes(name, bytes).unwrap();
-            let graph = TaxelGraph::of(&body).0;
+            let graph = TaxelGraph::from_body(&body).0;
             let skin = Arc::new(Skin::new(&body, &graph, |_| Reading::default()));
             assert_eq!(skin.nodes(), body.taxels.len());
             for node in 0..skin.nodes() as u32 {

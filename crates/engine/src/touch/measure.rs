@@ -149,11 +149,11 @@ fn sums(felt: &Felt<'_>, nodes: &[u32]) -> Touch {
 /// What is to be said of the taxels without a value beside `node`: that they are missing, unless something else is noted.
 fn of_gaps(felt: &Felt<'_>, node: u32) -> TouchFlags {
     let gaps = felt.skin.beside(node).iter().filter(|other| !felt.bridges.has_value(**other));
-    let of = |other: &u32| match felt.notes.get(*other as usize) {
+    let note_on = |other: &u32| match felt.notes.get(*other as usize) {
         Some(note) if !note.is_empty() => *note,
         _ => TouchFlags::INCOMPLETE,
     };
-    gaps.map(of).fold(TouchFlags::empty(), |all, note| all | note)
+    gaps.map(note_on).fold(TouchFlags::empty(), |all, note| all | note)
 }
 
 /// Adds the links that `nodes` lie on, in the body's order.

@@ -32,7 +32,7 @@ pub struct Input<'a, P> {
     pub pressures: &'a [P],
     /// Nodes without a value, missing or masked, ascending: their neighbours are each other's.
     pub without_value: &'a [u32],
-    /// What is to be said of nodes, with or without a value. One without a value of which nothing is said is missing.
+    /// Flags of nodes, with or without a value. A node without a value and without flags is missing.
     pub notes: &'a [(u32, TouchFlags)],
 }
 

@@ -4,7 +4,7 @@ use super::*;
 
 /// With touches, and fields whose total alone is wanted.
 fn bench() -> Bench {
-    Bench::of(Scene::default().outputs(Outputs::TOTAL).touches(touch::Options::default()), "")
+    Bench::with_scene(Scene::default().outputs(Outputs::TOTAL).touches(touch::Options::default()), "")
 }
 
 /// Both links of the body where they are at rest, the arm moved by `x_m`.

@@ -1,4 +1,4 @@
-//! What is damaged is read as it was, or told: no frame is lost, or another, without a word.
+//! Damaged files are read as they were, or the damage is reported: no frame is lost or changed silently.
 
 use somatic_testing::{damage, numbers};
 use std::io::{Seek as _, Write as _};
@@ -23,7 +23,7 @@ struct Content {
     files: Vec<Option<Vec<u8>>>,
 }
 
-/// Reads the recording at `path`, with what is said of it.
+/// Reads the recording at `path`, with its notices.
 fn read(path: &Path) -> Result<(Content, Vec<String>)> {
     let mut reader = Reader::open(path)?;
     let mut content = Content { taxels: reader.taxels().to_vec(), ..Content::default() };
@@ -44,7 +44,7 @@ fn read(path: &Path) -> Result<(Content, Vec<String>)> {
     losses.extend(reader.losses());
     // The survey counts what was read.
     let mut reader = Reader::open(path)?;
-    let survey = Survey::of(&mut reader, |_| {})?;
+    let survey = Survey::read(&mut reader, |_| {})?;
     assert_eq!(survey.rhythm.frames, content.frames.len() as u64);
     assert_eq!(reader.losses().is_empty(), losses.is_empty(), "{losses:?}, {:?}", reader.losses());
     Ok((content, losses))
@@ -58,7 +58,7 @@ pub(crate) fn read_bytes(file: &mut std::fs::File, path: &Path, bytes: &[u8]) {
         Ok((_, losses)) => losses.iter().for_each(|loss| one_line(loss)),
         Err(e) => one_line(&e.to_string()),
     }
-    match BagSurvey::of(path, |_| {}) {
+    match BagSurvey::read(path, |_| {}) {
         Ok(survey) => survey.losses.iter().for_each(|loss| one_line(loss)),
         Err(e) => one_line(&e.to_string()),
     }
@@ -129,7 +129,7 @@ impl Harm {
         Self { whole, content, file, same: 0, mended: 0, less: 0, refused: 0 }
     }
 
-    /// `what` was done to `bytes`. Gives how many frames were read, and what is said.
+    /// `what` was done to `bytes`. Gives the number of frames that were read, and the notices.
     fn check(&mut self, what: &str, bytes: &[u8]) -> (usize, Vec<String>) {
         put(self.file.as_file_mut(), bytes);
         let (found, losses) = match read(self.file.path()) {
@@ -207,10 +207,10 @@ fn what_is_cut_out_or_put_in_is_reported_with_how_much() {
         let (frames, losses) = harm.check(&format!("record {index} of kind {kind} cut out"), &without);
         if *kind == 0x06 {
             assert_eq!(frames, 9, "{losses:?}");
-            let told = losses.join("\n");
-            assert!(told.contains(&format!("{} bytes were cut out of it", place.len())), "{told}");
-            assert!(told.contains("1 of the 4 chunks that its summary lists are not there"), "{told}");
-            assert!(told.contains("3 of its 12 frames are missing"), "{told}");
+            let reported = losses.join("\n");
+            assert!(reported.contains(&format!("{} bytes were cut out of it", place.len())), "{reported}");
+            assert!(reported.contains("1 of the 4 chunks that its summary lists are not there"), "{reported}");
+            assert!(reported.contains("3 of its 12 frames are missing"), "{reported}");
         }
         let twice = [&whole[..place.end], &whole[place.start..]].concat();
         harm.check(&format!("record {index} of kind {kind} there twice"), &twice);
@@ -280,7 +280,7 @@ fn many_damaged_entries_of_an_index_take_as_long_as_the_file_is() {
     let mut file = tempfile::NamedTempFile::new().unwrap();
     put(file.as_file_mut(), &bytes);
     let start = std::time::Instant::now();
-    let survey = BagSurvey::of(file.path(), |_| {}).unwrap();
+    let survey = BagSurvey::read(file.path(), |_| {}).unwrap();
     assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
     assert!(survey.losses.iter().any(|loss| loss.contains("damaged in")), "{:?}", survey.losses);
 }

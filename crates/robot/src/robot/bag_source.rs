@@ -86,8 +86,8 @@ impl BagSource {
     /// Tells, at the end, which topics are not in all frames.
     fn tell_of_topics(&mut self) {
         let Kind::Clouds(merge) = &mut self.kind else { return };
-        for (topic, told) in merge.summaries() {
-            self.notices.push(format!("{}: {}: {told}", self.path, self.topics[topic]));
+        for (topic, summary) in merge.summaries() {
+            self.notices.push(format!("{}: {}: {summary}", self.path, self.topics[topic]));
         }
     }
 }
@@ -213,11 +213,11 @@ mod tests {
         let none: [&str; 0] = [];
         let output = OutputPaths::new(false, none).add_folder(path, [NAME, BAG_METADATA]).unwrap();
         let mut bag = BagWriter::create(output, NAME, true).unwrap();
-        let of = |name, hash, definition| BagType { name, hash, definition };
+        let kind = |name, hash, definition| BagType { name, hash, definition };
         let [clouds, arrays, states] = [
-            ("/clouds", of(PointCloud2::TYPE, PointCloud2::HASH, PointCloud2::definition())),
-            ("/arrays", of(Float32MultiArray::TYPE, Float32MultiArray::HASH, Float32MultiArray::definition())),
-            ("/joints", of(JointState::TYPE, JointState::HASH, JointState::definition())),
+            ("/clouds", kind(PointCloud2::TYPE, PointCloud2::HASH, PointCloud2::definition())),
+            ("/arrays", kind(Float32MultiArray::TYPE, Float32MultiArray::HASH, Float32MultiArray::definition())),
+            ("/joints", kind(JointState::TYPE, JointState::HASH, JointState::definition())),
         ]
         .map(|(name, kind)| bag.topic(name, &kind).unwrap());
         let count = body.taxels.len() as u32;
@@ -285,7 +285,7 @@ mod tests {
         let (whole, _) = read(&path, "/clouds", &body).unwrap();
         let originals = [NAME, BAG_METADATA].map(|name| std::fs::read(path.join(name)).unwrap());
         let (mut chance, start) = (numbers(seed), std::time::Instant::now());
-        let mut told = 0;
+        let mut reported = 0;
         for round in 0..rounds {
             if start.elapsed().as_secs() >= seconds {
                 break;
@@ -305,7 +305,7 @@ mod tests {
                     let what = format!("round {round} of seed {seed}: {} frames", frames.len());
                     assert!(frames == whole || !losses.is_empty(), "{what}, and not a word");
                     assert!(losses.iter().all(|loss| loss.lines().count() == 1), "{what}: {losses:?}");
-                    told += u64::from(!losses.is_empty());
+                    reported += u64::from(!losses.is_empty());
                 }
                 Err(e) => assert_eq!(e.to_string().lines().count(), 1, "{e}"),
             }
@@ -314,7 +314,7 @@ mod tests {
             }
             assert!(began.elapsed().as_secs() < 5, "round {round} of seed {seed} took {:?}", began.elapsed());
         }
-        assert!(told > 0, "nothing was damaged");
+        assert!(reported > 0, "nothing was damaged");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Joint states from a bag of ROS 2.
 
 use super::bag_source::time_of;
+use super::joint_positions::joint_positions;
 use super::messages::{JointState, Message as _};
-use super::told_positions::told_positions;
 use crate::error::{Error, Result, failed};
 use crate::recording::{BagReader, WantedTopics};
 use crate::source::{BagName, JointStates};
@@ -41,7 +41,7 @@ pub fn joint_states_of_bag(bag: &BagName) -> Result<JointStates> {
         let time = if stamp.nanoseconds() == 0 { time_of(log_ns) } else { stamp.frame_time() };
         let t_s = time.s;
         reader.saw(t_s);
-        for (joint, position) in told_positions(&state).map_err(|e| e.at(format!("{name}: at {t_s} s")))? {
+        for (joint, position) in joint_positions(&state).map_err(|e| e.at(format!("{name}: at {t_s} s")))? {
             if position.is_finite() {
                 states.add(joint, time, position);
             } else {

@@ -1,6 +1,6 @@
 //! Clouds of several topics of a bag as frames of the whole body, by the rules for boards on lines. No I/O.
 //!
-//! Stamps take the place of arrivals, so that one bag gives the same frames each time. A frame is made for each cloud of the
+//! Stamps replace times of arrival, so that one bag gives the same frames each time. A frame is made for each cloud of the
 //! fastest topic that still sends, at its stamp, with the newest cloud of every other topic up to a short wait after it. A
 //! cloud that is too old leaves its taxels stale, never zero.
 
@@ -172,8 +172,8 @@ impl CloudMerge {
 
     /// Of each topic with clouds that wait, the first of them, and its place in the order in which they came.
     fn heads(&self) -> impl Iterator<Item = (usize, u64, &TopicCloud)> {
-        let of = self.topics.iter().enumerate();
-        of.filter_map(|(topic, one)| one.waiting.front().map(|(came, cloud)| (topic, *came, cloud)))
+        let topics = self.topics.iter().enumerate();
+        topics.filter_map(|(topic, one)| one.waiting.front().map(|(came, cloud)| (topic, *came, cloud)))
     }
 
     /// The topic whose cloud is next by its stamp, if no earlier one is to come.
@@ -241,18 +241,18 @@ impl CloudMerge {
         let mut all = Vec::new();
         for (index, topic) in self.topics.iter_mut().enumerate() {
             let TopicAccount { clouds, replaced, absent, span_s } = std::mem::take(&mut topic.account);
-            let mut told = Vec::new();
+            let mut parts = Vec::new();
             if absent > 0 {
                 let span = span_s.map_or("there are none".to_owned(), |[from_s, to_s]| {
                     format!("they are of {from_s} to {to_s} s, frames of {first_s} to {last_s} s")
                 });
-                told.push(format!("{absent} of {frames} frames have no cloud of it that is young enough: {span}"));
+                parts.push(format!("{absent} of {frames} frames have no cloud of it that is young enough: {span}"));
             }
             if replaced > 0 {
-                told.push(format!("{replaced} of its {clouds} clouds are in no frame, as a newer one replaced them"));
+                parts.push(format!("{replaced} of its {clouds} clouds are in no frame, as a newer one replaced them"));
             }
-            if !told.is_empty() {
-                all.push((index, told.join("; ")));
+            if !parts.is_empty() {
+                all.push((index, parts.join("; ")));
             }
         }
         all
@@ -325,9 +325,12 @@ mod tests {
             let newest = (at as i64 * 10 - 17).div_euclid(40);
             assert_eq!(values[1], (newest >= 0).then_some(newest as f64), "{at}");
         }
-        let told = merge.summaries();
-        assert!(told.len() == 1 && told[0].0 == 1, "{told:?}");
-        assert!(told[0].1.starts_with("2 of 100 frames have no cloud of it that is young enough"), "{told:?}");
+        let summaries = merge.summaries();
+        assert!(summaries.len() == 1 && summaries[0].0 == 1, "{summaries:?}");
+        assert!(
+            summaries[0].1.starts_with("2 of 100 frames have no cloud of it that is young enough"),
+            "{summaries:?}"
+        );
         assert_eq!(merge.summaries(), []);
     }
 
@@ -357,8 +360,8 @@ mod tests {
         assert!(found[last_of_first + 1..].iter().all(|(_, values)| values == &[None, Some(2.0)]));
         assert_eq!(found.last().unwrap().0, 995);
         assert!(merge.has_stale());
-        let told = merge.summaries();
-        assert!(told[0].1.contains("they are of 0 to 0.49 s, frames of 0 to 0.995 s"), "{told:?}");
+        let summaries = merge.summaries();
+        assert!(summaries[0].1.contains("they are of 0 to 0.49 s, frames of 0 to 0.995 s"), "{summaries:?}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::author::{DrawnPoses, drawn_position};
 use crate::body::{Body, Up};
 use crate::error::Result;
 
-/// Poses of `body` with the joints of `robot`, of which axis `up` points up, as [`DrawnPoses::of_own_joints`] draws them. A link
+/// Poses of `body` with the joints of `robot`, whose axis `up` points up, as [`DrawnPoses::of_own_joints`] draws them. A link
 /// that the robot does not have keeps its place on the link above it.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! What is odd about joint states, each told once.
+//! Remarks on odd joint states, each reported once.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ pub(super) struct JointRemarks {
     has_told_of_carried: bool,
     /// Joints that the URDF does not have.
     strange: BTreeSet<String>,
-    /// What is still to be told, a line each.
+    /// Remarks that are not reported yet, a line each.
     pub(super) notices: Vec<String>,
 }
 

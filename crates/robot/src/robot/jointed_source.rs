@@ -33,7 +33,7 @@ const COMES_WITHIN_S: f64 = 1.0;
 const DEFAULT_MAX_AGE_S: f64 = 0.1;
 
 impl JointOptions {
-    /// Joint states that frames carry, for a URDF of which axis `up` points up.
+    /// Joint states that frames carry, for a URDF whose axis `up` points up.
     #[must_use]
     pub fn new(up: Up) -> Self {
         Self { up, states: None, delay_s: 0.0, max_age_s: DEFAULT_MAX_AGE_S }
@@ -42,7 +42,7 @@ impl JointOptions {
 
 /// Frames of another source, with poses of links from joint states.
 ///
-/// A frame's own pose of a link overrides the joints', and what hangs on that link goes from there: so a floating base is given. Where a
+/// A frame's own pose of a link overrides the joints'. Links below it start from that pose: this gives a floating base. Where a
 /// joint that moves a link with taxels has no state, or an old one, the frame has [`Frame::has_stale_pose`], and poses of those
 /// links alone that such joints do not move.
 ///
@@ -66,9 +66,9 @@ pub struct JointedSource {
     stale_since_s: Option<f64>,
     /// The joint that was named first.
     named: Option<usize>,
-    /// Whether the last time that it became stale was told, and when that was, s.
-    is_stale_told: bool,
-    told_s: f64,
+    /// Whether it reported the last time that it became stale, and when it last did, s.
+    is_stale_reported: bool,
+    reported_s: f64,
     counts: PoseCounts,
     remarks: JointRemarks,
 }
@@ -132,8 +132,8 @@ impl JointedSource {
             was_stale: false,
             stale_since_s: None,
             named: None,
-            is_stale_told: false,
-            told_s: f64::NEG_INFINITY,
+            is_stale_reported: false,
+            reported_s: f64::NEG_INFINITY,
             counts: PoseCounts::default(),
             remarks: JointRemarks::default(),
             robot,
@@ -263,13 +263,13 @@ impl JointedSource {
     fn note_late(&mut self, late: &[usize], t_s: f64) {
         let is_stale = !late.is_empty();
         if is_stale && !self.was_stale {
-            // States that keep coming too late are told of now and then, and counted at the end.
-            self.is_stale_told = t_s - self.told_s >= QUIET_S;
-            self.told_s = if self.is_stale_told { t_s } else { self.told_s };
-            self.stale_since_s = self.is_stale_told.then_some(t_s);
+            // States that keep coming too late are reported now and then, and counted at the end.
+            self.is_stale_reported = t_s - self.reported_s >= QUIET_S;
+            self.reported_s = if self.is_stale_reported { t_s } else { self.reported_s };
+            self.stale_since_s = self.is_stale_reported.then_some(t_s);
             self.named = late.first().copied();
         }
-        if is_stale != self.was_stale && self.is_stale_told {
+        if is_stale != self.was_stale && self.is_stale_reported {
             self.remarks.notices.push(match late.first() {
                 Some(&first) => {
                     let (joint, link) = &self.matches.needed[first];

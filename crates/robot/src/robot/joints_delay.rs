@@ -20,8 +20,8 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// Of the spans `took_ns`. `None` where there are none.
-    fn of(mut took_ns: Vec<i128>) -> Option<Self> {
+    /// The transport times `took_ns`. `None` if there are none.
+    fn from_spans(mut took_ns: Vec<i128>) -> Option<Self> {
         took_ns.sort_unstable();
         let (least_ns, median_ns) = (*took_ns.first()?, *took_ns.get(took_ns.len() / 2)?);
         Some(Self { messages: took_ns.len(), least_ns, median_ns })
@@ -106,7 +106,7 @@ fn transport(reader: &mut BagReader, place: &str) -> Result<Transport> {
             took_ns.push(i128::from(message.log_ns) - i128::from(stamp_ns));
         }
     }
-    Transport::of(took_ns).ok_or_else(|| {
+    Transport::from_spans(took_ns).ok_or_else(|| {
         let what =
             "its messages have no stamps, and --joints-delay auto compares stamps; give --joints-delay in seconds";
         Error::failed(what).at(place)
@@ -119,14 +119,15 @@ mod tests {
 
     #[test]
     fn the_delay_is_the_difference_of_the_least_spans() {
-        let of = |took_ms: &[i128]| Transport::of(took_ms.iter().map(|ms| ms * 1_000_000).collect());
+        let transport = |took_ms: &[i128]| Transport::from_spans(took_ms.iter().map(|ms| ms * 1_000_000).collect());
         // The joints' clock is 250 ms ahead: less seems to pass until their messages come.
-        let estimate = DelayEstimate { frames: of(&[9, 2, 5]).unwrap(), joints: of(&[-240, -248, -246]).unwrap() };
+        let estimate =
+            DelayEstimate { frames: transport(&[9, 2, 5]).unwrap(), joints: transport(&[-240, -248, -246]).unwrap() };
         assert!((estimate.delay_s() - 0.25).abs() < 1e-12);
         assert!((estimate.frames.spread_s() - 0.003).abs() < 1e-12);
         let line = estimate.to_string();
         assert!(line.starts_with("--joints-delay auto is 0.250000 s, from 3 clouds and 3 states"), "{line}");
         assert!(line.ends_with("clouds took 3.0 ms longer than their fastest, and states 2.0 ms"), "{line}");
-        assert_eq!(of(&[]), None);
+        assert_eq!(transport(&[]), None);
     }
 }

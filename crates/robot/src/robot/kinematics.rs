@@ -58,7 +58,7 @@ impl Kinematics {
     /// It is not a URDF, or its joints are not a tree; with the line.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        Self::of(&Robot::load_joints(path)?).map_err(|e| e.at(path.display()))
+        Self::from_robot(&Robot::load_joints(path)?).map_err(|e| e.at(path.display()))
     }
 
     /// Reads a URDF from `text`; errors call it `name`.
@@ -66,10 +66,10 @@ impl Kinematics {
     /// # Errors
     /// As [`Kinematics::load`].
     pub fn from_urdf(name: &str, text: &str) -> Result<Self> {
-        Robot::joints_of(text).and_then(|robot| Self::of(&robot)).map_err(|e| e.at(name))
+        Robot::joints_of(text).and_then(|robot| Self::from_robot(&robot)).map_err(|e| e.at(name))
     }
 
-    fn of(robot: &Robot) -> Result<Self> {
+    fn from_robot(robot: &Robot) -> Result<Self> {
         let drivers = followed(robot)?;
         let is_own = |index: usize, joint: &UrdfJoint| joint.is_driven() && drivers[index].joint == index;
         let own: Vec<&UrdfJoint> = robot
@@ -280,7 +280,7 @@ mod tests {
             robot.link_names().zip(poses).filter(|(_, pose)| pose.is_some()).map(|(name, _)| name).collect()
         };
         assert_eq!(known(&poses), ["base"]);
-        // A pose of the hand says where that is and what hangs on it.
+        // A pose of the hand places the hand and the links below it.
         let hand = robot.link_names().position(|name| name == "hand").unwrap();
         let given = |link: usize| (link == hand).then_some(Some(DAffine3::from_translation(DVec3::X)));
         robot.poses_into(|joint| (joint == 0).then_some(0.5), given, &DAffine3::IDENTITY, &mut poses);

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
+use super::joint_positions::joint_positions;
 use super::messages::{JointState, Message as _};
 use super::stamped_states::StampedStates;
-use super::told_positions::told_positions;
 use crate::dds::{Delivery, Node, Reader};
 use crate::error::{Error, Result, failed};
 use crate::signal::Frame;
@@ -13,7 +13,7 @@ use crate::source::Source;
 
 /// States that are kept until the next frame reads them.
 const DEPTH: usize = 64;
-/// How long the first state may take before that is told.
+/// How long the first state may take before a warning.
 const COMES_WITHIN: Duration = Duration::from_secs(5);
 /// How far stamps of one clock may be from the time of the frame that comes with them, s.
 const ONE_CLOCK_S: f64 = 1.0;
@@ -25,7 +25,7 @@ const NODE: &str = "somatic_joints";
 pub enum StatesTime {
     /// Those that have come since the frame before: the clocks have nothing in common.
     Arrival,
-    /// Those of its time: a position is between those of two stamps, or the last where no later one has come.
+    /// Positions at its own time: between the positions of two stamps, or the last position if no later one has come.
     Stamp {
         /// How much later the joints' clock stamps an instant than the frames' clock, s.
         delay_s: f64,
@@ -44,8 +44,8 @@ pub struct LiveJoints {
     states: Reader<JointState>,
     /// When it began to wait for the first state; nothing once that has come.
     waits_since: Option<Instant>,
-    /// Whether it was told that nothing comes.
-    has_told: bool,
+    /// Whether it has reported that no state comes.
+    has_reported: bool,
     time: StatesTime,
     /// Joints that have arrived since the last frame.
     arrived: BTreeMap<String, f64>,
@@ -70,7 +70,7 @@ impl LiveJoints {
             topic: topic.to_owned(),
             states,
             waits_since: Some(Instant::now()),
-            has_told: false,
+            has_reported: false,
             time,
             arrived: BTreeMap::new(),
             stamped: StampedStates::default(),
@@ -130,7 +130,7 @@ impl LiveJoints {
 
 /// Gives `put` each joint of `state` and its position. A state without positions tells of none.
 fn take_state(state: &JointState, mut put: impl FnMut(&str, f64)) -> Result<()> {
-    for (joint, position) in told_positions(state)? {
+    for (joint, position) in joint_positions(state)? {
         if !position.is_finite() {
             return Err(failed!("joint `{joint}` is at {position}; send finite numbers"));
         }
@@ -174,8 +174,8 @@ impl Source for LiveJoints {
     fn notices(&mut self) -> Vec<String> {
         let mut notices = self.source.notices();
         notices.extend(self.notice.take());
-        if !self.has_told && self.waits_since.is_some_and(|since| since.elapsed() > COMES_WITHIN) {
-            self.has_told = true;
+        if !self.has_reported && self.waits_since.is_some_and(|since| since.elapsed() > COMES_WITHIN) {
+            self.has_reported = true;
             notices.extend(self.nothing_came());
         }
         notices
@@ -183,7 +183,7 @@ impl Source for LiveJoints {
 
     fn closing(&self) -> Vec<String> {
         let mut closing = self.source.closing();
-        if !self.has_told {
+        if !self.has_reported {
             closing.extend(self.nothing_came());
         }
         closing

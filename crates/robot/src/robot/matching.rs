@@ -32,7 +32,7 @@ pub struct LinkMatches {
 }
 
 impl LinkMatches {
-    /// Matches the links of `robot`, of which axis `up` points up, with those of `body`.
+    /// Matches the links of `robot`, whose axis `up` points up, with those of `body`.
     ///
     /// # Errors
     /// They have no link in common; or with every joint at 0, a link is over [`MAX_REST_DISTANCE_M`] or

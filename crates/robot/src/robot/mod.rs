@@ -23,6 +23,8 @@ mod bag_states;
 mod cloud_merge;
 #[cfg(feature = "meshes")]
 mod drawn;
+#[cfg(any(feature = "mcap", feature = "ros2"))]
+mod joint_positions;
 #[cfg(feature = "meshes")]
 mod joint_remarks;
 #[cfg(feature = "meshes")]
@@ -42,8 +44,6 @@ mod places;
 mod ros2_source;
 #[cfg(feature = "ros2")]
 mod stamped_states;
-#[cfg(any(feature = "mcap", feature = "ros2"))]
-mod told_positions;
 
 #[cfg(feature = "mcap")]
 pub use bag_source::BagSource;

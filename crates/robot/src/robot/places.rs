@@ -26,7 +26,7 @@ pub(super) struct Places {
     of_link: BTreeMap<String, Vec<usize>>,
     all: Vec<usize>,
     body: String,
-    /// Frames of coordinates that clouds may be in: the body's links, and others that were told of.
+    /// Frames of coordinates that clouds may be in: the body's links, and others that were reported.
     frames: BTreeSet<String>,
     /// What is odd about messages, a line each.
     pub(super) notices: Vec<String>,
@@ -286,21 +286,22 @@ mod tests {
     fn points_without_ids_are_the_links_or_all_in_order_or_refused_with_counts() {
         let (mut places, body) = places();
         let (link, taxels) = places.of_link.clone().into_iter().next().unwrap();
-        let of = |count: usize| (0..count).flat_map(|at| (at as f32).to_le_bytes()).collect::<Vec<u8>>();
+        let floats = |count: usize| (0..count).flat_map(|at| (at as f32).to_le_bytes()).collect::<Vec<u8>>();
         let field = [("pressure", 0, 7)];
-        let frame = read(&mut places, &cloud(&link, &field, 4, of(taxels.len()))).unwrap();
+        let frame = read(&mut places, &cloud(&link, &field, 4, floats(taxels.len()))).unwrap();
         for (at, &index) in taxels.iter().enumerate() {
             assert_eq!(frame.values[index].number(), Some(at as f64));
         }
         let all = body.taxels.len();
-        let frame = read(&mut places, &cloud("map", &field, 4, of(all))).unwrap();
+        let frame = read(&mut places, &cloud("map", &field, 4, floats(all))).unwrap();
         assert!(frame.values.iter().enumerate().all(|(at, value)| value.number() == Some(at as f64)));
-        let why = read(&mut places, &cloud(&link, &field, 4, of(all + 1))).unwrap_err().to_string();
+        let why = read(&mut places, &cloud(&link, &field, 4, floats(all + 1))).unwrap_err().to_string();
         assert!(
             why.contains(&format!("{} points", all + 1)) && why.contains(&format!("{} taxels", taxels.len())),
             "{why}"
         );
-        let why = read(&mut places, &cloud(&link, &[("x", 0, 7), ("y", 0, 7)], 4, of(all))).unwrap_err().to_string();
+        let why =
+            read(&mut places, &cloud(&link, &[("x", 0, 7), ("y", 0, 7)], 4, floats(all))).unwrap_err().to_string();
         assert!(why.contains("have x, y"), "{why}");
     }
 

@@ -93,7 +93,7 @@ mod tests {
         assert_eq!(found(&mut states, 4.5), [a(2.0)]);
         assert_eq!(found(&mut states, 4.6), []);
         states.add("a", 5.0.into(), 2.5);
-        // What is late or told twice changes nothing.
+        // Late and repeated states change nothing.
         states.add("a", 4.9.into(), 0.0);
         states.add("a", 5.0.into(), 0.0);
         assert_eq!(found(&mut states, 4.75), [a(2.375)]);

@@ -1,7 +1,7 @@
 //! Carries what a sink is given on a thread of its own, so that a network that blocks never blocks percepts.
 //!
-//! Items wait in a bounded queue. Where it is full, the oldest gives way to the newest. What was left out is counted, told
-//! when it begins and told at the end.
+//! Items wait in a bounded queue. If it is full, the newest replaces the oldest. Dropped items are counted, and reported
+//! when the first is dropped and at the end.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result, failed};
 
-/// Items that were left out within this time of each other are told of once.
+/// Items that are dropped within this time of each other are reported once.
 const QUIET: Duration = Duration::from_secs(10);
 
 /// Brings items to where they go, on the thread of a [`Handover`]. It may block.
@@ -35,7 +35,7 @@ pub(crate) trait Carrier<T>: Send + 'static {
 pub(crate) struct Handed {
     /// Items that were handed over.
     pub(crate) given: u64,
-    /// Those of them that gave way to newer ones, or were still waiting at the end.
+    /// Items that newer ones replaced, or that were still waiting at the end.
     pub(crate) left_out: u64,
 }
 

@@ -1,4 +1,4 @@
-//! The first line of NDJSON, where it is asked for: what numbers are measured in, and of which body they are.
+//! The first line of NDJSON, where it is asked for: the units, and the body.
 
 use serde_json::{Map, Value, json};
 

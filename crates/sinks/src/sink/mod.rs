@@ -78,7 +78,7 @@ pub trait Sink {
     /// They cannot be written; the message names the output.
     fn write(&mut self, percepts: &Percepts) -> Result<Flow>;
 
-    /// Takes what is told of the source's boards. Sinks of percepts ignore it.
+    /// Takes news of the source's boards. Sinks of percepts ignore it.
     ///
     /// # Errors
     /// As [`Sink::write`].
@@ -174,7 +174,7 @@ impl FieldNames {
 
     /// The same with a field's letter and signal, if there are any, as a part of its name.
     #[cfg(feature = "mcap")]
-    fn told_apart(&self) -> Self {
+    fn with_marks(&self) -> Self {
         let marks = [&self.letter, &self.signal].into_iter().flatten();
         Self { field: marks.fold(self.field.clone(), |name, mark| format!("{name} ({mark})")), ..self.clone() }
     }
@@ -244,7 +244,7 @@ pub struct Session<'a> {
     /// Whether the frames are those of a recording, which ends: a recording or bag that is made of them appears when it is whole.
     /// Else it grows under its own name, as what is live can be had only once.
     pub is_recorded: bool,
-    /// Which taxel is on which channel of which board.
+    /// The map from channels of boards to taxels.
     pub wiring: Option<&'a Wiring>,
     /// Zenoh's own configuration, a file; without one limbs send to this computer alone.
     pub zenoh_config: Option<&'a std::path::Path>,
@@ -253,10 +253,10 @@ pub struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// What touches of the whole body are said of; `None` where none are looked for.
+    /// The names that touches of the whole body refer to; `None` if none are looked for.
     #[must_use]
     pub fn skin(&self) -> Option<SkinNames> {
-        SkinNames::of(self.body?, self.plan?)
+        SkinNames::for_plan(self.body?, self.plan?)
     }
 }
 

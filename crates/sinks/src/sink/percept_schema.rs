@@ -177,7 +177,7 @@ mod tests {
         let calibration = Calibration::parse(calibration, &ids).unwrap();
         let options = Options::default().scene(Scene::default().touches(all)).calibration(calibration);
         let mut engine = Engine::new(&body, options).unwrap();
-        let skin = SkinNames::of(&body, engine.plan());
+        let skin = SkinNames::for_plan(&body, engine.plan());
         let lines = LineWriter::new(&FieldNames::all_of(engine.plan()), true).with_skin(skin.as_ref());
         let schema: Value = serde_json::from_str(&text()).unwrap();
         let mut found = Vec::new();

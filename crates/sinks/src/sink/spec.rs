@@ -182,7 +182,7 @@ impl TableWish {
 }
 
 impl SinkSpec {
-    /// Whether it is a table, of which [`TableWish`] says more.
+    /// Whether it is a table; [`TableWish`] says more about it.
     #[must_use]
     pub fn is_table(&self) -> bool {
         matches!(self, Self::Csv(_) | Self::Parquet(_))

@@ -7,7 +7,7 @@ use crate::body::{Body, Modality};
 use crate::percept::{Touch, TouchFlags, TouchFrame, TouchOutputs, Wrench};
 use crate::scene::Plan;
 
-/// What touches of the whole body are said of.
+/// The names that touches of the whole body refer to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SkinNames {
     /// The body's links.
@@ -21,9 +21,9 @@ pub struct SkinNames {
 }
 
 impl SkinNames {
-    /// Those of `body`, whose percepts `plan` makes; `None` where that looks for no touches of the whole body.
+    /// The names of `body`, whose percepts `plan` makes; `None` if `plan` does not look for touches of the whole body.
     #[must_use]
-    pub fn of(body: &Body, plan: &Plan) -> Option<Self> {
+    pub fn for_plan(body: &Body, plan: &Plan) -> Option<Self> {
         let is_node = |taxel: &&crate::body::Taxel| taxel.modality == Modality::Pressure;
         Some(Self {
             links: body.links.iter().map(|link| link.name.clone()).collect(),

@@ -23,7 +23,7 @@ pub(super) struct TouchMark {
 }
 
 impl TouchMark {
-    pub(super) fn of(touch: &Touch) -> Self {
+    pub(super) fn from_touch(touch: &Touch) -> Self {
         let normal = touch.normal.normalize_or(DVec3::Z);
         let along = touch.principal_axis.and_then(|axis| axis.reject_from_normalized(normal).try_normalize());
         let along = along.unwrap_or_else(|| normal.any_orthonormal_vector());
@@ -58,12 +58,12 @@ mod tests {
         let found = engine.percepts().touches(0).unwrap();
         let mut with_axis = 0;
         for touch in &found.touches {
-            let mark = TouchMark::of(touch);
+            let mark = TouchMark::from_touch(touch);
             assert_eq!(mark.position, touch.position);
             let beside = touch.position + DVec3::X;
             let mut placed = touch.clone();
             placed.place = Some(beside);
-            assert_eq!(TouchMark::of(&placed).position, beside);
+            assert_eq!(TouchMark::from_touch(&placed).position, beside);
             assert!((mark.turn * DVec3::Z).distance(touch.normal) < 1e-9, "{mark:?}");
             assert!(mark.diameters_m.min_element() >= LEAST_M && mark.diameters_m.max_element() < 0.3, "{mark:?}");
             let Some((axis, [along_m, across_m])) = touch.principal_axis.zip(touch.spread_m) else { continue };
@@ -77,8 +77,8 @@ mod tests {
         // Without spread it is as wide as its area, or as usual.
         let mut bare = found.touches[0].clone();
         (bare.spread_m, bare.principal_axis, bare.area_m2) = (None, None, Some(std::f64::consts::PI * 1e-4));
-        assert!((TouchMark::of(&bare).diameters_m.x - 0.02).abs() < 1e-12);
+        assert!((TouchMark::from_touch(&bare).diameters_m.x - 0.02).abs() < 1e-12);
         bare.area_m2 = None;
-        assert_eq!(TouchMark::of(&bare).diameters_m.y, USUAL_M);
+        assert_eq!(TouchMark::from_touch(&bare).diameters_m.y, USUAL_M);
     }
 }

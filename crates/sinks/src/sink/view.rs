@@ -97,7 +97,7 @@ impl ViewWriter {
         };
         let top = names.iter().enumerate().filter(|(_, names)| is_top(&names.field));
         Self {
-            top_fields: top.map(|(index, names)| (format!("{FIELDS}{}", names.told_apart().field), index)).collect(),
+            top_fields: top.map(|(index, names)| (format!("{FIELDS}{}", names.with_marks().field), index)).collect(),
             surface: Some(surface),
             index_of: links.iter().enumerate().map(|(index, link)| (link.name.clone(), index)).collect(),
             world: links.iter().map(|link| link.world_from_link).collect(),
@@ -199,7 +199,7 @@ impl ViewWriter {
             for touch in &found.touches {
                 self.max_total = self.max_total.max(touch.total);
                 let share = touch.total / self.max_total.max(f64::MIN_POSITIVE);
-                let TouchMark { position, normal, turn, diameters_m } = TouchMark::of(touch);
+                let TouchMark { position, normal, turn, diameters_m } = TouchMark::from_touch(touch);
                 scene.push(&ShownTouch {
                     id: touch.id,
                     frame: if touch.in_world { &self.world_name } else { &self.links[touch.link as usize].name },

@@ -59,7 +59,7 @@ impl ZenohSink {
         let carrier = LimbCarrier {
             publication,
             taxels: (sends == LimbSends::Frames).then_some(taxels),
-            told: None,
+            layout_sent_at: None,
             is_read: None,
             name: format!("zenoh:{key}"),
             packet: Vec::new(),
@@ -157,7 +157,7 @@ struct LimbCarrier {
     /// Of frames.
     taxels: Option<Vec<u32>>,
     /// When the layout was sent last, and whether somebody reads was looked at.
-    told: Option<Instant>,
+    layout_sent_at: Option<Instant>,
     is_read: Option<bool>,
     name: String,
     packet: Vec<u8>,
@@ -166,8 +166,8 @@ struct LimbCarrier {
 impl Carrier<Vec<u8>> for LimbCarrier {
     fn carry(&mut self, item: &Vec<u8>) -> Result<()> {
         let now = Instant::now();
-        if self.told.is_none_or(|told| now - told >= LAYOUT_PERIOD) {
-            self.told = Some(now);
+        if self.layout_sent_at.is_none_or(|sent_at| now - sent_at >= LAYOUT_PERIOD) {
+            self.layout_sent_at = Some(now);
             let is_read = self.publication.is_read();
             if self.is_read.replace(is_read) != Some(is_read) {
                 let what = if is_read { "it has a subscriber" } else { "it has no known subscriber" };

@@ -188,7 +188,7 @@ fn without(mut edit: JsonEdit<'_>, old: &OldLayout) -> (String, Option<usize>) {
             renumber(&mut edit, span);
         }
     }
-    let tail = Tail::of(&edit, old);
+    let tail = Tail::from_edit(&edit, old);
     let mut emptied = Vec::new();
     for (key, kept) in [("meshes", tail.meshes), ("accessors", tail.accessors), ("bufferViews", tail.views)] {
         let Some(list) = edit.member(&root, key) else { continue };
@@ -221,7 +221,7 @@ struct Tail {
 }
 
 impl Tail {
-    fn of(edit: &JsonEdit<'_>, old: &OldLayout) -> Self {
+    fn from_edit(edit: &JsonEdit<'_>, old: &OldLayout) -> Self {
         let meshes = edit.list("meshes");
         let without_end = |length: usize, goes: &dyn Fn(usize) -> bool| {
             (0..length).rposition(|index| !goes(index)).map_or(0, |last| last + 1)

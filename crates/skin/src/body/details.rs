@@ -89,7 +89,7 @@ pub struct Mark {
 /// The body called `name` in `bytes`, a file with its own buffers, and its details.
 pub(super) fn read(name: &str, bytes: &[u8]) -> Result<(Body, Details)> {
     let document = Document::parse(bytes, None)?;
-    let nodes = Nodes::of(&document)?;
+    let nodes = Nodes::from_document(&document)?;
     let (body, sources) = from_document(name, &document, &nodes)?;
     let mut parts = Vec::with_capacity(sources.surfaces.len());
     for (&(node, primitive), surface) in sources.surfaces.iter().zip(&body.surfaces) {

@@ -211,7 +211,7 @@ fn slack(link_from_mesh: &DAffine3, longest: f64) -> f64 {
 
 /// The surface around a place, to be pierced by lines.
 pub enum Near {
-    /// Search indices of whole surfaces, of which what is within `radius` of `centre` counts.
+    /// Search indices of whole surfaces; only what is within `radius` of `centre` counts.
     Trees {
         /// The indices.
         trees: Vec<Rc<TriangleTree>>,

@@ -35,7 +35,7 @@ pub(super) struct Nodes<'a> {
 }
 
 impl<'a> Nodes<'a> {
-    pub(super) fn of(document: &'a Document) -> Result<Self> {
+    pub(super) fn from_document(document: &'a Document) -> Result<Self> {
         let raw = &document.root.nodes[..];
         if raw.len() > MAX_NODES {
             return Err(failed!("it has {} nodes, over the {MAX_NODES} that a body may have; merge some", raw.len()));

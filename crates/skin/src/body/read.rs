@@ -70,7 +70,7 @@ impl Body {
 fn read(name: &str, bytes: &[u8], folder: Option<&Path>) -> Result<Body> {
     refuse_other_formats(name, bytes)?;
     let document = Document::parse(bytes, folder)?;
-    let nodes = Nodes::of(&document)?;
+    let nodes = Nodes::from_document(&document)?;
     from_document(name, &document, &nodes).map(|(body, _)| body)
 }
 
@@ -112,7 +112,7 @@ fn check_size(document: &Document, nodes: &Nodes<'_>) -> Result<()> {
         let of_positions = document.count(positions);
         vertices = vertices.saturating_add(of_positions);
         let own = primitive.indices.map_or(of_positions, |indices| document.count(indices.value()));
-        // Those of a strip or fan have a corner of their own each.
+        // Triangles of a strip or fan have a corner of their own each.
         let own = match primitive.mode {
             Checked::Valid(Mode::Triangles) => own / 3,
             Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => own,

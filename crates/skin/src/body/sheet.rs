@@ -1,4 +1,4 @@
-//! Flat sheets of sensors, of which each is a link with a mesh of its cells, its taxels, and its fields.
+//! Flat sheets of sensors. Each is a link with a mesh of its cells, its taxels, and its fields.
 
 use std::collections::{BTreeSet, HashMap};
 

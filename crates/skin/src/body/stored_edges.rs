@@ -83,7 +83,7 @@ impl StoredEdges {
         text + "}}"
     }
 
-    /// The edges in `texts`, of which a file should have one; an error says why they cannot be used.
+    /// The edges in `texts`; a file should have one text. An error says why they cannot be used.
     pub(super) fn of_nodes<'a>(texts: impl Iterator<Item = &'a String>) -> Result<Option<Self>> {
         // Editors copy nodes.
         let texts: BTreeSet<&String> = texts.collect();

@@ -36,11 +36,11 @@ impl Body {
                     let way = |&(link, way): &(usize, DAffine3)| (link, self.links[link].body_from_link * way);
                     let ways: Vec<(usize, DAffine3)> = joints.iter().map(way).collect();
                     let mirrored = ways.first().is_some_and(|(_, way)| way.matrix3.determinant() < 0.0);
-                    let of = |v: u32| ways[heaviest[v as usize]];
-                    let at = |v: u32| of(v).1.transform_point3(surface.positions[v as usize]);
+                    let way = |v: u32| ways[heaviest[v as usize]];
+                    let at = |v: u32| way(v).1.transform_point3(surface.positions[v as usize]);
                     triangles.extend(surface.triangles.iter().map(|&[a, b, c]| {
                         let [a, b, c] = if mirrored { [a, c, b] } else { [a, b, c] };
-                        (of(a).0, [at(a), at(b), at(c)])
+                        (way(a).0, [at(a), at(b), at(c)])
                     }));
                 }
             }

@@ -48,7 +48,7 @@ pub fn read_taxel_table(reader: impl Read, flat: bool) -> Result<Vec<TaxelRow>> 
         failed!("not a valid table: {e}; give the columns id,x,y,z").at(format!("line {row}"))
     };
     let header = reader.headers().map_err(|e| broken(&e))?.clone();
-    let columns = Columns::of(&header, flat)?;
+    let columns = Columns::from_header(&header, flat)?;
     let mut rows: Vec<TaxelRow> = Vec::new();
     let mut seen = HashMap::new();
     for record in reader.records() {
@@ -84,7 +84,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(header: &csv::StringRecord, flat: bool) -> Result<Self> {
+    fn from_header(header: &csv::StringRecord, flat: bool) -> Result<Self> {
         if let Some(unknown) = header.iter().find(|own| !COLUMNS.iter().any(|known| own.eq_ignore_ascii_case(known))) {
             return Err(failed!(
                 "there is no column `{unknown}` in a table of taxels; it may have {}: rename or remove it",

@@ -32,7 +32,7 @@ pub struct Distortion {
 impl Distortion {
     /// The distortion of a chart that maps `members` (position, m, and unit normal) to `places`, m.
     #[must_use]
-    pub fn of(members: &[(DVec3, DVec3)], places: &[DVec2]) -> Self {
+    pub fn measure(members: &[(DVec3, DVec3)], places: &[DVec2]) -> Self {
         let tree = point_tree(members.iter().map(|(position, _)| *position));
         let mut measured = Self::default();
         let (mut squares, mut pairs) = (0.0, 0_u64);
@@ -83,22 +83,22 @@ mod tests {
     #[test]
     fn an_unrolled_cylinder_has_none_and_a_projected_one_its_cosine() {
         let (members, places): (Vec<_>, Vec<_>) = cylinder(0.1, 12).into_iter().unzip();
-        let unrolled = Distortion::of(&members, &places);
+        let unrolled = Distortion::measure(&members, &places);
         assert!(unrolled.largest < 1e-13 && unrolled.rms <= unrolled.largest, "{unrolled:?}");
         let projected: Vec<DVec2> = members.iter().map(|(position, _)| position.truncate()).collect();
-        let projected = Distortion::of(&members, &projected);
+        let projected = Distortion::measure(&members, &projected);
         // The outermost pair lies between 1.1 and 1.2 rad.
         let right = 1.0 - (1.2_f64.sin() - 1.1_f64.sin()) / 0.1;
         assert!((projected.largest - right).abs() < 1e-12, "{projected:?} {right}");
         assert!(projected.rms > 0.0 && projected.rms < projected.largest);
         let doubled: Vec<DVec2> = places.iter().map(|&p| 2.0 * p).collect();
-        assert!((Distortion::of(&members, &doubled).rms - 1.0).abs() < 1e-12);
+        assert!((Distortion::measure(&members, &doubled).rms - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn members_on_one_point_or_alone_have_none() {
         let member = (DVec3::X, DVec3::Z);
-        assert_eq!(Distortion::of(&[member; 40], &[DVec2::ZERO; 40]), Distortion::default());
-        assert_eq!(Distortion::of(&[], &[]), Distortion::default());
+        assert_eq!(Distortion::measure(&[member; 40], &[DVec2::ZERO; 40]), Distortion::default());
+        assert_eq!(Distortion::measure(&[], &[]), Distortion::default());
     }
 }

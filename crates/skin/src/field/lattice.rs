@@ -34,7 +34,7 @@ impl Lattice {
             if field.members.iter().any(|member| taken.contains(&member.taxel)) {
                 continue;
             }
-            if let Some(lattice) = Self::of(field) {
+            if let Some(lattice) = Self::from_field(field) {
                 taken.extend(lattice.taxels.iter().copied());
                 lattices.push(lattice);
             }
@@ -64,7 +64,7 @@ impl Lattice {
     }
 
     /// The members of a field with a chart as a lattice; `None` where they do not lie in rows and columns.
-    fn of(field: &Field) -> Option<Self> {
+    fn from_field(field: &Field) -> Option<Self> {
         let spacing_m = field.spacing_m();
         let along = |axis: fn(glam::DVec3) -> f64| {
             lines(&field.members.iter().map(|member| axis(member.place)).collect::<Vec<f64>>(), ACROSS * spacing_m)
@@ -109,11 +109,11 @@ mod tests {
 
     #[test]
     fn a_mat_has_rows_and_columns_and_a_scattered_skin_none() {
-        let of = |glb: &[u8]| {
+        let lattice_of = |glb: &[u8]| {
             let body = crate::body::Body::from_bytes("body", glb).unwrap();
             (body.taxels.len(), Lattice::all(&FieldSet::new(&body).unwrap()))
         };
-        let (count, mat) = of(somatic_bodies::MAT);
+        let (count, mat) = lattice_of(somatic_bodies::MAT);
         assert_eq!(mat.iter().map(|lattice| lattice.taxels.len()).sum::<usize>(), count, "each once");
         // Only every other taxel, the last one first.
         let (whole, some) = (&mat[0], (0..count).rev().step_by(2).collect::<Vec<_>>());
@@ -123,7 +123,7 @@ mod tests {
             let at = whole.taxels.iter().position(|taxel| *taxel == some[*place]).unwrap();
             assert_eq!((whole.rows[at], whole.columns[at]), (*row, *column));
         }
-        let (_, humanoid) = of(somatic_bodies::HUMANOID);
+        let (_, humanoid) = lattice_of(somatic_bodies::HUMANOID);
         assert_eq!(humanoid, []);
     }
 }

@@ -42,14 +42,14 @@ impl FieldSet {
                 Err(_) => {}
             }
         }
-        Ok(Recharted { fields: Self::of(body, &specs)?, kept })
+        Ok(Recharted { fields: Self::from_specs(body, &specs)?, kept })
     }
 
     /// `spec` of field `index`, if it can have a plane chart.
     fn plane(&self, body: &Body, index: usize, spec: FieldSpec) -> std::result::Result<FieldSpec, NoChart> {
         let taxels: Vec<usize> = self.fields[index].members.iter().map(|member| member.taxel).collect();
         let alone = FieldSpec { parent: None, ..spec.clone() }.with_members(taxels.iter().map(|&t| body.taxels[t].id));
-        let made = Self::of(body, &[alone]).ok().and_then(|mut set| set.fields.pop());
+        let made = Self::from_specs(body, &[alone]).ok().and_then(|mut set| set.fields.pop());
         made.map_or(Err(NoChart::NoTaxels), |field| field.chart.map(|_| spec))
     }
 }

@@ -24,7 +24,7 @@ pub struct ContactTolerance {
 }
 
 impl ContactTolerance {
-    /// That of `body`, or `given_m` for all of its links.
+    /// The tolerance of `body`, or `given_m` for all of its links.
     #[must_use]
     pub fn new(body: &Body, given_m: Option<f64>) -> Self {
         let mut places: Vec<Vec<[f64; 3]>> = vec![Vec::new(); body.links.len()];

@@ -18,7 +18,7 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// Those of `body` that one of `links` moves.
+    /// The groups of `body` that one of `links` moves.
     pub(super) fn all(body: &Body, links: impl Iterator<Item = usize>) -> Vec<Self> {
         let mut surfaces: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (surface, group) in surface_groups(body).into_iter().enumerate() {

@@ -79,10 +79,10 @@ impl FieldSet {
     /// # Errors
     /// A field has no taxel, nor have its descendants.
     pub fn new(body: &Body) -> Result<Self> {
-        Self::of(body, &body.fields)
+        Self::from_specs(body, &body.fields)
     }
 
-    pub(super) fn of(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
+    pub(super) fn from_specs(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
         let parents = parents(specs);
         let taxels = unions(specs);
         let nearest = Nearest::new(body);
@@ -168,7 +168,7 @@ fn complete(
         .collect();
     let chart = laid.map(|(_, [u_in_anchor, v_in_anchor, normal_in_anchor])| {
         let places: Vec<DVec2> = members.iter().map(|member| member.place.truncate()).collect();
-        let Distortion { largest, rms, .. } = Distortion::of(&in_anchor, &places);
+        let Distortion { largest, rms, .. } = Distortion::measure(&in_anchor, &places);
         Chart { kind, u_in_anchor, v_in_anchor, normal_in_anchor, distortion: largest, distortion_rms: rms }
     });
     Field { name: spec.name.clone(), parent, anchor, members, origin_in_anchor, chart }

@@ -156,7 +156,7 @@ impl Patch<'_> {
         };
         let ways: Vec<_> = reached.into_iter().flatten().collect();
         let uv: Vec<DVec2> = ways.iter().map(|way| way.uv).collect();
-        let distortion = Distortion::of(members, &uv);
+        let distortion = Distortion::measure(members, &uv);
         let nearest = |i: usize| {
             let others = members.iter().map(|(position, _)| position.distance(members[i].0)).filter(|&d| d > 0.0);
             others.fold(f64::INFINITY, f64::min)

@@ -51,7 +51,7 @@ pub(super) fn folder_of(path: &Path) -> &Path {
 
 impl Destination {
     /// The destination of `path`; `-` is standard output. Its folder must exist; the file or the target of a link need not.
-    pub(super) fn of(path: &Path) -> io::Result<Self> {
+    pub(super) fn from_path(path: &Path) -> io::Result<Self> {
         if path.as_os_str() == STANDARD_OUTPUT {
             return Ok(Self::Stream(Stream::Output));
         }

@@ -30,7 +30,7 @@ impl OutputPath {
     /// It does not exist, or is not a regular file.
     pub fn edit(path: impl AsRef<Path>) -> Result<Self> {
         let name = path.as_ref().to_owned();
-        match Destination::of(&name).map_err(|e| Error::io(&name, &e))? {
+        match Destination::from_path(&name).map_err(|e| Error::io(&name, &e))? {
             destination @ Destination::File(_) => Ok(Self { name, destination, replaces: true }),
             _ => Err(Error::failed("only a file can be edited in place").at(name.display())),
         }
@@ -83,7 +83,7 @@ impl OutputPaths {
     /// A usage error if it is an input or another output; it exists, is closed, is a folder, or is in a folder that does not exist.
     pub fn add(&mut self, path: impl AsRef<Path>) -> Result<OutputPath> {
         let name = path.as_ref().to_owned();
-        let destination = Destination::of(&name).map_err(|e| Error::io(&name, &e))?;
+        let destination = Destination::from_path(&name).map_err(|e| Error::io(&name, &e))?;
         if let Destination::Stream(stream) = &destination {
             stream.check()?;
         }

@@ -63,7 +63,7 @@ pub struct TaxelCalibration {
     pub response: Response,
     /// What P is. Gain, dead band and P_max are in its SI unit, whatever unit the file is in.
     pub quantity: Quantity,
-    /// How large the sensor is beside its cell; `None` where nothing is said.
+    /// The sensor's size relative to its cell; `None` if it is not given.
     pub sensors: Option<Sensors>,
 }
 
@@ -88,7 +88,7 @@ impl Default for TaxelCalibration {
 
 impl TaxelCalibration {
     /// Whether its P counts times the area of its cell in the place and axis of a touch: a pressure always does, a force or a count of
-    /// sensors of one size. Where nothing is said of sensors, those that give newtons cover their cells, and others are of one size.
+    /// sensors of one size. If nothing is given, sensors that give newtons cover their cells, and others are of one size.
     #[must_use]
     pub fn weighs_by_cell(&self) -> bool {
         match (self.quantity, self.sensors) {

@@ -10,7 +10,7 @@ use zenoh::{Session, Wait as _};
 
 use crate::error::{Result, failed};
 
-/// The port on which a head listens for limbs on its own computer, unless told otherwise: Zenoh's.
+/// The default port on which a host listens for limbs on its own computer: Zenoh's.
 const PORT: u16 = 7447;
 
 /// Which side of the network a session is on, where no configuration says more.

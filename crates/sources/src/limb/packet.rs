@@ -237,8 +237,8 @@ mod tests {
         let mut frame = Vec::new();
         frame_packet(&mut frame, 0, 0, 0.0, 1, &[RawValue::new(1.0)]);
         for cut in 0..frame.len() {
-            let told = open(&frame[..cut]);
-            assert_eq!(told.is_ok(), cut == FRAME_BYTES, "{cut}");
+            let opened = open(&frame[..cut]);
+            assert_eq!(opened.is_ok(), cut == FRAME_BYTES, "{cut}");
         }
         for (at, byte, why) in [(0, 2, "version 2"), (1, 9, "kind 9")] {
             let mut other = frame.clone();

@@ -143,7 +143,7 @@ mod tests {
     use super::*;
     use crate::limb::{Packet, PerceptHead, open, percepts_begin};
 
-    fn told(key: &str, line: &str) -> Result<String, String> {
+    fn qualified_line(key: &str, line: &str) -> Result<String, String> {
         let mut bytes = Vec::new();
         percepts_begin(&mut bytes, PerceptHead { boot: 1, sequence: 0 });
         bytes.extend_from_slice(line.as_bytes());
@@ -155,19 +155,19 @@ mod tests {
     fn ids_get_the_limb_and_all_else_stays_byte_for_byte() {
         let line = r#""t":1.5,"frame":7,"touches":[{"id":3,"age":0.1,"link":"middle","total":1e-7,"links":{"middle":1.0},"flags":["young"]},{"id":4}],"released":[1,2],"fields":[{"field":"a \"b\"","total":100000000000000.0,"touches":{"3":0.25,"4":1.0},"flags":[]},{"field":"c","touches":{}}],"self_contacts":[{"id":0,"fields":["a","c"],"touches":[3,4],"position":[0.10,1,2]}]}"#;
         let wanted = r#","frame":7,"touches":[{"id":"robot/left/3","age":0.1,"link":"middle","total":1e-7,"links":{"middle":1.0},"flags":["young"]},{"id":"robot/left/4"}],"released":["robot/left/1","robot/left/2"],"fields":[{"field":"a \"b\"","total":100000000000000.0,"touches":{"robot/left/3":0.25,"robot/left/4":1.0},"flags":[]},{"field":"c","touches":{}}],"self_contacts":[{"id":"robot/left/0","fields":["a","c"],"touches":["robot/left/3","robot/left/4"],"position":[0.10,1,2]}]}"#;
-        assert_eq!(told("robot/left", line).unwrap(), wanted);
+        assert_eq!(qualified_line("robot/left", line).unwrap(), wanted);
         // A limb without touches has none here.
         let line = r#""t":1.5,"frame":7,"fields":[{"field":"a","contact":false}]}"#;
-        assert_eq!(told("left", line).unwrap(), r#","frame":7,"fields":[{"field":"a","contact":false}]}"#);
+        assert_eq!(qualified_line("left", line).unwrap(), r#","frame":7,"fields":[{"field":"a","contact":false}]}"#);
         // Names of limbs are text as any other.
         let line = r#""t":1.5,"frame":7,"touches":[{"id":3}],"fields":[]}"#;
-        assert_eq!(told("a\"b", line).unwrap(), r#","frame":7,"touches":[{"id":"a\"b/3"}],"fields":[]}"#);
+        assert_eq!(qualified_line("a\"b", line).unwrap(), r#","frame":7,"touches":[{"id":"a\"b/3"}],"fields":[]}"#);
     }
 
     #[test]
     fn two_limbs_ids_differ() {
         let line = r#""t":0,"frame":0,"touches":[{"id":17}],"released":[16],"fields":[]}"#;
-        let [left, right] = ["left", "right"].map(|key| told(key, line).unwrap());
+        let [left, right] = ["left", "right"].map(|key| qualified_line(key, line).unwrap());
         assert!(left.contains(r#""id":"left/17""#) && left.contains(r#"["left/16"]"#) && right.contains("right/17"));
     }
 
@@ -179,7 +179,7 @@ mod tests {
             r#""t":0,"frame":0,"released":["a"],"fields":[]}"#,
             r#""t":0,"frame":0,"fields":[{"field":"a","touches":"b"}]}"#,
         ] {
-            let why = told("left", line).unwrap_err();
+            let why = qualified_line("left", line).unwrap_err();
             assert!(why.starts_with("it sends JSON that is not percepts: ") && !why.contains('\n'), "{why}");
         }
     }

@@ -3,7 +3,7 @@
 /// What a limb sends to the computer that brings limbs together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimbSends {
-    /// Raw frames, of which that computer makes percepts.
+    /// Raw frames; the host makes percepts of them.
     Frames,
     /// Percepts, as in NDJSON.
     Percepts,

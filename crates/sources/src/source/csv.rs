@@ -416,7 +416,7 @@ mod tests {
         assert!(usage("0.5,1,2\n", None).contains("give --rate HZ, and add"));
         let eighty_one = vec!["7"; 81].join(",");
         assert!(usage(&format!("{eighty_one}\n{eighty_one}\n"), None).contains("--grid 9x9"));
-        // Ids are ids, and it is said that they are taken for them.
+        // A first row of ids is read as ids, and a notice says so.
         for ids in ["4,7\n", "7,4\n"] {
             let mut source = open(&format!("{ids}1,2\n3,4\n"), Some(20.0)).unwrap();
             let said = source.notices();
@@ -460,7 +460,7 @@ mod tests {
         assert_eq!(times("t [ms],4\n1000,1\n1050,1\n"), (vec![1.0, 1.05], 0));
         assert_eq!(times("millis,4\n1000,1\n1050,1\n"), (vec![1.0, 1.05], 0));
         assert_eq!(times("time,4\n0.5,1\n0.6,1\n"), (vec![0.5, 0.6], 0));
-        // What nobody said is told.
+        // A guessed unit is reported.
         assert_eq!(times("t,4\n1768494979568,1\n1768494979584,1\n"), (vec![1_768_494_979.568, 1_768_494_979.584], 1));
         assert_eq!(times("timestamp,4\n1970-01-01T00:00:01Z,1\n1970-01-01T00:00:01.5Z,1\n"), (vec![1.0, 1.5], 1));
         assert_eq!(times("t,4\n1000,1\n1050,1\n1100,1\n"), (vec![1000.0, 1050.0, 1100.0], 1));

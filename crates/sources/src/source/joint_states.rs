@@ -120,7 +120,7 @@ impl JointStates {
                 .at(at()));
             }
             let t_s = time.read(&row[0], row[0].parse().ok()).map_err(|e| e.at(at()))?;
-            // An empty cell is a joint of which nothing is told.
+            // An empty cell is a joint without a position.
             for column in (1..header.len()).filter(|&column| !row[column].is_empty()) {
                 self.push(column - 1, t_s, number(column)?).map_err(|e| e.at(at()))?;
             }

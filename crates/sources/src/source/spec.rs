@@ -187,7 +187,7 @@ impl SourceSpec {
         matches!(self, Self::Stdin | Self::CsvStdin | Self::Text(TextPlace::Stdin))
     }
 
-    /// What it is by the content of its file, and by what is said of that: a `.csv` may be an export.
+    /// What it is by its file's content and by the options: a `.csv` may be an export.
     #[must_use]
     pub fn with_content(self, options: &VendorOptions) -> Self {
         match self {

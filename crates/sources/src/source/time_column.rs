@@ -188,7 +188,7 @@ fn wrong(word: &str, unit: TimeUnit) -> Error {
     }
 }
 
-/// The unit of a time of which nobody says it: seconds, unless it is one of our days in another unit.
+/// The unit of a time without a stated one: seconds, unless it is a date of our days in another unit.
 pub(super) fn by_size(number: f64) -> TimeUnit {
     let of_our_days = |unit: &TimeUnit| SINCE_1970_S.contains(&(number / unit.seconds()));
     let units = [TimeUnit::Milliseconds, TimeUnit::Microseconds, TimeUnit::Nanoseconds];

@@ -14,14 +14,14 @@ pub(super) struct File<'a> {
 }
 
 impl<'a> File<'a> {
-    pub(super) fn of(document: &'a Document<'a>) -> Self {
+    pub(super) fn from_document(document: &'a Document<'a>) -> Self {
         let mut by_id = HashMap::new();
         for node in document.descendants() {
             if let Some(id) = node.attribute("id") {
                 by_id.entry((node.tag_name().name(), id)).or_insert(node);
             }
         }
-        Self { by_id, lines: Lines::of(document) }
+        Self { by_id, lines: Lines::from_document(document) }
     }
 
     pub(super) fn at(&self, node: Node<'_, '_>, what: impl Into<String>) -> Error {

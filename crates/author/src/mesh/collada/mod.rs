@@ -28,7 +28,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Triangles, Up)> {
     if root.tag_name().name() != "COLLADA" {
         return Err(failed!("not a COLLADA mesh: its root is <{}>", root.tag_name().name()));
     }
-    let file = File::of(&document);
+    let file = File::from_document(&document);
     let mut mesh = file.scene(root)?;
     let asset = root.children().find(|node| node.has_tag_name("asset"));
     let (unit_m, up) = asset.map_or(Ok((1.0, Up::Y)), |asset| file.unit_and_up(asset))?;

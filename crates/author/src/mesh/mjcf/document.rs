@@ -28,7 +28,7 @@ struct Includes<'a> {
 impl Includes<'_> {
     fn put_into(&mut self, text: &str, depth: usize) -> Result<String> {
         let document = parse(text)?;
-        let lines = Lines::of(&document);
+        let lines = Lines::from_document(&document);
         let includes = document.descendants().filter(|node| node.has_tag_name("include"));
         let mut parts: Vec<(std::ops::Range<usize>, String)> = Vec::new();
         for node in includes {
@@ -104,7 +104,7 @@ impl Defaults {
         let own = self.classes.entry(class.to_owned()).or_default();
         for element in node.children().filter(|child| child.is_element() && !child.has_tag_name("default")) {
             let tag = element.tag_name().name();
-            // A new orientation takes the place of an inherited one, however that is written.
+            // A new orientation replaces an inherited one, however that is written.
             if element.attributes().any(|own| ORIENTATIONS.contains(&own.name())) {
                 own.retain(|(known, name), _| known != tag || !ORIENTATIONS.contains(&name.as_str()));
             }

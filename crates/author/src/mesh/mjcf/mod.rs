@@ -44,7 +44,7 @@ pub fn author_mjcf_skin(path: &Path, options: &MeshOptions) -> Result<Authored> 
     build(&model, path, options).map_err(|e| e.at(path.display()))
 }
 
-/// Taxels by body, and what is said of them.
+/// Taxels by body, and the notices about them.
 #[derive(Default)]
 struct Skin {
     by_body: BTreeMap<usize, Vec<Taxel>>,
@@ -60,7 +60,7 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
         return Err(Error::failed(what));
     }
     let mut skin = Skin::default();
-    let mut places = Places::of(model);
+    let mut places = Places::from_model(model);
     let mut first_id = 0_u64;
     for sensor in &model.sensors {
         let at = |e: Error| e.at(format!("line {}", sensor.line));

@@ -32,7 +32,7 @@ pub(super) struct Shape<'a> {
 }
 
 impl<'a> Places<'a> {
-    pub(super) fn of(model: &'a Model) -> Self {
+    pub(super) fn from_model(model: &'a Model) -> Self {
         let mut places = Self {
             model,
             geoms: HashMap::new(),

@@ -4,7 +4,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use crate::error::{Error, Result, failed};
 
-/// The attributes of which one gives an orientation.
+/// Attributes that each give an orientation.
 pub(super) const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "xyaxes", "zaxis", "euler"];
 
 /// How angles are written.
@@ -85,23 +85,23 @@ mod tests {
     #[test]
     fn an_orientation_is_the_same_however_it_is_written() {
         let angles = Angles::default();
-        let of = |name: &str, numbers: &[f64]| angles.orientation(name, numbers).unwrap();
-        let turned = of("euler", &[0.0, 0.0, 90.0]);
+        let orientation = |name: &str, numbers: &[f64]| angles.orientation(name, numbers).unwrap();
+        let turned = orientation("euler", &[0.0, 0.0, 90.0]);
         let half = 0.5_f64.sqrt();
         for other in [
-            of("quat", &[half, 0.0, 0.0, half]),
-            of("axisangle", &[0.0, 0.0, 2.0, 90.0]),
-            of("xyaxes", &[0.0, 1.0, 0.0, -1.0, 0.0, 0.0]),
+            orientation("quat", &[half, 0.0, 0.0, half]),
+            orientation("axisangle", &[0.0, 0.0, 2.0, 90.0]),
+            orientation("xyaxes", &[0.0, 1.0, 0.0, -1.0, 0.0, 0.0]),
             Angles { in_degrees: false, eulerseq: "XYZ".into() }
                 .orientation("euler", &[0.0, 0.0, std::f64::consts::FRAC_PI_2])
                 .unwrap(),
         ] {
             assert!((other * DVec3::X).distance(turned * DVec3::X) < 1e-12);
         }
-        assert!((of("zaxis", &[0.0, 3.0, 0.0]) * DVec3::Z).distance(DVec3::Y) < 1e-12);
+        assert!((orientation("zaxis", &[0.0, 3.0, 0.0]) * DVec3::Z).distance(DVec3::Y) < 1e-12);
         assert!(angles.orientation("quat", &[1.0, 0.0]).is_err() && angles.orientation("zaxis", &[0.0; 3]).is_err());
         // Axes that turn along: about x, then about the new y, which is z.
-        let turned = of("euler", &[90.0, 90.0, 0.0]);
+        let turned = orientation("euler", &[90.0, 90.0, 0.0]);
         assert!((turned * DVec3::X).distance(-DVec3::Z).min((turned * DVec3::X).distance(DVec3::Y)) < 1e-12);
     }
 }

@@ -58,7 +58,7 @@ impl<'a> Reader<'a> {
         for node in root.descendants().filter(|node| node.has_tag_name("instance")) {
             node.attribute("name").map(|name| instances.entry(name).or_insert(node));
         }
-        let (defaults, lines) = (Defaults::read(root)?, Lines::of(document));
+        let (defaults, lines) = (Defaults::read(root)?, Lines::from_document(document));
         let mut reader = Self { defaults, angles, lines, instances, room: Room::default(), model: Model::default() };
         let mesh_folder: PathBuf = folder.join(compiler("meshdir").or(compiler("assetdir")).unwrap_or(""));
         let strips = compiler("strippath") == Some("true");
@@ -88,7 +88,7 @@ impl<'a> Reader<'a> {
         Ok(reader.model)
     }
 
-    /// What stands in `world`, the body 0, in the order of the file. However deep bodies are, no stack grows.
+    /// The content of `world`, the body 0, in the order of the file. Deep bodies do not grow the stack.
     fn bodies(&mut self, world: Node<'_, '_>) -> Result<()> {
         let mut open = vec![(world.children(), 0, DAffine3::IDENTITY)];
         while let Some((children, body, body_from_node)) = open.last_mut() {
@@ -206,7 +206,7 @@ impl<'a> Reader<'a> {
 
     /// The grid of the sensor plugin `node`; `None` if it is another plugin.
     fn touch_grid(&self, node: Node<'_, '_>) -> Result<Option<TouchGrid>> {
-        // What is said in the sensor itself, or in the instance that it names.
+        // A value in the sensor itself, or in the instance that it names.
         let instance = node.attribute("instance").and_then(|wanted| self.instances.get(wanted).copied());
         let plugin = node.attribute("plugin").or_else(|| instance?.parent()?.attribute("plugin"));
         if plugin != Some(TOUCH_GRID) {

@@ -53,7 +53,7 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Those of `plan`; what fills up the last tile is unpressed.
+    /// The tiles of `plan`; what fills up the last tile is unpressed.
     pub(super) fn new(plan: &Plan) -> Self {
         let all: Vec<Tile> = plan.taxels[..plan.calibrated()].chunks(LANES).map(Tile::new).collect();
         Self { sorts: all.iter().map(|tile| tile.sort).collect(), all }
@@ -113,7 +113,7 @@ pub(super) fn tile<S: Simd>(
     let mut any = false;
     let mut at = 0;
     while at < LANES {
-        let of = |row: &Row<f32>| load(simd, row, at);
+        let lanes = |row: &Row<f32>| load(simd, row, at);
         let bits = load_u(simd, raw, at);
         if tile.sort == Sort::Raw && fine(simd, bits).all_true() {
             let (value, none) = (bits.bitcast::<F<S>>(), splat(simd, 0.0));
@@ -123,15 +123,15 @@ pub(super) fn tile<S: Simd>(
             at += width::<S>();
             continue;
         }
-        let above = bits.bitcast::<F<S>>() - of(&tile.baseline);
-        let pressure = above * of(&tile.gain);
+        let above = bits.bitcast::<F<S>>() - lanes(&tile.baseline);
+        let pressure = above * lanes(&tile.gain);
         let plain = fine(simd, bits)
             & fine(simd, pressure.bitcast())
-            & bits.bitcast::<F<S>>().simd_ge(of(&tile.raw_low))
-            & bits.bitcast::<F<S>>().simd_le(of(&tile.raw_high))
-            & pressure.simd_le(of(&tile.p_max));
+            & bits.bitcast::<F<S>>().simd_ge(lanes(&tile.raw_low))
+            & bits.bitcast::<F<S>>().simd_le(lanes(&tile.raw_high))
+            & pressure.simd_le(lanes(&tile.p_max));
         if tile.sort != Sort::Any && plain.all_true() {
-            let over = pressure.simd_gt(of(&tile.dead_band));
+            let over = pressure.simd_gt(lanes(&tile.dead_band));
             store(simd, over.select(pressure, splat(simd, 0.0)), pressures, at);
             store_u(simd, splat_u(simd, 0), statuses, at);
         } else {
@@ -157,7 +157,7 @@ pub(super) fn plain<S: Simd>(
     if sort == Sort::Any {
         return None;
     }
-    let of = |row: &Row<f32>| f32x16::from_slice(simd, row);
+    let lanes = |row: &Row<f32>| f32x16::from_slice(simd, row);
     let (none, mut pressed, mut sizes) = (f32x16::splat(simd, 0.0), u32x16::splat(simd, 0), Sizes::new(simd));
     if sort == Sort::Raw {
         for (bits, pressures) in raw.iter().zip(pressures) {
@@ -171,8 +171,8 @@ pub(super) fn plain<S: Simd>(
             return None;
         }
     } else {
-        let (baseline, gain, dead_band) = (of(&tile.baseline), of(&tile.gain), of(&tile.dead_band));
-        let (mut low, mut high, mut most) = (of(&tile.raw_high), of(&tile.raw_low), none);
+        let (baseline, gain, dead_band) = (lanes(&tile.baseline), lanes(&tile.gain), lanes(&tile.dead_band));
+        let (mut low, mut high, mut most) = (lanes(&tile.raw_high), lanes(&tile.raw_low), none);
         for (bits, pressures) in raw.iter().zip(pressures) {
             let bits = u32x16::from_slice(simd, bits);
             let value = bits.bitcast::<f32x16<S>>();
@@ -184,8 +184,8 @@ pub(super) fn plain<S: Simd>(
             pressed |= pressure.bitcast::<u32x16<S>>();
             pressure.store_slice(pressures);
         }
-        let within = low.simd_ge(of(&tile.raw_low)) & high.simd_le(of(&tile.raw_high));
-        if !(sizes.are_fine(simd) && (within & most.simd_le(of(&tile.p_max))).all_true()) {
+        let within = low.simd_ge(lanes(&tile.raw_low)) & high.simd_le(lanes(&tile.raw_high));
+        if !(sizes.are_fine(simd) && (within & most.simd_le(lanes(&tile.p_max))).all_true()) {
             return None;
         }
     }
@@ -268,7 +268,7 @@ pub(super) fn shared_frame(
     faulty != 0
 }
 
-/// Those of `range`, which `pressures` and `statuses` begin with.
+/// The tiles in `range`, which `pressures` and `statuses` begin with.
 #[inline(always)]
 fn some_tiles<S: Simd>(
     simd: S,
@@ -328,14 +328,15 @@ fn plain_tiles<S: Simd>(
             continue;
         }
         let tile = &tiles.all[index];
-        let of = |row: &Row<f32>| f32x16::from_slice(simd, row);
+        let lanes = |row: &Row<f32>| f32x16::from_slice(simd, row);
         let value = bits.bitcast::<f32x16<S>>();
-        let pressure = (value - of(&tile.baseline)) * of(&tile.gain);
+        let pressure = (value - lanes(&tile.baseline)) * lanes(&tile.gain);
         sizes.see(simd, pressure.bitcast());
-        let within =
-            value.simd_ge(of(&tile.raw_low)) & value.simd_le(of(&tile.raw_high)) & pressure.simd_le(of(&tile.p_max));
+        let within = value.simd_ge(lanes(&tile.raw_low))
+            & value.simd_le(lanes(&tile.raw_high))
+            & pressure.simd_le(lanes(&tile.p_max));
         beyond |= within.select(u32x16::splat(simd, 0), u32x16::splat(simd, 1));
-        pressure.simd_gt(of(&tile.dead_band)).select(pressure, none).store_slice(pressures);
+        pressure.simd_gt(lanes(&tile.dead_band)).select(pressure, none).store_slice(pressures);
     }
     sizes.are_fine(simd) && !beyond.simd_gt(u32x16::splat(simd, 0)).any_true()
 }
@@ -360,7 +361,7 @@ fn any_value<S: Simd>(
     pressures: &mut Row<f32>,
     statuses: &mut Row<u32>,
 ) -> bool {
-    let of = |row: &Row<f32>| load(simd, row, at);
+    let lanes = |row: &Row<f32>| load(simd, row, at);
     let response = load_u(simd, &tile.response, at);
     let (none, nothing) = (splat(simd, 0.0), splat_u(simd, 0));
     let is_tiny = |size: U<S>| size.simd_gt(nothing) & size.simd_lt(splat_u(simd, TINY_BITS));
@@ -369,10 +370,10 @@ fn any_value<S: Simd>(
     let size = bits & SIZE_BITS;
     let missing = bits.simd_eq(splat_u(simd, u32::MAX));
     let value = bits.bitcast::<F<S>>();
-    let beyond = value.simd_lt(of(&tile.raw_low)) | value.simd_gt(of(&tile.raw_high));
+    let beyond = value.simd_lt(lanes(&tile.raw_low)) | value.simd_gt(lanes(&tile.raw_high));
     let value = is_tiny(size).select(none, value);
-    let above = value - of(&tile.baseline);
-    let mut pressure = above * of(&tile.gain);
+    let above = value - lanes(&tile.baseline);
+    let mut pressure = above * lanes(&tile.gain);
     if tile.sort == Sort::Any {
         for lane in 0..width::<S>() {
             let slot = first + at + lane;
@@ -384,12 +385,12 @@ fn any_value<S: Simd>(
     let pressure_size = pressure.bitcast::<U<S>>() & SIZE_BITS;
     let unbelievable = is_huge(size) | is_huge(pressure_size) | response.simd_eq(splat_u(simd, MASKED));
     let altered = is_tiny(size) | is_tiny(pressure_size);
-    let over = pressure.simd_gt(of(&tile.dead_band)) & !is_tiny(pressure_size);
+    let over = pressure.simd_gt(lanes(&tile.dead_band)) & !is_tiny(pressure_size);
     let usable = !(missing | unbelievable);
     let faulty = Flags::FAULTY_INPUT.bits();
     let kept = bits_where(simd, beyond, Flags::OUT_OF_RANGE.bits())
         | bits_where(simd, altered, faulty)
-        | bits_where(simd, over & pressure.simd_gt(of(&tile.p_max)), Flags::SATURATED.bits());
+        | bits_where(simd, over & pressure.simd_gt(lanes(&tile.p_max)), Flags::SATURATED.bits());
     let left_out = missing.select(splat_u(simd, Flags::INCOMPLETE.bits() | UNUSABLE), splat_u(simd, faulty | UNUSABLE));
     let status = usable.select(kept, left_out);
     store(simd, (usable & over).select(pressure, none), pressures, at);

@@ -86,8 +86,8 @@ fn abreast<S: Simd>(simd: S, group: &[Startable<'_>]) -> Vec<Fits<f64>> {
     let most = group.iter().map(|startable| startable.touch.sensors().len()).max().unwrap_or(0);
     let mut sensors = Vec::with_capacity(most);
     for index in 0..most {
-        let of = std::array::from_fn(|lane| of_lane(lane).touch.sensors().get(index).unwrap_or(&Sensor::NONE));
-        sensors.push(Sensor::abreast(of, lanes));
+        let abreast = std::array::from_fn(|lane| of_lane(lane).touch.sensors().get(index).unwrap_or(&Sensor::NONE));
+        sensors.push(Sensor::abreast(abreast, lanes));
     }
     let start = Start::abreast(std::array::from_fn(|lane| &of_lane(lane).start), lanes);
     let fits = fit(&sensors, &start);

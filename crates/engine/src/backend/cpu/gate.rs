@@ -52,7 +52,7 @@ impl Gate {
             Coverage::Auto => plan.slots() >= WORTH_IT || cadence == Cadence::OnChange,
             Coverage::Touched => true,
         };
-        // What changes also hangs on the time between frames.
+        // Changes also depend on the time between frames.
         if !wanted || plan.has_changes() {
             return None;
         }

@@ -103,7 +103,7 @@ const LINE: usize = 64;
 #[repr(align(64))]
 pub(super) struct Aligned<T>(pub(super) T);
 
-/// Rows one after the other, of which the first begins with a cache line.
+/// Rows one after the other; the first begins with a cache line.
 #[derive(Debug)]
 pub(super) struct Lines<T> {
     memory: Vec<T>,
@@ -364,7 +364,7 @@ pub(super) mod x86 {
     );
 
     fearless_simd::kernel!(
-        /// Those of 32 lanes that `places` says.
+        /// The values at `places` among 32 lanes.
         #[inline(always)]
         pub fn of_32(
             token: Avx512,
@@ -386,7 +386,7 @@ pub(super) mod x86 {
     );
 
     fearless_simd::kernel!(
-        /// Those of sixteen lanes that `places` says.
+        /// The values at `places` among sixteen lanes.
         #[inline(always)]
         pub fn of_sixteen(token: Avx2, low: u32x8<Avx2>, high: u32x8<Avx2>, places: u32x8<Avx2>) -> u32x8<Avx2> {
             let places = places.into();
@@ -461,7 +461,7 @@ mod tests {
         angles
     }
 
-    /// Those of `x` and `y` on every set of instructions, which have the same bits.
+    /// The angles of `x` and `y` on every set of instructions, which have the same bits.
     fn angles(x: &Row<f32>, y: &Row<f32>) -> [Row<f32>; 2] {
         let on_each = levels().into_iter().map(|level| with_widest!(level, simd => rows(simd, x, y)));
         let angles: Vec<[Row<f32>; 2]> = on_each.collect();

@@ -74,7 +74,7 @@ pub(super) struct Live {
     answers: Vec<Answers>,
     /// By slot, and a last row that is nobody's: unpressed and unusable.
     values: Calibrated,
-    /// Those of the frame before, where there are changes.
+    /// The values of the frame before, if there are changes.
     before: Calibrated,
     gathered: Gathered,
     /// Of the other threads that take part, where a frame is shared.
@@ -256,7 +256,7 @@ impl Frame<'_> {
         }
     }
 
-    /// Those of `groups` that are stale, those side by side together.
+    /// Answers the stale ones of `groups`, adjacent ones together.
     fn stale(&self, mut groups: &[Narrow], stale: &[bool], gathered: &mut Gathered, mut answers: &mut [Answers]) {
         for run in stale.chunk_by(|a, b| a == b) {
             let (now, later) = groups.split_at(run.len());
@@ -322,9 +322,9 @@ struct WideField {
 
 impl WideField {
     fn new(plan: &Plan, field: usize, unpressed: usize) -> Self {
-        let of = &plan.fields[field];
-        let rows = MemberRows::of_one(plan, of, unpressed);
-        Self { lanes: FieldLanes::new(&[field]), kind: OneKind::new(of), rows }
+        let own = &plan.fields[field];
+        let rows = MemberRows::of_one(plan, own, unpressed);
+        Self { lanes: FieldLanes::new(&[field]), kind: OneKind::new(own), rows }
     }
 }
 

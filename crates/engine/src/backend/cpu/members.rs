@@ -282,7 +282,7 @@ impl MemberRows {
         }
     }
 
-    /// Those of `fields`, up to sixteen, a lane each.
+    /// The rows of `fields`, up to sixteen, a lane each.
     pub(super) fn of_each(plan: &Plan, fields: &[usize], unpressed: usize) -> Self {
         let fields = fields.iter().map(|&field| &plan.fields[field]);
         let count = fields.clone().map(|field| field.count).max().unwrap_or(0);
@@ -293,7 +293,7 @@ impl MemberRows {
         rows
     }
 
-    /// Those of `field`, with their weights.
+    /// The rows of `field`, with the weights of its members.
     pub(super) fn of_one(plan: &Plan, field: &PlanField, unpressed: usize) -> Self {
         let mut rows = Self::new(field.count.div_ceil(LANES), unpressed, true);
         (0..field.count).for_each(|member| rows.set(plan, field, member, (member / LANES, member % LANES)));

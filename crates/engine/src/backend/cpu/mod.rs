@@ -151,7 +151,7 @@ impl Backend for Cpu {
             self.before.clear();
             self.before.extend(raw.rows.row(raw.frames - 1));
         }
-        // What hangs on the frame before goes through the frames in order.
+        // What depends on the frame before goes through the frames in order.
         let stages = self.plan.stages();
         if stages.hysteresis {
             hysteresis::scan(&self.plan, raw.frames, &mut cells, &mut self.touched);

@@ -134,7 +134,7 @@ impl<'a> SomeFrames<'a> {
     }
 }
 
-/// Those of `values` that `shuffles` say together, if the machine has instructions that pay.
+/// The values that all `shuffles` pick together from `values`, if the machine has instructions that pay.
 #[inline(always)]
 fn pick_all<S: Simd>(simd: S, values: &[u32], shuffles: &[Shuffle]) -> Option<u32x16<S>> {
     let (first, others) = shuffles.split_first()?;
@@ -147,7 +147,7 @@ fn pick_all<S: Simd>(simd: S, values: &[u32], shuffles: &[Shuffle]) -> Option<u3
     Some(row)
 }
 
-/// Those of `values` that `shuffle` says, if the machine has instructions that pay; anything for those that lie elsewhere.
+/// The values that `shuffle` picks from `values`, if the machine has instructions that pay; anything for values elsewhere.
 #[inline(always)]
 fn pick<S: Simd>(simd: S, values: &[u32], shuffle: &Shuffle) -> Option<u32x16<S>> {
     let Aligned(bits) = &mut Aligned([0; LANES]);

@@ -234,12 +234,12 @@ enum Way {
 
 impl Brief {
     fn all(plan: &Plan) -> Vec<Self> {
-        let of = |field: &PlanField| {
+        let brief = |field: &PlanField| {
             let narrow = if field.unweighted { Way::Unweighted } else { Way::Weighted };
             let way = if field.is_wide() { Way::Wide } else { narrow };
             Self { first: field.first, count: field.count, way, kind: OneKind::new(field) }
         };
-        plan.fields.iter().map(of).collect()
+        plan.fields.iter().map(brief).collect()
     }
 
     fn members(&self) -> Range<usize> {
@@ -384,7 +384,7 @@ fn calibrated<S: Simd>(
     any
 }
 
-/// All stages for the fields from `first` on, of which `rests` says whether any pressure is to be seen, over sixteen frames.
+/// All stages for the fields from `first` on, over sixteen frames. `rests` says whether their pressures are all 0.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "as `stretch`")]
 fn answer<S: Simd>(

@@ -24,7 +24,7 @@ impl Answers {
     pub(super) const EMPTY: Self =
         Self { flags: [0; LANES], present: [0; LANES], active: [0; LANES], parts: [[0.0; LANES]; Component::COUNT] };
 
-    /// Those of a field that nothing presses.
+    /// The answers of a field that nothing presses.
     pub(super) fn untouched(kind: &OneKind) -> Self {
         let (flags, present) = kind.untouched();
         Self { flags: [flags; LANES], present: [present; LANES], ..Self::EMPTY }
@@ -129,7 +129,7 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// That of `count` fields from `first` on in all frames of `cells`; `beyond` says whether a row may reach beyond its frame's
+    /// The place of `count` fields from `first` on in all frames of `cells`; `beyond` says whether a row may reach beyond its frame's
     /// last field.
     pub(super) fn new(cells: &CellsMut<'_>, first: usize, count: usize, beyond: bool) -> Self {
         let (fields, frames) = (cells.fields(), cells.frames());

@@ -22,18 +22,18 @@ pub(super) fn across_frames(device: &Device, plan: &Plan, columns: &Columns, cel
     if plan.stages().hysteresis {
         let thresholds: Vec<[f32; 2]> = plan.fields.iter().map(|f| f.thresholds.rounded()).collect();
         let buffers = [batch, &table(device, "thresholds", &thresholds), results, touched];
-        let told = columns.of_hysteresis();
-        stages.push(Stage::new(device, &shaders::HYSTERESIS, "main", Over::Fields, &told, &buffers));
+        let overrides = columns.of_hysteresis();
+        stages.push(Stage::new(device, &shaders::HYSTERESIS, "main", Over::Fields, &overrides, &buffers));
     }
     if plan.stages().motion {
         let still: Vec<layout::Still> = plan.fields.iter().map(|field| field.still).collect();
         let still = table(device, "still", &still);
-        let told = columns.of_motion();
+        let overrides = columns.of_motion();
         let main = [batch, steps, &still, results, last];
-        stages.push(Stage::new(device, &shaders::MOTION, "main", Over::Cells, &told, &main));
+        stages.push(Stage::new(device, &shaders::MOTION, "main", Over::Cells, &overrides, &main));
         let keep = [(0, batch), (3, results), (4, last)];
         let keep = keep.map(|(binding, buffer)| (binding, buffer.as_entire_binding()));
-        stages.push(Stage::bound(device, &shaders::MOTION, "keep", Over::Fields, &told, &keep));
+        stages.push(Stage::bound(device, &shaders::MOTION, "keep", Over::Fields, &overrides, &keep));
     }
     stages
 }

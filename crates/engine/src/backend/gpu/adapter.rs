@@ -54,7 +54,7 @@ impl Device {
         self.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| what.to_owned());
     }
 
-    /// Says so if something went wrong that no call has told.
+    /// Gives an error that no call has reported yet.
     pub(crate) fn check(&self) -> Result<()> {
         match &*self.trouble.lock().unwrap_or_else(PoisonError::into_inner) {
             Some(why) => Err(self.lost(why)),

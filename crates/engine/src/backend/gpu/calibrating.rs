@@ -36,8 +36,8 @@ impl Calibrating {
         let buffers = [batch, taxels, raw, pressures, statuses, curves, knots];
         let calibrated = |plain: bool| {
             let signals = (plan.calibrated() / plan.channels()) as f64;
-            let told = [("SIGNALS", signals), ("PLAIN", f64::from(u8::from(plain)))];
-            Stage::new(device, &shaders::CALIBRATE, entry, Over::Calibrated, &told, &buffers[..used])
+            let overrides = [("SIGNALS", signals), ("PLAIN", f64::from(u8::from(plain)))];
+            Stage::new(device, &shaders::CALIBRATE, entry, Over::Calibrated, &overrides, &buffers[..used])
         };
         let mut stages = if direct { Vec::new() } else { vec![calibrated(plain)] };
         let mut fallback: Vec<Stage> = plain.then(|| calibrated(false)).into_iter().collect();

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::scene::Plan;
 use crate::stage::layout;
 
-/// Frames of which shaders take all lanes.
+/// Frames that fill all lanes of the shaders.
 pub(super) const FRAMES_A_BLOCK: usize = 4 * layout::LANES as usize;
 /// Bytes of raw values in a submission, about: enough for the device to be busy, little enough to stay in caches and to
 /// have several on their way.
@@ -17,7 +17,7 @@ const ENOUGH: usize = 4 << 20;
 const MOST: usize = 1 << 17;
 
 /// Frames that a submission takes for calls of `batch`.
-pub(super) fn of(device: &Device, plan: &Plan, columns: &Columns, batch: usize) -> Result<usize> {
+pub(super) fn frames_per_submission(device: &Device, plan: &Plan, columns: &Columns, batch: usize) -> Result<usize> {
     let limits = device.device.limits();
     let limit = limits.max_storage_buffer_binding_size as usize;
     let tables = [

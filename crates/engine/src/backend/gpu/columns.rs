@@ -61,7 +61,7 @@ impl Columns {
         &self.all[..self.read]
     }
 
-    /// Where `column` stands, as the shaders' overrides say it.
+    /// The index of `column`, as in the shaders' overrides.
     fn at(&self, column: Column) -> f64 {
         self.all.iter().position(|other| *other == column).map_or(u32::MAX.into(), |at| at as f64)
     }
@@ -108,7 +108,7 @@ impl Columns {
     }
 }
 
-/// For programs that are told nothing.
+/// For programs without overrides.
 pub(super) const NOTHING: Constants<'static> = &[];
 
 #[cfg(test)]

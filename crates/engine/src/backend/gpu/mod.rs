@@ -58,7 +58,7 @@ pub(crate) struct Gpu {
     ring: Vec<Set>,
     batch: wgpu::Buffer,
     /// What is in `batch`.
-    told: Option<layout::Batch>,
+    batch_header: Option<layout::Batch>,
     steps: wgpu::Buffer,
     raw: wgpu::Buffer,
     /// The raw values of the frame before, where the plan has changes.
@@ -102,7 +102,7 @@ impl Gpu {
         (most_of_part, most_of_share): (usize, usize),
     ) -> Result<Self> {
         let columns = Columns::new(plan);
-        let capacity = capacity::of(&device, plan, &columns, batch)?;
+        let capacity = capacity::frames_per_submission(&device, plan, &columns, batch)?;
         let shares = Shares::new(plan, most_of_part, most_of_share);
         let plain = is_plain(plan);
         let direct = plain && !plan.has_changes() && !plan.stages().pressures && plan.calibrated() == plan.channels();
@@ -133,7 +133,7 @@ impl Gpu {
             capacity,
             ring,
             batch,
-            told: None,
+            batch_header: None,
             steps,
             raw,
             before,
@@ -161,9 +161,9 @@ impl Gpu {
         let steps = frames * STEP;
         let mut encoder = self.device.encoder();
         // Each copy waits for the one before: none that changes nothing.
-        if self.told != Some(header) {
+        if self.batch_header != Some(header) {
             encoder.copy_buffer_to_buffer(upload, 0, &self.batch, 0, HEADER);
-            self.told = Some(header);
+            self.batch_header = Some(header);
         }
         if self.plan.stages().motion || self.plan.has_changes() {
             encoder.copy_buffer_to_buffer(upload, HEADER, &self.steps, 0, steps);

@@ -23,7 +23,7 @@ pub(super) struct OverFields {
     /// What parts leave for the next program.
     by_parts: wgpu::Buffer,
     abreast: Abreast,
-    told: Vec<(&'static str, f64)>,
+    overrides: Vec<(&'static str, f64)>,
     /// Whether there are lines to look for.
     lined: bool,
 }
@@ -78,7 +78,7 @@ impl OverFields {
             firsts: (table(device, "first parts", &shares.firsts), shares.firsts.len() as u32),
             by_parts,
             abreast: if capacity == 1 { Abreast::One } else { Abreast::Four },
-            told: columns.of_fields(plan),
+            overrides: columns.of_fields(plan),
             lined: stages.orientation || stages.principal_axis,
         }
     }
@@ -92,7 +92,7 @@ impl OverFields {
             let mut bindings: Vec<_> = buffers.map(|(binding, buffer)| (binding, buffer.as_entire_binding())).into();
             bindings.extend([(2, share.members.binding()), (5, at.clone()), more]);
             bindings.extend(statuses.iter().map(|statuses| (6, statuses.clone())));
-            Stage::bound(device, shader, entry, over, &self.told, &bindings)
+            Stage::bound(device, shader, entry, over, &self.overrides, &bindings)
         };
         let results = || (7, bound.results.as_entire_binding());
         let wide_shader = |share: &Tables| shaders::wide_fields(self.abreast, bound.values, share.members.kind());
@@ -119,13 +119,20 @@ impl OverFields {
             let buffers = [(0, bound.batch.as_entire_binding()), (1, rows.as_entire_binding())];
             let bindings = [&buffers[..], &[(2, share.members.binding()), (5, at.clone()), by_parts()]].concat();
             let (shader, over) = (wide_shader(share), Over::Wide(*count));
-            stages.push(Stage::bound(device, &shader, "lines", over, &self.told, &bindings));
+            stages.push(Stage::bound(device, &shader, "lines", over, &self.overrides, &bindings));
         }
         if let Some(share) = in_parts().next() {
             let (rows, count) = &self.firsts;
             let buffers = [(0, bound.batch.as_entire_binding()), (1, rows.as_entire_binding())];
             let bindings = [&buffers[..], &[results(), by_parts()]].concat();
-            stages.push(Stage::bound(device, &wide_shader(share), "ends", Over::Wide(*count), &self.told, &bindings));
+            stages.push(Stage::bound(
+                device,
+                &wide_shader(share),
+                "ends",
+                Over::Wide(*count),
+                &self.overrides,
+                &bindings,
+            ));
         }
         stages
     }

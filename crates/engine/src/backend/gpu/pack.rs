@@ -51,7 +51,7 @@ impl Packer {
         self.form.bytes(self.channels, frames)
     }
 
-    /// Fills an upload buffer, of which `mapped` is as much as `raw` takes.
+    /// Fills an upload buffer; `mapped` is the part that `raw` takes.
     pub(super) fn pack(&mut self, raw: &RawBatch<'_>, header: &layout::Batch, mut mapped: wgpu::WriteOnly<'_, [u8]>) {
         self.steps.clear();
         self.steps.extend(raw.steps.iter().map(|s| layout::Step { dt_s: s.dt_s as f32, flags: s.flags.bits() }));
@@ -103,7 +103,7 @@ fn pack_quads(raw: &RawBatch<'_>, channels: usize, scratch: &mut Vec<RawValue>, 
     }
 }
 
-/// What a dispatch over `frames` frames is told of the plan.
+/// What a dispatch over `frames` frames reads about the plan.
 pub(super) fn header(plan: &Plan, frames: u32) -> layout::Batch {
     layout::Batch {
         frames,

@@ -116,9 +116,9 @@ pub fn draw(drawing: &Drawing) -> Result<Vec<u8>> {
         picture.size(),
     );
     device.queue.submit([encoder.finish()]);
-    let (told, outcome) = std::sync::mpsc::channel();
+    let (mapped_sender, outcome) = std::sync::mpsc::channel();
     readback.map_async(wgpu::MapMode::Read, .., move |result| {
-        let _ = told.send(result);
+        let _ = mapped_sender.send(result);
     });
     device.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| device.lost(&e))?;
     device.check()?;

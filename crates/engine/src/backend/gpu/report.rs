@@ -14,7 +14,7 @@ use crate::stage::layout;
 
 /// Bytes that bandwidths are measured with: far beyond any cache but for the largest.
 const MUCH: u64 = 128 << 20;
-/// Measurements, of which the median counts.
+/// Number of measurements; their median counts.
 const ROUNDS: usize = 9;
 
 /// What a machine copies, bytes a second; a copy on the device reads and writes each byte and is counted once.

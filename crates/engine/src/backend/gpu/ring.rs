@@ -14,7 +14,7 @@ pub(super) struct Set {
     /// Mapped, but for while a submission has it.
     pub(super) upload: wgpu::Buffer,
     pub(super) readback: wgpu::Buffer,
-    told: Sender<Result<(), wgpu::BufferAsyncError>>,
+    mapped: Sender<Result<(), wgpu::BufferAsyncError>>,
     outcome: Receiver<Result<(), wgpu::BufferAsyncError>>,
     pub(super) pending: Option<Pending>,
 }
@@ -31,11 +31,11 @@ pub(super) struct Pending {
 
 impl Set {
     pub(super) fn new(device: &Device, up: u64, back: u64) -> Self {
-        let (told, outcome) = channel();
+        let (mapped, outcome) = channel();
         Self {
             upload: device.buffer("upload", up, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC),
             readback: device.buffer("readback", back, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
-            told,
+            mapped,
             outcome,
             pending: None,
         }
@@ -50,12 +50,12 @@ impl Set {
         bytes: u64,
     ) {
         let submission = device.queue.submit([commands]);
-        let (told, told_too) = (self.told.clone(), self.told.clone());
+        let (read, written) = (self.mapped.clone(), self.mapped.clone());
         self.readback.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
-            let _ = told.send(result);
+            let _ = read.send(result);
         });
         self.upload.map_async(wgpu::MapMode::Write, .., move |result| {
-            let _ = told_too.send(result);
+            let _ = written.send(result);
         });
         self.pending = Some(Pending { first, frames, bytes, submission });
     }

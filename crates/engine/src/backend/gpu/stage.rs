@@ -6,7 +6,7 @@ use super::adapter::Device;
 use super::shaders::Shader;
 use crate::stage::layout;
 
-/// How buffers are used that stages read and write, and what stages are told of a batch.
+/// The usages of buffers that stages read and write, and of those that describe a batch.
 pub(super) const WORKING: wgpu::BufferUsages =
     wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC).union(wgpu::BufferUsages::COPY_DST);
 pub(super) const UNIFORM: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM.union(wgpu::BufferUsages::COPY_DST);

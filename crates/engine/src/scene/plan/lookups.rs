@@ -13,7 +13,7 @@ impl Plan {
     /// Per slot that is calibrated.
     #[doc(hidden)]
     pub fn curve_of(&self, slot: usize) -> Table<'_> {
-        self.curves.of(self.taxels[slot].response)
+        self.curves.table(self.taxels[slot].response)
     }
 
     #[doc(hidden)]
@@ -51,7 +51,7 @@ impl Plan {
         Ok(())
     }
 
-    /// What a device gives back: the outputs, and what tells the host of which touches one taxel is nearly all.
+    /// What a device gives back: the outputs, and what shows the host the touches that one taxel dominates.
     pub(crate) fn read_back(&self) -> Outputs {
         let of_orientation = Outputs::TOTAL | Outputs::PEAK | Outputs::ACTIVE;
         if self.outputs.contains(Outputs::ORIENTATION) { self.outputs | of_orientation } else { self.outputs }

@@ -30,7 +30,7 @@ impl Plan {
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         check(body, fields, scene, calibration)?;
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
-        let left_out = LeftOut::of(body, &chosen, fields);
+        let left_out = LeftOut::from_fields(body, &chosen, fields);
         let chosen = left_out.feeling(body, chosen, fields)?;
         let mut plan = Self::without_fields(body, scene, calibration, read(body, fields, scene, &chosen))?;
         plan.left_out = left_out;
@@ -57,7 +57,7 @@ impl Plan {
         let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibration.taxels[taxel]));
         Ok(Self {
             outputs,
-            stages: Stages::of(outputs),
+            stages: Stages::for_outputs(outputs),
             columns: outputs,
             letters: scene.letters.clone(),
             knobs: scene.knobs,
@@ -84,11 +84,12 @@ impl Plan {
 
     /// Takes the fields, and what follows from all of them together.
     fn take_fields(&mut self, FieldsMade { fields, members }: FieldsMade) {
-        let of = |field: &PlanField| &members[field.first..][..field.count];
-        let heaviest = |field| of(field).iter().fold(0.0, |most, member| f32::max(most, member.weight));
+        let members_of = |field: &PlanField| &members[field.first..][..field.count];
+        let heaviest = |field| members_of(field).iter().fold(0.0, |most, member| f32::max(most, member.weight));
         self.heaviest = fields.iter().map(heaviest).collect();
         let spread = fields.iter().filter(|field| !field.parts.is_empty());
-        let slots: BTreeSet<u32> = spread.flat_map(|field| of(field).iter().map(|member| member.slot)).collect();
+        let slots: BTreeSet<u32> =
+            spread.flat_map(|field| members_of(field).iter().map(|member| member.slot)).collect();
         self.spread_slots = slots.into_iter().collect();
         self.stages.hysteresis = fields.iter().any(|field| field.thresholds != Thresholds::default());
         self.fields = fields.into();

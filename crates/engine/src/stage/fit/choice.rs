@@ -78,7 +78,7 @@ pub(crate) fn fit_alone(sensors: &[Sensor<f64>], start: &Start<f64>) -> Fits<f64
 /// `shape`, which has a force of 1, with the force that explains the pressed sensors best.
 #[inline(always)]
 fn with_force<R: Real, M: Kind<K>, const K: usize>(sensors: &[Sensor<R>], shape: Shape<R>) -> Shape<R> {
-    let (contact, zero) = (Contact::of(&shape), shape.force.all(0.0));
+    let (contact, zero) = (Contact::from_shape(&shape), shape.force.all(0.0));
     let (mut both, mut own) = (zero, shape.force.all(f64::MIN_POSITIVE));
     for sensor in sensors {
         let (felt, _) = M::felt(&contact, sensor.at, sensor.margin);
@@ -133,7 +133,7 @@ struct Candidate {
 }
 
 impl Candidate {
-    fn of<M: Kind<K>, const K: usize>(kind: ContactKind, fitted: &Fitted<f64, K>) -> Self {
+    fn from_fit<M: Kind<K>, const K: usize>(kind: ContactKind, fitted: &Fitted<f64, K>) -> Self {
         let free = M::FREE;
         let mut variances = [0.0; 6];
         for (k, parameter) in free.into_iter().enumerate() {
@@ -150,7 +150,7 @@ impl Candidate {
 
     /// What it makes the sensors of `touch` feel.
     fn felt(&self, touch: &Touch) -> Vec<f64> {
-        let contact = Contact::of(&self.shape);
+        let contact = Contact::from_shape(&self.shape);
         let felt = |&Sensor { at, margin, .. }: &Sensor<f64>| match self.kind {
             ContactKind::Point => Point::felt(&contact, at, margin).0,
             ContactKind::Line => Line::felt(&contact, at, margin).0,
@@ -161,10 +161,15 @@ impl Candidate {
     }
 
     fn each(fits: &Fits<f64>) -> impl Iterator<Item = Self> {
-        let short =
-            [Self::of::<Point, 4>(ContactKind::Point, &fits.point), Self::of::<Line, 4>(ContactKind::Line, &fits.line)];
+        let short = [
+            Self::from_fit::<Point, 4>(ContactKind::Point, &fits.point),
+            Self::from_fit::<Line, 4>(ContactKind::Line, &fits.line),
+        ];
         let long = fits.long.as_ref().map(|[segment, blob]| {
-            [Self::of::<Segment, 6>(ContactKind::Segment, segment), Self::of::<Blob, 6>(ContactKind::Blob, blob)]
+            [
+                Self::from_fit::<Segment, 6>(ContactKind::Segment, segment),
+                Self::from_fit::<Blob, 6>(ContactKind::Blob, blob),
+            ]
         });
         short.into_iter().chain(long.into_iter().flatten())
     }
@@ -193,11 +198,11 @@ impl Touch {
 
     /// The likeliest kind of those that the taxels are enough for; with few taxels a point, whose spread then is the prior's.
     fn best(&self, fits: Option<&Fits<f64>>) -> Option<Candidate> {
-        let is_told = |candidate: &Candidate| {
+        let is_clear = |candidate: &Candidate| {
             self.pressed > candidate.parameters
                 || (candidate.kind == ContactKind::Point && self.pressed >= LEAST_PRESSED)
         };
-        let candidates = Candidate::each(fits?).filter(is_told);
+        let candidates = Candidate::each(fits?).filter(is_clear);
         let penalised = |candidate: &Candidate| {
             candidate.cost + self.width_of_floor(candidate.floor) + 2.0 * PENALTY * candidate.parameters as f64
         };

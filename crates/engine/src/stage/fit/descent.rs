@@ -38,7 +38,7 @@ pub(crate) fn descend<R: Real, M: Kind<K>, const K: usize>(
     let (mut shape, mut now, mut damping) = (start, Objective::none(zero), zero.all(DAMPING));
     // The objective stands in the code once: it is long, and there are eight of it side by side.
     for step in 0..=steps {
-        let tried = if step == 0 { start } else { shape.moved(M::FREE, Factor::of(&now.a, damping).solve(now.g)) };
+        let tried = if step == 0 { start } else { shape.moved(M::FREE, Factor::new(&now.a, damping).solve(now.g)) };
         let then = Objective::at::<M>(sensors, gain_variance, &tried);
         if step == 0 {
             now = then;
@@ -49,7 +49,7 @@ pub(crate) fn descend<R: Real, M: Kind<K>, const K: usize>(
         now = Objective::choose(better, &then, &now);
         damping = R::choose(better, damping * (1.0 / DAMPING_CHANGES), damping * DAMPING_CHANGES);
     }
-    let factor = Factor::of(&now.a, damping.all(0.0));
+    let factor = Factor::new(&now.a, damping.all(0.0));
     let step = factor.solve(now.g);
     let mut ahead = -(step[0] * now.g[0]);
     for k in 1..K {
@@ -63,7 +63,7 @@ struct Factor<R, const K: usize>([[R; K]; K]);
 
 impl<R: Real, const K: usize> Factor<R, K> {
     #[inline(always)]
-    fn of(a: &[[R; K]; K], damping: R) -> Self {
+    fn new(a: &[[R; K]; K], damping: R) -> Self {
         let mut l = *a;
         for i in 0..K {
             for j in 0..i {
@@ -138,7 +138,7 @@ mod tests {
     fn a_factor_solves_and_inverts() {
         let a = [[4.0, 0.0, 0.0], [1.0, 5.0, 0.0], [-2.0, 0.5, 6.0]];
         let whole = |i: usize, j: usize| if i < j { a[j][i] } else { a[i][j] };
-        let factor = Factor::of(&a, 0.0);
+        let factor = Factor::new(&a, 0.0);
         let x = factor.solve([1.0, -2.0, 0.5]);
         let inverse = factor.inverse();
         for i in 0..3 {

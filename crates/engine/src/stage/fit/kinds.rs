@@ -30,7 +30,7 @@ pub(crate) struct Contact<R> {
 
 impl<R: Real> Contact<R> {
     #[inline(always)]
-    pub(crate) fn of(shape: &Shape<R>) -> Self {
+    pub(crate) fn from_shape(shape: &Shape<R>) -> Self {
         Self { shape: *shape, force: shape.force.exp(), width: shape.width.exp(), length: shape.length.exp() }
     }
 }
@@ -121,7 +121,7 @@ mod tests {
     /// By how much slopes differ from quotients of differences, as a share of what is felt.
     fn worst<M: Kind<K>, const K: usize>() -> f64 {
         let shape = Shape { place: [0.3, -0.2], along: [0.6, 0.8], force: 0.4, width: 0.2, length: 0.9 };
-        let felt = |shape: &Shape<f64>, at| M::felt(&Contact::of(shape), at, 0.5);
+        let felt = |shape: &Shape<f64>, at| M::felt(&Contact::from_shape(shape), at, 0.5);
         let mut worst: f64 = 0.0;
         for at in [[0.0, 0.0], [1.0, 0.4], [-1.3, 2.0], [0.2, -2.2]] {
             let (value, slopes) = felt(&shape, at);
@@ -147,7 +147,7 @@ mod tests {
     fn kinds_meet_where_they_are_the_same_contact() {
         let shape = Shape { place: [0.3, -0.2], along: [0.6, 0.8], force: 0.4, width: 0.2, length: 0.2 };
         let felt = |shape: &Shape<f64>, at: [f64; 2]| {
-            let contact = Contact::of(shape);
+            let contact = Contact::from_shape(shape);
             [
                 Point::felt(&contact, at, 0.5).0,
                 Blob::felt(&contact, at, 0.5).0,

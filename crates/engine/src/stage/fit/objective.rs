@@ -42,7 +42,7 @@ pub(crate) const USUAL_WIDTH: f64 = 1.2;
 /// The standard deviation of its logarithm there.
 const WIDTH_VARIES: f64 = 0.3;
 
-/// χ² and the prior at a shape, with A = JᵀJ, of which the lower half is made, and g = Jᵀr.
+/// χ² and the prior at a shape, with the lower half of A = JᵀJ, and g = Jᵀr.
 #[derive(Clone, Copy)]
 pub(crate) struct Objective<R, const K: usize> {
     /// Σr², the prior's included.
@@ -65,7 +65,7 @@ impl<R: Real, const K: usize> Objective<R, K> {
     pub(crate) fn at<M: Kind<K>>(sensors: &[Sensor<R>], gain_variance: R, shape: &Shape<R>) -> Self {
         let (zero, one) = (shape.force.all(0.0), shape.force.all(1.0));
         let mut sum = Self::none(zero);
-        let contact = Contact::of(shape);
+        let contact = Contact::from_shape(shape);
         for sensor in sensors {
             let (felt, by) = M::felt(&contact, sensor.at, sensor.margin);
             let off = felt - sensor.pressure;
@@ -105,13 +105,13 @@ impl<R: Real, const K: usize> Objective<R, K> {
     /// `yes` where `mask` holds, `no` elsewhere.
     #[inline(always)]
     pub(crate) fn choose(mask: R::Mask, yes: &Self, no: &Self) -> Self {
-        let of = |yes, no| R::choose(mask, yes, no);
+        let choose = |yes, no| R::choose(mask, yes, no);
         let mut chosen = *no;
-        (chosen.cost, chosen.chi_squared) = (of(yes.cost, no.cost), of(yes.chi_squared, no.chi_squared));
+        (chosen.cost, chosen.chi_squared) = (choose(yes.cost, no.cost), choose(yes.chi_squared, no.chi_squared));
         for i in 0..K {
-            chosen.g[i] = of(yes.g[i], no.g[i]);
+            chosen.g[i] = choose(yes.g[i], no.g[i]);
             for j in 0..=i {
-                chosen.a[i][j] = of(yes.a[i][j], no.a[i][j]);
+                chosen.a[i][j] = choose(yes.a[i][j], no.a[i][j]);
             }
         }
         chosen

@@ -51,8 +51,8 @@ struct Mean {
 }
 
 impl Mean {
-    /// Of places that pull by so much.
-    fn of(pulls: impl Iterator<Item = (DVec2, f64)>) -> Self {
+    /// The mean of places, each with its pull as weight.
+    fn from_pulls(pulls: impl Iterator<Item = (DVec2, f64)>) -> Self {
         let (mut sum, mut total) = (DVec2::ZERO, 0.0);
         for (at, pull) in pulls {
             sum += at * pull;
@@ -68,8 +68,8 @@ impl Touch {
         let own = || self.sensors().iter().zip(&self.pulls).zip(fitted.felt);
         let own = || own().filter(|((sensor, pull), _)| sensor.pressed > 0.0 && pull.weight > 0.0);
         let at = |sensor: &super::Sensor<f64>| DVec2::from_array(sensor.at);
-        let found = Mean::of(own().map(|((sensor, pull), _)| (at(sensor), pull.of(sensor.pressure))));
-        let expected = Mean::of(own().map(|((sensor, pull), felt)| (at(sensor), pull.of(*felt))));
+        let found = Mean::from_pulls(own().map(|((sensor, pull), _)| (at(sensor), pull.weighted(sensor.pressure))));
+        let expected = Mean::from_pulls(own().map(|((sensor, pull), felt)| (at(sensor), pull.weighted(*felt))));
         if !(found.total > 0.0 && expected.total > 0.0) {
             return None;
         }

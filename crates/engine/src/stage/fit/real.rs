@@ -72,7 +72,7 @@ pub(crate) trait Real:
 
 /// 1.5 · 2⁵²: added, it leaves no room for parts of a whole number.
 const ROUNDS: f64 = 6_755_399_441_055_744.0;
-/// ln 2 in two parts, of which the first times a whole number is exact.
+/// ln 2 in two parts; the first times a whole number is exact.
 const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
 /// 1/n!, the last first.
 const EXP: [f64; 14] = [

@@ -83,13 +83,13 @@ impl<R: Real> Shape<R> {
     /// `yes` where `mask` holds, `no` elsewhere.
     #[inline(always)]
     pub(crate) fn choose(mask: R::Mask, yes: &Self, no: &Self) -> Self {
-        let of = |yes, no| R::choose(mask, yes, no);
+        let choose = |yes, no| R::choose(mask, yes, no);
         Self {
-            place: [of(yes.place[0], no.place[0]), of(yes.place[1], no.place[1])],
-            along: [of(yes.along[0], no.along[0]), of(yes.along[1], no.along[1])],
-            force: of(yes.force, no.force),
-            width: of(yes.width, no.width),
-            length: of(yes.length, no.length),
+            place: [choose(yes.place[0], no.place[0]), choose(yes.place[1], no.place[1])],
+            along: [choose(yes.along[0], no.along[0]), choose(yes.along[1], no.along[1])],
+            force: choose(yes.force, no.force),
+            width: choose(yes.width, no.width),
+            length: choose(yes.length, no.length),
         }
     }
 }

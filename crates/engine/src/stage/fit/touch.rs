@@ -49,8 +49,8 @@ pub(crate) struct Pull {
 }
 
 impl Pull {
-    /// That of a taxel that feels `pressure`.
-    pub(super) fn of(self, pressure: f64) -> f64 {
+    /// The weighted pressure of a taxel that feels `pressure`.
+    pub(super) fn weighted(self, pressure: f64) -> f64 {
         self.weight * (pressure - self.less).max(0.0)
     }
 }
@@ -103,7 +103,7 @@ impl<R: Real> Start<R> {
     }
 }
 
-/// A point may be told from this many pressed taxels.
+/// Pressed taxels that suffice for a point.
 pub(super) const LEAST_PRESSED: usize = 3;
 /// A taxel's noise counts as at least this part of the touch's largest pressure: what it is taken for where it is not known.
 const LEAST_NOISE: f64 = 1e-3;
@@ -116,7 +116,7 @@ const MOVES: usize = 32;
 const SHORTEST_HALF: f64 = 0.5;
 
 impl Touch {
-    /// The touch of `taxels`, some of which are pressed.
+    /// The touch of `taxels`; some of them are pressed.
     pub(crate) fn new(taxels: &[Taxel], layer: &Layer) -> Self {
         let (unit_m, peak) = (layer.sigma_m, taxels.iter().map(|taxel| taxel.pressure).fold(0.0, f64::max));
         let total: f64 = taxels.iter().map(|taxel| taxel.pressure).sum();

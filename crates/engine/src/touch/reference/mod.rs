@@ -1,8 +1,8 @@
 //! The definition of touches, written plainly and slowly: other code for the same equations, with the margins of its choices.
 //!
 //! A choice whose margin is less than `within` of what it compares is in doubt, and with it all touches that it may change. These
-//! are left out of comparisons, and counted. Where P may be off by more than rounding, `within` is that share. A taxel of which it is
-//! not certain whether it is pressed puts all in doubt that it is part of or lies beside.
+//! are left out of comparisons, and counted. Where P may be off by more than rounding, `within` is that share. If it is
+//! not certain whether a taxel is pressed, all touches that it is part of or lies beside are in doubt.
 
 mod divided;
 mod measure;
@@ -114,8 +114,8 @@ impl Reference {
             touches.insert(kept.id, past);
         }
         for taxel in &memory.taxels {
-            let of = memory.touches.get(taxel.touch as usize).and_then(|kept| touches.get_mut(&kept.id));
-            if let Some(past) = of {
+            let touch = memory.touches.get(taxel.touch as usize).and_then(|kept| touches.get_mut(&kept.id));
+            if let Some(past) = touch {
                 past.pressures.insert(taxel.node, taxel.pressure);
             }
         }

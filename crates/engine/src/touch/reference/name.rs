@@ -31,8 +31,8 @@ impl Reference {
         }
         claims.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         let rivals = |region: usize, ids: &BTreeSet<u64>| {
-            let of = |claim: &&(f64, u64, usize)| claim.2 == region || ids.contains(&claim.1);
-            let near: Vec<f64> = claims.iter().filter(of).map(|claim| claim.0).collect();
+            let concerns = |claim: &&(f64, u64, usize)| claim.2 == region || ids.contains(&claim.1);
+            let near: Vec<f64> = claims.iter().filter(concerns).map(|claim| claim.0).collect();
             near.windows(2).any(|pair| scene.are_near(pair[0], pair[1]))
         };
         let mut became: BTreeMap<usize, Became> = BTreeMap::new();

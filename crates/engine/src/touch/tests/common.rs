@@ -42,10 +42,10 @@ pub(super) fn touches(parts: SkinParts) -> Touches {
 
 /// The pressure of bumps at `centres` with this spread on each taxel.
 pub(super) fn bumps(skin: &Skin, centres: &[(DVec3, f64)], spread_m: f64) -> Vec<f64> {
-    let of = |position: DVec3, &(centre, height): &(DVec3, f64)| {
+    let bump = |position: DVec3, &(centre, height): &(DVec3, f64)| {
         height * (-0.5 * position.distance_squared(centre) / (spread_m * spread_m)).exp()
     };
-    let pressure = |position: DVec3| centres.iter().map(|centre| of(position, centre)).sum::<f64>();
+    let pressure = |position: DVec3| centres.iter().map(|centre| bump(position, centre)).sum::<f64>();
     // What is little is not felt.
     let felt = |pressure: f64| if pressure < 0.02 { 0.0 } else { pressure };
     skin.taxels().iter().map(|taxel| felt(pressure(taxel.position))).collect()

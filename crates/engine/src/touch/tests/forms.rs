@@ -1,4 +1,4 @@
-//! Touches of which the right answer is known.
+//! Touches whose right answer is known.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -36,7 +36,7 @@ pub(super) const BOARDS: Topic = Topic(2);
 pub(super) struct TopicKind {
     pub(super) name: String,
     pub(super) kind: BagType,
-    /// Whether it is only there where something is told.
+    /// Whether it is published only if there is something to report.
     pub(super) is_optional: bool,
     /// Whether a frame has several of its messages: one for each touch. Bags have room for all.
     #[cfg_attr(not(feature = "ros2"), allow(dead_code, reason = "live topics alone have a depth"))]
@@ -60,7 +60,7 @@ pub(super) struct Messages {
     /// Where the wrench of each touch is asked for; and the links' names.
     touch_wrenches: Option<(Topic, Vec<String>)>,
     at_rest: Vec<(String, Pose)>,
-    links_told_s: Option<f64>,
+    links_sent_s: Option<f64>,
     readings: Readings,
 }
 
@@ -105,7 +105,7 @@ impl Messages {
             touches,
             touch_wrenches,
             at_rest: rest_poses(body),
-            links_told_s: None,
+            links_sent_s: None,
             readings: Readings::new(body),
         })
     }
@@ -124,13 +124,13 @@ impl Messages {
     /// Gives each message of `moment` to `send`, which says whether it could be sent.
     ///
     /// # Errors
-    /// Those of `send`.
+    /// The errors of `send`.
     pub(super) fn tell(&mut self, moment: &Moment, send: &mut dyn FnMut(Topic, Vec<u8>) -> Result<bool>) -> Result<()> {
         let time_ns = moment.time_ns;
-        // Where links are is not known while joints are late, and told now and then while nothing moves.
-        let is_due = self.links_told_s.is_none_or(|told_s| !(0.0..LINKS_PERIOD_S).contains(&(moment.t_s - told_s)));
+        // Poses of links are unknown while joints are late, and sent now and then while nothing moves.
+        let is_due = self.links_sent_s.is_none_or(|sent_s| !(0.0..LINKS_PERIOD_S).contains(&(moment.t_s - sent_s)));
         if (is_due && !moment.has_stale_pose) || !moment.pose.is_empty() {
-            self.links_told_s = Some(moment.t_s);
+            self.links_sent_s = Some(moment.t_s);
             send(LINKS, transforms(time_ns, &self.at_rest, &moment.pose).to_cdr())?;
         }
         if !moment.joints.is_empty() {

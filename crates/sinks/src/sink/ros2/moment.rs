@@ -64,7 +64,7 @@ impl Moment {
         self.presses.clear();
         let Some(found) = percepts.touches(frame) else { return };
         for touch in &found.touches {
-            let mark = TouchMark::of(touch);
+            let mark = TouchMark::from_touch(touch);
             self.touches.push(FeltTouch { id: touch.id, link: touch.link, in_world: touch.in_world, mark });
             self.presses.extend_from_slice(found.links(touch));
         }

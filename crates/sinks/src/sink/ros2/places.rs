@@ -31,7 +31,7 @@ pub(super) fn header(time_ns: u64, frame_id: &str) -> Header {
     Header { stamp: Time::from_ns(time_ns), frame_id: frame_id.to_owned() }
 }
 
-/// `name` as a part of a topic's name: letters, digits, `_` and `/`, no part of which begins with a digit.
+/// `name` as a part of a topic's name: letters, digits, `_` and `/`. No part between slashes begins with a digit.
 pub(super) fn topic_part(name: &str) -> String {
     let part = |part: &str| {
         let word: String = part.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
@@ -76,7 +76,7 @@ impl Clouds {
         self.0.iter().map(move |Cloud { link, taxels }| {
             let mut data = Vec::with_capacity(taxels.len() * POINT_BYTES);
             for (taxel, point) in taxels {
-                let Some(pressure) = readings.of(*taxel) else { continue };
+                let Some(pressure) = readings.pressure(*taxel) else { continue };
                 let at = data.len() + PRESSURE_AT;
                 data.extend_from_slice(point);
                 data[at..][..4].copy_from_slice(&(pressure as f32).to_le_bytes());

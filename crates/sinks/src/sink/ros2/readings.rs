@@ -30,7 +30,7 @@ impl Readings {
     }
 
     /// The pressure of taxel `taxel` of the body.
-    pub(super) fn of(&self, taxel: usize) -> Option<f64> {
+    pub(super) fn pressure(&self, taxel: usize) -> Option<f64> {
         self.pressures[taxel]
     }
 }

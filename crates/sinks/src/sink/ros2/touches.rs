@@ -122,22 +122,22 @@ mod tests {
         let touch = |id| FeltTouch { id, ..FeltTouch::default() };
         let skin = SkinNames { links: vec!["hand".into()], world: "world".into(), ..SkinNames::default() };
         let mut touches = Touches::new(skin);
-        let mut told = |touched: &[FeltTouch], is_sent: bool| {
+        let mut sent = |touched: &[FeltTouch], is_sent: bool| {
             let markers = touches.message(0, touched).map_or(&[][..], |message| &message.markers);
-            let told = markers.iter().map(|marker| (marker.id, marker.action)).collect::<Vec<_>>();
+            let sent = markers.iter().map(|marker| (marker.id, marker.action)).collect::<Vec<_>>();
             assert!(markers.iter().all(|marker| marker.ns == NAMESPACE && marker.header.frame_id == "hand"));
             if !is_sent {
                 touches.was_refused();
             }
-            told
+            sent
         };
-        assert_eq!(told(&[touch(7)], true), [(7, ADD)]);
-        assert_eq!(told(&[touch(9)], false), [(9, ADD), (7, DELETE)]);
-        assert_eq!(told(&[touch(9)], true), [(9, ADD), (7, DELETE)]);
-        assert_eq!(told(&[touch(9), touch(10)], true), [(9, ADD), (10, ADD)]);
-        assert_eq!(told(&[touch(10)], true), [(10, ADD), (9, DELETE)]);
-        assert_eq!(told(&[], true), [(10, DELETE)]);
-        assert_eq!(told(&[], true), []);
+        assert_eq!(sent(&[touch(7)], true), [(7, ADD)]);
+        assert_eq!(sent(&[touch(9)], false), [(9, ADD), (7, DELETE)]);
+        assert_eq!(sent(&[touch(9)], true), [(9, ADD), (7, DELETE)]);
+        assert_eq!(sent(&[touch(9), touch(10)], true), [(9, ADD), (10, ADD)]);
+        assert_eq!(sent(&[touch(10)], true), [(10, ADD), (9, DELETE)]);
+        assert_eq!(sent(&[], true), [(10, DELETE)]);
+        assert_eq!(sent(&[], true), []);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::signal::{Quantity, Receptor};
 /// Links that are named in a line; the others are counted.
 const NAMED_LINKS: usize = 4;
 
-/// The links whose wrench can be told.
+/// The links whose wrench can be computed.
 pub(super) struct LinkWrenches {
     links: Vec<LinkWrench>,
     /// By value of a frame, which of these links its taxel is of.
@@ -62,7 +62,7 @@ impl Unknown {
 }
 
 impl LinkWrenches {
-    /// Those of `body`, whose frames hold values of the taxels `sent`.
+    /// The wrenches of the links of `body`, whose frames hold values of the taxels `sent`.
     pub(super) fn new(body: &Body, plan: &Plan, sent: &[u32]) -> Self {
         let taxel_of = |id: &u32| body.taxels.binary_search_by_key(id, |taxel| taxel.id).ok();
         let sent: Vec<Option<usize>> = sent.iter().map(taxel_of).collect();
@@ -108,7 +108,7 @@ impl LinkWrenches {
     }
 
     /// The wrench of each link, by its place among [`Self::names`]: −Σ PᵢAᵢnᵢ over all of its taxels, whatever touches they are of, and
-    /// the torque about the link's origin. None of a link of which a value is missing: a part would be taken for the whole. A value
+    /// the torque about the link's origin. A link with a missing value has none: a part would pass for the whole. A value
     /// that came and was rejected adds nothing, as in all sums.
     pub(super) fn messages(
         &mut self,
@@ -156,7 +156,7 @@ impl LinkWrench {
     fn message(&self, time_ns: u64, readings: &Readings) -> WrenchStamped {
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
         for WrenchTaxel { taxel, force_at_one_in_link, position_in_link } in &self.taxels {
-            let Some(pressure) = readings.of(*taxel).filter(|&pressure| pressure > 0.0) else { continue };
+            let Some(pressure) = readings.pressure(*taxel).filter(|&pressure| pressure > 0.0) else { continue };
             let own = force_at_one_in_link * pressure;
             force += own;
             torque += position_in_link.cross(own);
@@ -194,7 +194,7 @@ mod tests {
     }
 
     /// The wrenches by link, of a frame of all taxels.
-    fn told(
+    fn wrenches_by_link(
         wrenches: &mut LinkWrenches,
         body: &Body,
         engine: &Engine,
@@ -222,7 +222,7 @@ mod tests {
         engine.process_one(&frame).unwrap();
         let mut presses = Vec::new();
         engine.presses_on_links(&mut presses);
-        let found = told(&mut wrenches, &body, &engine, &frame);
+        let found = wrenches_by_link(&mut wrenches, &body, &engine, &frame);
         let mut compared = 0;
         for press in &presses {
             let wrench = press.wrench.unwrap();
@@ -237,7 +237,7 @@ mod tests {
         assert!(compared >= 2 && compared <= found.len(), "{presses:?}");
         // What is not pressed has a wrench, too: nothing.
         frame.values.fill(RawValue::new(0.0));
-        let at_rest = told(&mut wrenches, &body, &engine, &frame);
+        let at_rest = wrenches_by_link(&mut wrenches, &body, &engine, &frame);
         assert!(at_rest.len() == found.len() && at_rest.values().all(|wrench| *wrench == Wrench::default()));
     }
 
@@ -249,18 +249,18 @@ mod tests {
         let mut wrenches = LinkWrenches::new(&body, engine.plan(), &ids);
         let mut frame = engine.frame(0.0);
         frame.values.fill(RawValue::new(1.0));
-        let all = told(&mut wrenches, &body, &engine, &frame);
+        let all = wrenches_by_link(&mut wrenches, &body, &engine, &frame);
         let own = &body.links[body.taxels[0].link].name;
         frame.values[0] = RawValue::MISSING;
-        assert_eq!(told(&mut wrenches, &body, &engine, &frame), all, "it is masked anyway");
+        assert_eq!(wrenches_by_link(&mut wrenches, &body, &engine, &frame), all, "it is masked anyway");
         let beside = (1..ids.len()).find(|&index| body.taxels[index].link == body.taxels[0].link).unwrap();
         // What came and is not a number adds nothing; what did not come is not known.
         frame.values[beside] = RawValue::FAULTY;
-        let faulty = told(&mut wrenches, &body, &engine, &frame);
+        let faulty = wrenches_by_link(&mut wrenches, &body, &engine, &frame);
         assert!(faulty.len() == all.len() && faulty[own] != all[own]);
         for absent in [RawValue::MISSING, RawValue::STALE] {
             frame.values[beside] = absent;
-            let found = told(&mut wrenches, &body, &engine, &frame);
+            let found = wrenches_by_link(&mut wrenches, &body, &engine, &frame);
             assert!(found.len() + 1 == all.len() && !found.contains_key(own), "{absent:?}");
         }
     }

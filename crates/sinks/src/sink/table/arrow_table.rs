@@ -39,7 +39,7 @@ pub enum TableKind {
     SelfContacts,
 }
 
-/// The values of a column, of which no batch is made yet.
+/// The values of a column that are in no batch yet.
 enum Builder {
     F64(Float64Builder),
     F32(Float32Builder),
@@ -90,7 +90,7 @@ impl ArrowTable {
         self.columns.iter().map(|(column, _)| column)
     }
 
-    /// Number of rows of which no batch is made yet.
+    /// Number of rows that are in no batch yet.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows

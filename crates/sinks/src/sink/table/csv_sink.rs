@@ -145,9 +145,9 @@ impl CsvSink {
 /// The columns that each field has in a table with one row per frame.
 fn wide_columns(session: &Session<'_>) -> Vec<TableColumn> {
     let all = percept_columns(session);
-    let of = |value: ValueOf| all.iter().find(|column| column.value == value).cloned();
+    let column_of = |value: ValueOf| all.iter().find(|column| column.value == value).cloned();
     let outputs = output_columns(session);
-    of(ValueOf::Contact).into_iter().chain(outputs).chain(of(ValueOf::Flags)).collect()
+    column_of(ValueOf::Contact).into_iter().chain(outputs).chain(column_of(ValueOf::Flags)).collect()
 }
 
 /// What the columns of a field begin with.

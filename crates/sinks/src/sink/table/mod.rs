@@ -78,7 +78,7 @@ fn columns_of(
     session: &Session<'_>,
     value: impl Fn(&'static Column, usize) -> ValueOf,
 ) -> Vec<TableColumn> {
-    let of = |column: &'static Column| {
+    let table_columns = |column: &'static Column| {
         let (kind, value) = (kind_of(column, session), &value);
         let unit = unit_of(column.unit, session);
         suffixes(column.components).iter().enumerate().map(move |(component, suffix)| {
@@ -86,7 +86,7 @@ fn columns_of(
             TableColumn::new(&name, &unit, kind, column.help, value(column, component)).or_absent()
         })
     };
-    outputs.columns().flat_map(of).collect()
+    outputs.columns().flat_map(table_columns).collect()
 }
 
 fn kind_of(column: &Column, session: &Session<'_>) -> TableType {

@@ -39,8 +39,8 @@ pub(super) fn columns(outputs: TouchOutputs, session: &Session<'_>) -> Vec<Table
         };
         for (component, part) in parts.iter().enumerate() {
             let name = if part.is_empty() { quantity.name.to_owned() } else { format!("{}_{part}", quantity.name) };
-            let of = OfTouch::Number(index, component);
-            columns.push(column(&name, &unit, TableType::F64, quantity.help, of).or_absent());
+            let value = OfTouch::Number(index, component);
+            columns.push(column(&name, &unit, TableType::F64, quantity.help, value).or_absent());
         }
     }
     let mut list = |output, name: &str, help: &str, of| {

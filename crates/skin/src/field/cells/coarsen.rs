@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use crate::body::area_vector;
 
-/// Rounds, each of which takes out about a third of what can be.
+/// Rounds; each takes out about a third of what can go.
 const MOST_ROUNDS: usize = 24;
 
 /// Rounds end when one takes out less than this share of the vertices.

@@ -74,7 +74,7 @@ impl Divided {
             [Some(a), Some(b), Some(c)] => Some([a, b, c]),
             _ => None,
         });
-        pieces.extend(corners.map(Piece::of).filter(|piece| piece.area > 0.0));
+        pieces.extend(corners.map(Piece::from_corners).filter(|piece| piece.area > 0.0));
         let (mut areas, first) = (cells.areas.clone(), &cells.first);
         give_away(&pieces, points, |owner, area| areas[first[owner] as usize] += area);
         let mut sharing = vec![0_u32; points.len()];

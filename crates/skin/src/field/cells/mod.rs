@@ -62,7 +62,7 @@ pub struct Piece {
 }
 
 impl Piece {
-    fn of(corners: [DVec3; 3]) -> Self {
+    fn from_corners(corners: [DVec3; 3]) -> Self {
         let spanned = area_vector(corners);
         let [a, b, c] = corners;
         Self { middle: (a + b + c) / 3.0, normal: spanned.normalize_or_zero(), area: spanned.length() / 2.0 }
@@ -137,7 +137,7 @@ impl Cells {
         let mut cells = Self::empty(first);
         let is_fine = fine_parts(topology, starts.iter().map(|&start| places[start].triangle), marched_per_point);
         let is_fine = |triangle: u32| is_fine[topology.part[triangle as usize] as usize];
-        let spacing = Spacing::of(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
+        let spacing = Spacing::from_positions(&starts.iter().map(|&start| positions[start]).collect::<Vec<_>>());
         let reach_m = match (&parts_of_cells, skin) {
             (Some(_), _) => REACH * spacing.largest_m(),
             (None, Some(_)) => REACH_HIDDEN * spacing.largest_m(),
@@ -190,7 +190,7 @@ impl Cells {
         cells
     }
 
-    /// Cells that have nothing yet, of points of which each has its cell in common with `first` of it.
+    /// Empty cells, for points that each share the cell of point `first[point]`.
     fn empty(first: Vec<u32>) -> Self {
         let areas = vec![0.0; first.len()];
         Self { areas, first, borders: BTreeMap::new(), pieces: Vec::new(), surface: Vec::new() }
@@ -247,7 +247,7 @@ impl Cells {
             let part = topology.part[triangle as usize] as usize;
             if !is_reached[part] {
                 if is_skin(triangle) {
-                    self.pieces.push(Piece::of(topology.corners(triangle)));
+                    self.pieces.push(Piece::from_corners(topology.corners(triangle)));
                 }
                 continue;
             }
@@ -288,7 +288,7 @@ impl Cells {
         let area = area_vector(corners).length() / 2.0;
         match candidates {
             // Rounding hides it, as between needles.
-            [] => self.pieces.push(Piece::of(corners)),
+            [] => self.pieces.push(Piece::from_corners(corners)),
             [candidate] => {
                 self.areas[candidate.site as usize] += area;
                 if let Some(parts) = parts {
@@ -342,7 +342,7 @@ impl Cells {
         border.path_m = border.path_m.min(path_m);
     }
 
-    /// Takes the borders of the cell of `own` in a triangle, of which it has `polygon`.
+    /// Takes the borders of the cell of `own` in a triangle; `polygon` is its part of that.
     fn take_borders(&mut self, own: &Candidate, corners: [DVec3; 3], polygon: &[Side]) {
         let [a, b, c] = corners;
         let sides = DVec3::new(b.distance_squared(c), c.distance_squared(a), a.distance_squared(b));

@@ -1,4 +1,4 @@
-//! A triangle divided among points, of which the squared distances to its corners are known.
+//! A triangle divided among points, whose squared distances to its corners are known.
 //!
 //! On a flat triangle the difference of the squared distances to two points is linear, so that borders are straight and
 //! what is interpolated between corners is exact.

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::body::{QuickHasher, Topology};
 
-/// Rounds of cuts, each of which halves edges: more than any surface needs.
+/// Rounds of cuts; each halves edges. More than any surface needs.
 const MOST_ROUNDS: usize = 40;
 
 /// A surface whose long edges are cut.
@@ -132,7 +132,7 @@ mod tests {
             area[parent as usize] += own.length() / 2.0;
         }
         assert!(area.iter().all(|area| (area - 0.5).abs() < 1e-12), "{area:?}");
-        // Nothing long is left but where the number ends it, and nothing to cut is told.
+        // With nothing to cut it gives `None`, and the limit of triangles ends the cuts.
         assert!(refine(&topology, 2.0, |_| 0.0, 100_000).is_none());
         assert!(refine(&topology, 0.0, |_| 0.0, 50).unwrap().triangles.len() < 200);
     }

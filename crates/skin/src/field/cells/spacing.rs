@@ -20,7 +20,7 @@ pub(super) struct Spacing {
 }
 
 impl Spacing {
-    pub(super) fn of(positions: &[DVec3]) -> Self {
+    pub(super) fn from_positions(positions: &[DVec3]) -> Self {
         let tree = point_tree(positions.iter().copied());
         let nearest = |(index, at): (usize, &DVec3)| {
             let mut others = tree.nearest_neighbor_iter_with_distance_2(at.to_array());

@@ -213,11 +213,11 @@ fn points_at_one_place_share_its_cell_and_parts_without_points_are_left() {
 
 #[test]
 fn the_least_of_a_parabola() {
-    let of = |f: fn(f64) -> f64| least_of_parabola([0.0, 0.5, 1.0].map(f));
-    assert!((of(|t| (t - 0.3).powi(2) + 2.0) - 2.0).abs() < 1e-12);
-    assert!((of(|t| 3.0 - t) - 2.0).abs() < 1e-12);
-    assert!((of(|t| (t + 1.0).powi(2)) - 1.0).abs() < 1e-12);
-    assert!((of(|t| 1.0 - t * t)).abs() < 1e-12);
+    let least = |f: fn(f64) -> f64| least_of_parabola([0.0, 0.5, 1.0].map(f));
+    assert!((least(|t| (t - 0.3).powi(2) + 2.0) - 2.0).abs() < 1e-12);
+    assert!((least(|t| 3.0 - t) - 2.0).abs() < 1e-12);
+    assert!((least(|t| (t + 1.0).powi(2)) - 1.0).abs() < 1e-12);
+    assert!((least(|t| 1.0 - t * t)).abs() < 1e-12);
 }
 
 #[test]

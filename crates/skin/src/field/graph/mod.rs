@@ -33,7 +33,7 @@ impl TaxelGraph {
     /// The edges that `body`'s file holds, if they are current; else those of its surface. The second part says why stored
     /// edges are not current.
     #[must_use]
-    pub fn of(body: &Body) -> (Self, Option<String>) {
+    pub fn from_body(body: &Body) -> (Self, Option<String>) {
         match body.edges.as_ref().map(|edges| Self::stored(body, edges)) {
             Some(Ok(graph)) => (graph, None),
             Some(Err(why)) => {

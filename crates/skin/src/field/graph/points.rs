@@ -55,7 +55,7 @@ pub(super) fn edges(points: &[LinkPoint]) -> Vec<(u32, u32)> {
     found
 }
 
-/// Per point the longest edge of which its cell is the larger, m.
+/// Per point the longest edge to a neighbour with a smaller cell, m.
 fn limits_m(points: &[LinkPoint], tree: &PointTree) -> Vec<f64> {
     let nearest = |(index, point): (usize, &LinkPoint)| {
         let mut near = tree.nearest_neighbor_iter_with_distance_2(point.position.to_array());

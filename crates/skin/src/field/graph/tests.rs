@@ -204,29 +204,29 @@ fn stored_edges_are_used_while_they_are_current() {
     let taxels = grid(10, 5, 4, DVec3::ZERO);
     let mut body = body(&[], &taxels, &[]);
     let made = TaxelGraph::made(&body);
-    assert_eq!(TaxelGraph::of(&body), (made.clone(), None));
+    assert_eq!(TaxelGraph::from_body(&body), (made.clone(), None));
     body.edges = Some(made.to_stored(&body));
-    assert_eq!(TaxelGraph::of(&body), (made.clone(), None));
+    assert_eq!(TaxelGraph::from_body(&body), (made.clone(), None));
     // What is stored counts, also where it differs from what would be made.
     let fewer = body.edges.as_mut().unwrap();
     let row = fewer.rows.get_mut(&10).unwrap();
     row.to.remove(0);
     row.lengths_m -= PITCH;
-    let (graph, note) = TaxelGraph::of(&body);
+    let (graph, note) = TaxelGraph::from_body(&body);
     assert_eq!((pairs(&graph).len() + 1, note), (pairs(&made).len(), None));
     // Moved by what an editor rounds, and by more.
     body.edges = Some(made.to_stored(&body));
     body.taxels[7].position_in_link += DVec3::X * 1e-6;
-    assert_eq!(TaxelGraph::of(&body).1, None);
+    assert_eq!(TaxelGraph::from_body(&body).1, None);
     body.taxels[7].position_in_link += DVec3::X * 1e-4;
-    let note = TaxelGraph::of(&body).1.unwrap();
+    let note = TaxelGraph::from_body(&body).1.unwrap();
     assert!(note.contains("made anew") && note.contains("17") && note.contains("moved"), "{note}");
     body.taxels[7].position_in_link -= DVec3::X * 1e-4;
     let mut one = body.taxels.pop().unwrap();
-    let note = TaxelGraph::of(&body).1.unwrap();
+    let note = TaxelGraph::from_body(&body).1.unwrap();
     assert!(note.contains("have taxel 29"), "{note}");
     one.id = 40;
     body.taxels.push(one);
-    let note = TaxelGraph::of(&body).1.unwrap();
+    let note = TaxelGraph::from_body(&body).1.unwrap();
     assert!(note.contains("lack taxel 40"), "{note}");
 }

@@ -16,7 +16,7 @@ pub struct LayerResponse {
 }
 
 impl LayerResponse {
-    /// What gains are taken to vary by where nothing is said.
+    /// The assumed variation of gains, if none is given.
     pub const GAIN_SPREAD: f64 = 0.05;
 }
 

@@ -16,13 +16,13 @@ impl Calibration {
     pub fn with_names_of_now(text: String) -> (String, Vec<String>) {
         // What is not TOML is reported by whoever reads it.
         let Ok(mut file) = toml::from_str::<Table>(&text) else { return (text, Vec::new()) };
-        let mut told = Vec::new();
-        rename(&mut file, &TABLES, |was, new| told.push(format!("`[{was}]` is `[{new}]` now")));
+        let mut renamings = Vec::new();
+        rename(&mut file, &TABLES, |was, new| renamings.push(format!("`[{was}]` is `[{new}]` now")));
         let mut of_taxels = |keys: &mut Table| {
             rename(keys, &KEYS, |was, new| {
                 let what = format!("`{was}` is `{new}` now");
-                if !told.contains(&what) {
-                    told.push(what);
+                if !renamings.contains(&what) {
+                    renamings.push(what);
                 }
             });
         };
@@ -30,7 +30,7 @@ impl Calibration {
         let taxels = file.get_mut("taxel").and_then(Value::as_table_mut);
         taxels.into_iter().flatten().filter_map(|(_, keys)| keys.as_table_mut()).for_each(of_taxels);
         match toml::to_string(&file) {
-            Ok(text) if !told.is_empty() => (text, told),
+            Ok(text) if !renamings.is_empty() => (text, renamings),
             _ => (text, Vec::new()),
         }
     }
@@ -64,9 +64,9 @@ mod tests {
             Calibration::parse(old, &[3, 4]).unwrap_err().to_string().ends_with("is `wiper` now"),
             "a file is refused"
         );
-        let (text, told) = Calibration::with_names_of_now(old.to_owned());
+        let (text, renamings) = Calibration::with_names_of_now(old.to_owned());
         assert_eq!(
-            told,
+            renamings,
             ["`[skin]` is `[layer]` now", "`[upkeep]` is `[drift]` now", "`tap` is `wiper` now"],
             "each once, tables first"
         );

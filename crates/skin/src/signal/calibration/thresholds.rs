@@ -19,7 +19,7 @@ pub struct ContactThresholds {
 }
 
 impl ContactThresholds {
-    /// The same in another unit, of which `factor` are one of these.
+    /// The same in another unit: `factor` new units are one old unit.
     pub(super) fn times(self, factor: f64) -> Self {
         Self { on: self.on * factor, off: self.off * factor }
     }
@@ -35,7 +35,7 @@ pub struct ChangeCalibration {
 }
 
 impl ChangeCalibration {
-    /// The same in another unit, of which `factor` are one of these.
+    /// The same in another unit: `factor` new units are one old unit.
     pub(super) fn times(self, factor: f64) -> Self {
         Self { dead_band: self.dead_band * factor, contact: self.contact.times(factor) }
     }

@@ -35,7 +35,7 @@ impl WiredBoard {
         text + "]\n"
     }
 
-    /// The channels from `from` to before `end`, all of which have taxels.
+    /// The channels from `from` to before `end`. They all have taxels.
     fn run(&self, from: usize, end: usize) -> String {
         let ids: Vec<u32> = self.taxels[from..end].iter().flatten().copied().collect();
         let ascends = ids.windows(2).all(|pair| pair[0].checked_add(1) == Some(pair[1]));

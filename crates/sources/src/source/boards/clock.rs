@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-/// Length of a bucket, of which the earliest arrival counts, s of board time.
+/// Length of a bucket, s of board time. The earliest arrival in it counts.
 const BUCKET_S: f64 = 0.5;
 const BUCKETS: usize = 240;
 /// The drift is assumed to be 0 for less data than this, s.

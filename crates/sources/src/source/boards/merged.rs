@@ -12,11 +12,11 @@ use crate::signal::{Frame, RawValue};
 const CLOSE_POLL: Duration = Duration::from_millis(50);
 
 impl Pace {
-    /// That which `--live-rate` asks for.
+    /// The pace that `--live-rate` asks for.
     ///
     /// # Errors
     /// It is not a rate.
-    pub(in crate::source) fn of(live_rate_hz: Option<f64>) -> Result<Self> {
+    pub(in crate::source) fn from_rate(live_rate_hz: Option<f64>) -> Result<Self> {
         match live_rate_hz {
             None => Ok(Self::Fastest),
             Some(0.0) => Ok(Self::Arrival),

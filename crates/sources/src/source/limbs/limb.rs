@@ -63,13 +63,13 @@ pub(super) struct Limb {
     /// Frames lost since the last that was delivered.
     lost: u32,
     has_restarted: bool,
-    /// Of percepts, whose times are told here.
+    /// For percepts, whose times are computed here.
     clock: Clock,
     /// When something came last.
     heard: Option<Duration>,
     is_silent: bool,
     has_ended: bool,
-    /// What was said last of something that cannot be used.
+    /// The last message about something that cannot be used.
     said: Option<String>,
 }
 

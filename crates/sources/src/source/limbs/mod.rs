@@ -51,7 +51,7 @@ impl LimbSource {
         if let Some((_, key)) = keys.iter().enumerate().find(|(index, key)| keys[..*index].contains(key)) {
             return Err(Error::usage("this limb is given twice; give each once").at(format!("zenoh:{key}")));
         }
-        let pace = Pace::of(options.live_rate_hz)?;
+        let pace = Pace::from_rate(options.live_rate_hz)?;
         let network = Network::open(options.zenoh_config.as_deref(), Side::Head)?;
         let start = Instant::now();
         let account = |(index, key): (u16, &String)| BoardAccount {

@@ -62,7 +62,7 @@ impl SerialSource {
             None => Wiring::in_order(ids, 1, ports.len()).map_err(|e| e.at("no --wiring is given"))?,
         };
         check(ports, ids, &wiring)?;
-        let pace = Pace::of(options.live_rate_hz)?;
+        let pace = Pace::from_rate(options.live_rate_hz)?;
         let rate_mhz = options.board_rate_hz.map(rate_mhz).transpose()?;
         let taxels: Vec<u32> =
             wiring.boards().iter().flat_map(|board| board.taxels.iter().flatten().copied()).collect();

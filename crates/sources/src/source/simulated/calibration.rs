@@ -75,7 +75,7 @@ impl Sensor {
     }
 }
 
-/// For readings of the paper's circuit, of which `open` is the lowest of an open sensor.
+/// For readings of the paper's circuit; `open` is the lowest reading of an open sensor.
 fn counts_keys(circuit: FsrCircuit, open: u16) -> Vec<(&'static str, String)> {
     let linear = |counts| circuit.linearised(counts, FsrCircuit::SATURATION_NEWTON);
     // The raw signal needs the wider dead band; it is used for both if it ends below the smallest force.

@@ -322,9 +322,9 @@ mod tests {
     /// Skins of every model but the plain one.
     fn exact_layers() -> [Layer; 5] {
         let hertz = Layer { contact: Pressure::Hertz, ..LAYER };
-        let of = |kernel: Radial| Layer { kernel: Kernel::Radial(kernel), ..hertz };
-        let deep = of(Radial::Boussinesq);
-        [hertz, deep, Layer { thickness_m: 3e-3, ..deep }, of(Radial::Exponential), of(Radial::Bonded)]
+        let layer = |kernel: Radial| Layer { kernel: Kernel::Radial(kernel), ..hertz };
+        let deep = layer(Radial::Boussinesq);
+        [hertz, deep, Layer { thickness_m: 3e-3, ..deep }, layer(Radial::Exponential), layer(Radial::Bonded)]
     }
 
     #[test]

@@ -113,7 +113,7 @@ fn bonded(depths: f64) -> f64 {
     let table = TABLE.get_or_init(|| {
         /// Beyond this wave number nothing arrives: T·s is under 10⁻¹⁰.
         const MOST: u32 = 32;
-        /// Parts of a wave number, in each of which the integrand is as smooth as its nodes need.
+        /// Parts of a wave number; the integrand is smooth enough for its nodes in each.
         const PARTS: u32 = 4;
         let nodes = gauss_legendre(8);
         let waves: Vec<(f64, f64)> = (0..MOST * PARTS)
@@ -186,7 +186,7 @@ mod tests {
                 let within =
                     if kernel == Radial::Boussinesq { 1e-9 * integral + 1e-15 } else { 2e-3 * integral + 1e-7 };
                 assert!((got - integral).abs() <= within, "{kernel:?} ({x}, {y}): {got:e} {integral:e}");
-                // Another depth is told apart where much is felt.
+                // Where much is felt, another depth makes a difference.
                 let other = kernel.mass(x, y, side / 2.0, 1.15 * depth);
                 assert!(integral < 1e-4 || (other - integral).abs() > within, "{kernel:?} ({x}, {y})");
             }

@@ -110,19 +110,19 @@ fn write(
 /// The cells under [`COLUMNS`]; what is absent is blank.
 fn truth_row(t_s: f64, frame: u64, truth: &Truth) -> [String; COLUMNS.len()] {
     let cell = |number: Option<f64>| number.map(|x| x.to_string()).unwrap_or_default();
-    let of = |vector: Option<DVec3>| vector.map_or([None; 3], |v| v.to_array().map(Some)).map(cell);
+    let cells_of = |vector: Option<DVec3>| vector.map_or([None; 3], |v| v.to_array().map(Some)).map(cell);
     let two = |pair: Option<[f64; 2]>| pair.map_or([None; 2], |p| p.map(Some)).map(cell);
-    let [x, y, z] = of(Some(truth.position_in_link));
-    let [nx, ny, nz] = of(Some(truth.normal_in_link));
+    let [x, y, z] = cells_of(Some(truth.position_in_link));
+    let [nx, ny, nz] = cells_of(Some(truth.normal_in_link));
     let [u, v] = two(truth.uv);
-    let [vx, vy, vz] = of(truth.velocity_in_link);
+    let [vx, vy, vz] = cells_of(truth.velocity_in_link);
     let [vu, vv] = two(truth.velocity_uv);
     let field = truth.field.clone().unwrap_or_default();
     let (speed, force) = (cell(truth.speed), cell(Some(truth.force_newton)));
     let (t, frame, touch) = (t_s.to_string(), frame.to_string(), truth.touch.to_string());
     let (name, link, angle) = (truth.name.clone(), truth.link.clone(), cell(truth.angle));
-    let [dx, dy, dz] = of(truth.direction_in_link);
-    let [ax, ay, az] = of(truth.principal_axis_in_link);
+    let [dx, dy, dz] = cells_of(truth.direction_in_link);
+    let [ax, ay, az] = cells_of(truth.principal_axis_in_link);
     let depth = cell(truth.depth_m);
     [
         t, frame, touch, name, link, field, x, y, z, nx, ny, nz, u, v, angle, vx, vy, vz, vu, vv, speed, force, dx, dy,

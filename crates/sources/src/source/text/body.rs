@@ -1,4 +1,4 @@
-//! The body of sensors of which nobody says where they are: a grid, or a row of dots.
+//! The body of sensors without known places: a grid, or a row of dots.
 
 use crate::body::{Sheet, SheetCell, sheets};
 use crate::error::Result;

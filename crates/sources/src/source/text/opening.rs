@@ -19,10 +19,11 @@ const ENOUGH_LINES: usize = 8;
 const MOST_LINES: usize = 2048;
 /// Bytes that are kept while it is listened.
 const MOST_BYTES: usize = 16 << 20;
-/// How long nothing comes until that is said.
+/// The silence after which a message says so.
 const QUIET: Duration = Duration::from_secs(2);
-/// Bytes by which it is told whether they are text, and how long is waited for as many.
+/// Bytes that decide whether a source is text.
 const SAMPLE_BYTES: usize = 200;
+/// The longest wait for them.
 const SAMPLE: Duration = Duration::from_millis(1500);
 
 /// What was heard while it was found out how lines are written: bytes that came at once, and when.
@@ -173,7 +174,7 @@ impl Listening<'_> {
 
     fn is_enough(&self, now: Duration) -> bool {
         let Some(first) = self.first_numbers else { return self.lines.len() > MOST_LINES || self.bytes > MOST_BYTES };
-        // Frames of several lines are told by two ends.
+        // Frames of several lines are recognised by two ends.
         let is_unclear = self.others == 1 || self.numbers < ENOUGH_LINES;
         let listen = if is_unclear { LISTEN_LONGER } else { LISTEN };
         (now >= first + listen && self.numbers > 1) || self.lines.len() > MOST_LINES || self.bytes > MOST_BYTES

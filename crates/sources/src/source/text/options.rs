@@ -1,4 +1,4 @@
-//! What is said of lines of text instead of being found out: which columns are sensors, which is the time, what ends a frame.
+//! Options of lines of text that are not found out: which columns are sensors, which is the time, what ends a frame.
 
 use std::str::FromStr;
 
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 /// The most columns or ids that a range may name.
 const MAX_RANGE: usize = 1 << 20;
 
-/// What is said of lines of text; what is not said is found out from the first second of input.
+/// Options of lines of text; what they leave open is found out from the first second of input.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextOptions {
     /// The columns of sensors.
@@ -22,7 +22,7 @@ pub struct TextOptions {
 }
 
 impl TextOptions {
-    /// The flag of something that is said, if anything is.
+    /// The flag of an option that is set, if there is one.
     pub(in crate::source) fn given(&self) -> Option<&'static str> {
         let given = [
             ("--columns", self.columns.is_some()),

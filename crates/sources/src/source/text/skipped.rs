@@ -18,7 +18,7 @@ pub(super) enum Wrong {
     Long,
 }
 
-/// Each kind with what is said of it.
+/// Each kind with its message.
 const KINDS: [(Wrong, &str); 11] = [
     (Wrong::Torn, "torn where the connection began or ended"),
     (Wrong::Words, "words where numbers belong, as boards send when they start"),
@@ -47,7 +47,7 @@ pub(super) struct Skipped {
 }
 
 impl Skipped {
-    /// Counts `line`, of which `wrong` is wrong.
+    /// Counts `line`, which has the fault `wrong`.
     pub(super) fn add(&mut self, wrong: Wrong, line: &str) {
         let Some(index) = KINDS.iter().position(|(kind, _)| *kind == wrong) else { return };
         let kind = &mut self.kinds[index];

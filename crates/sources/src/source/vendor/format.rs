@@ -51,7 +51,7 @@ impl VendorFormat {
     }
 
     /// The format of a text that begins with `head`; plain matrices look like nothing in particular.
-    pub(super) fn of(head: &[u8]) -> Option<Self> {
+    pub(super) fn detect(head: &[u8]) -> Option<Self> {
         let text = decoded(head);
         let begins = |start: &str| text.lines().any(|line| line.trim_start().starts_with(start));
         let has = |words: &[&str]| words.iter().all(|word| text.contains(word));

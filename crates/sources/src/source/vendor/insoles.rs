@@ -47,7 +47,7 @@ impl Insoles {
     }
 
     fn row(&self, panel: &str, number: u32) -> Option<&TaxelRow> {
-        let of = |link: Option<&str>| self.rows.iter().find(|row| row.id == number && row.link.as_deref() == link);
-        of(Some(panel)).or_else(|| of(None))
+        let row_on = |link: Option<&str>| self.rows.iter().find(|row| row.id == number && row.link.as_deref() == link);
+        row_on(Some(panel)).or_else(|| row_on(None))
     }
 }

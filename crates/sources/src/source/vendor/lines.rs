@@ -87,7 +87,7 @@ impl Lines {
         })
     }
 
-    /// The first bytes of the text, of which none is taken.
+    /// The first bytes of the text; they stay to be read.
     pub(super) fn head(&mut self) -> Result<&[u8]> {
         while self.end < HEAD_BYTES && !self.ended {
             self.fill()?;

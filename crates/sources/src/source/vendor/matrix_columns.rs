@@ -1,5 +1,5 @@
-//! What the columns of a plain table are: the time, sensors, totals of these, labels. It is told by the first rows, and by the
-//! names in the line above them, where there is one.
+//! What the columns of a plain table are: the time, sensors, totals of these, labels. The first rows show it, and the
+//! names in the line above them, if there is one.
 
 use super::super::column_names::{columns, grid_of, is_beside_sensors};
 use super::super::time_column::{TimeUnit, by_size, calendar, is_long_step, unit_in_head};
@@ -56,7 +56,7 @@ pub(super) fn is_row(separator: Separator, line: &[u8], is_narrow: bool) -> bool
 
 impl<'a> Rows<'a> {
     /// The rows in `head`, the beginning of a text, as wide as the first; `None` if there is no whole one.
-    fn of(separator: Separator, head: &'a [u8], is_narrow: bool) -> Option<Self> {
+    fn from_head(separator: Separator, head: &'a [u8], is_narrow: bool) -> Option<Self> {
         let mut lines: Vec<&[u8]> = head.split(|&byte| byte == b'\n').collect();
         if head.len() >= HEAD_BYTES {
             // It goes on.
@@ -145,7 +145,7 @@ impl<'a> Rows<'a> {
 /// There are more or fewer columns than `grid` and what is beside it take, or it would take totals or the time for sensors; a
 /// usage error, as flags are the way out.
 pub(super) fn recognise(separator: Separator, grid: Grid, head: &[u8]) -> Result<Option<Columns>> {
-    let Some(rows) = Rows::of(separator, head, is_narrow(grid)) else { return Ok(None) };
+    let Some(rows) = Rows::from_head(separator, head, is_narrow(grid)) else { return Ok(None) };
     let (width, cells) = (rows.width(), grid.cells());
     if width < cells {
         // Rows of a block, or too few.
@@ -220,9 +220,9 @@ fn words(
     let sensors = grid.cells();
     words.push(format!("{}: a {} × {} grid", columns(first + 1, first + sensors), grid.rows, grid.columns));
     if !totals.is_empty() {
-        let of: Vec<String> = totals.iter().map(|total| columns(total.first + 1, total.end)).collect();
+        let sums: Vec<String> = totals.iter().map(|total| columns(total.first + 1, total.end)).collect();
         let places = columns(first + sensors + 1, first + sensors + totals.len());
-        words.push(format!("{places}: totals of {}, left out", of.join(" and of ")));
+        words.push(format!("{places}: totals of {}, left out", sums.join(" and of ")));
     }
     if has_label {
         words.push(format!("column {}: a label, left out", rows.width()));
@@ -242,9 +242,9 @@ fn misfit(rows: &Rows<'_>, grid: Grid, time: Likely, label: Likely) -> Error {
         known.push("column 1 is the time".to_owned());
     }
     if !totals.is_empty() {
-        let of: Vec<String> = totals.iter().map(|total| columns(total.first + 1, total.end)).collect();
+        let sums: Vec<String> = totals.iter().map(|total| columns(total.first + 1, total.end)).collect();
         let verb = if totals.len() == 1 { "is the total" } else { "are the totals" };
-        known.push(format!("{} {verb} of {}", columns(end - totals.len() + 1, end), of.join(" and of ")));
+        known.push(format!("{} {verb} of {}", columns(end - totals.len() + 1, end), sums.join(" and of ")));
     }
     if end < width {
         known.push(format!("column {width} is a label"));
@@ -268,9 +268,9 @@ fn misfit(rows: &Rows<'_>, grid: Grid, time: Likely, label: Likely) -> Error {
 pub(super) fn way_out(separator: Separator, head: &[u8]) -> Error {
     let table = "else save the columns of time and sensors as a CSV with the header `t,<taxel id>,...`";
     let is_wide = |rows: &Rows<'_>| rows.width() > 1;
-    let wide = Rows::of(separator, head, false).filter(is_wide);
+    let wide = Rows::from_head(separator, head, false).filter(is_wide);
     let is_narrow = wide.is_none();
-    let Some(rows) = wide.or_else(|| Rows::of(separator, head, true)) else {
+    let Some(rows) = wide.or_else(|| Rows::from_head(separator, head, true)) else {
         let first = head.split(|&byte| byte == b'\n').find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
         let first = super::text::shortened(super::text::decoded(first).trim());
         return failed!(

@@ -71,7 +71,7 @@ impl VendorSource {
         if !path.is_file() {
             return None;
         }
-        VendorFormat::of(Lines::open(path).ok()?.head().ok()?)
+        VendorFormat::detect(Lines::open(path).ok()?.head().ok()?)
     }
 
     /// Opens the recording at `path`.
@@ -90,8 +90,8 @@ impl VendorSource {
             return Err(Error::failed("the file is empty"));
         }
         let by_grid = options.grid.map(|_| VendorFormat::Matrix);
-        let format = options.format.or_else(|| VendorFormat::of(head)).or(by_grid);
-        let separator = Separator::of(head);
+        let format = options.format.or_else(|| VendorFormat::detect(head)).or(by_grid);
+        let separator = Separator::detect(head);
         let format = format.ok_or_else(|| way_out(separator, head))?;
         let parser = parser(format, separator, head, path, options)?;
         let mut source = Self {

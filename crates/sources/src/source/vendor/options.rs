@@ -1,4 +1,4 @@
-//! What is said of a recording beside what its file says.
+//! Options of a recording, besides what its file says.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::length::Length;
 use crate::signal::UnitOfP;
 
-/// What is said of a recording beside what its file says.
+/// Options of a recording, besides what its file says.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VendorOptions {
     /// Its format, if its content is not to tell.

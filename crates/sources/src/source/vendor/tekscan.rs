@@ -227,7 +227,7 @@ impl Parser for Tekscan {
     fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
         let mut cells = self.separator.cells(line);
         let Some(word) = cells.next().filter(|_| !line.trim_ascii().is_empty()) else {
-            // A blank line ends a frame of which nothing says how many rows it has.
+            // A blank line ends a frame whose number of rows is unknown.
             let ends = self.keys.rows.is_none() && self.frame.as_ref().is_some_and(|frame| frame.rows > 0);
             return if ends { self.finish(to) } else { Ok(false) };
         };

@@ -5,7 +5,7 @@ use std::fmt;
 
 use encoding_rs::WINDOWS_1252;
 
-/// What stands between the cells of a line.
+/// The separator between the cells of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Separator {
     /// A comma, a semicolon or a tab. Where it is not a comma, a comma in a number is its decimal point.
@@ -16,8 +16,8 @@ pub(super) enum Separator {
 }
 
 impl Separator {
-    /// That of a text that begins with `head`: what most of its lines with separators have.
-    pub(super) fn of(head: &[u8]) -> Self {
+    /// The separator of a text that begins with `head`: the one in most of its lines with separators.
+    pub(super) fn detect(head: &[u8]) -> Self {
         let lines_with = |mark: u8| head.split(|&byte| byte == b'\n').filter(|line| line.contains(&mark)).count();
         match [b';', b'\t', b','].into_iter().map(|mark| (lines_with(mark), mark)).max_by_key(|(lines, _)| *lines) {
             // A decimal comma is in every line that has a semicolon or a tab.
@@ -252,7 +252,7 @@ pub(super) fn metres(text: &str) -> Option<f64> {
     })
 }
 
-/// What stands in the first pair of parentheses.
+/// The content of the first pair of parentheses.
 pub(super) fn in_parentheses(text: &str) -> Option<&str> {
     let (_, after) = text.split_once('(')?;
     Some(after.split_once(')')?.0)
@@ -290,11 +290,11 @@ mod tests {
 
     #[test]
     fn a_separator_is_what_most_lines_have() {
-        assert_eq!(Separator::of(b"File:,a\n1,2\n3,4\n"), Separator::One(b','));
-        assert_eq!(Separator::of(b"File:;a\n1,5;2,5\n3;4\n"), Separator::One(b';'));
-        assert_eq!(Separator::of(b"a\tb\n1,5\t2,5\n"), Separator::One(b'\t'));
-        assert_eq!(Separator::of(b"left insole: 1,2\n  0.1 0.2\n 0.3  0.4\n"), Separator::One(b','));
-        assert_eq!(Separator::of(b"  0.1 0.2\n"), Separator::Blanks);
+        assert_eq!(Separator::detect(b"File:,a\n1,2\n3,4\n"), Separator::One(b','));
+        assert_eq!(Separator::detect(b"File:;a\n1,5;2,5\n3;4\n"), Separator::One(b';'));
+        assert_eq!(Separator::detect(b"a\tb\n1,5\t2,5\n"), Separator::One(b'\t'));
+        assert_eq!(Separator::detect(b"left insole: 1,2\n  0.1 0.2\n 0.3  0.4\n"), Separator::One(b','));
+        assert_eq!(Separator::detect(b"  0.1 0.2\n"), Separator::Blanks);
     }
 
     #[test]

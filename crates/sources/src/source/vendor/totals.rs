@@ -29,13 +29,13 @@ struct Sums {
 /// The totals that the columns before `end` end with, of all columns from `first` on between them: each of the columns after those
 /// of the one before, or of all. Empty if the rows do not show it.
 pub(super) fn totals(rows: &[Vec<Word<'_>>], first: usize, end: usize) -> Vec<Total> {
-    let sums = Sums::of(rows, first, end);
+    let sums = Sums::from_rows(rows, first, end);
     let most = MAX_TOTALS.min(end.saturating_sub(first + MIN_SENSORS));
     (1..=most).rev().find_map(|count| sums.tiled(first, end, count)).unwrap_or_default()
 }
 
 impl Sums {
-    fn of(rows: &[Vec<Word<'_>>], first: usize, end: usize) -> Self {
+    fn from_rows(rows: &[Vec<Word<'_>>], first: usize, end: usize) -> Self {
         let number = |word: &Word<'_>| word.number().filter(|number| number.is_finite()).unwrap_or(0.0);
         let values: Vec<Vec<f64>> = rows.iter().map(|row| row[..end].iter().map(number).collect()).collect();
         let sums = values.iter().map(|row| {

@@ -1,8 +1,8 @@
 //! XSENSOR's `.csv`: for each frame a header and, for each sensor, keys with values and then a table of its cells.
 //!
 //! Cells outside a sensor's outline are printed as 0, and the file does not say which they are. It says the area of the whole
-//! sensor, and how many cells each of its groups has and their area; from these comes the area of a cell, of which the width
-//! and height in the file have two digits only.
+//! sensor, and how many cells each of its groups has and their area. The area of a cell comes from these: its width
+//! and height in the file have only two digits.
 
 use super::layout::{Grid, Layout, next_value};
 use super::parser::{Parser, Rate};
@@ -27,7 +27,7 @@ pub(super) struct Xsensor {
     values: Vec<RawValue>,
 }
 
-/// A frame of which more is to come.
+/// A frame that is not complete yet.
 struct Started {
     number: Option<u32>,
     t_s: Option<f64>,
@@ -105,12 +105,12 @@ impl Xsensor {
     /// Begins a sensor's table, whose size must be known by now.
     fn table(&mut self, sensor: usize) -> Result<()> {
         let place = self.values.len();
-        let of = &mut self.sensors[sensor];
-        if of.first.is_none() {
-            of.grid = of.grid.check().map_err(|e| e.at(format!("sensor `{}`", of.name)))?;
-            of.grid.pitch_m = of.width_m.zip(of.height_m).map(|(width, height)| [width, height]);
-            of.first = Some(place);
-            self.values.resize(place + of.grid.cells(), RawValue::MISSING);
+        let known = &mut self.sensors[sensor];
+        if known.first.is_none() {
+            known.grid = known.grid.check().map_err(|e| e.at(format!("sensor `{}`", known.name)))?;
+            known.grid.pitch_m = known.width_m.zip(known.height_m).map(|(width, height)| [width, height]);
+            known.first = Some(place);
+            self.values.resize(place + known.grid.cells(), RawValue::MISSING);
         }
         self.place = Place::Table { sensor, row: 0 };
         Ok(())
@@ -145,7 +145,7 @@ impl Xsensor {
         Ok(())
     }
 
-    /// Takes a key of a sensor or a group, with what stands beside it.
+    /// Takes a key of a sensor or a group, with the cells after it.
     fn key(&mut self, key: Word<'_>, beside: Option<Word<'_>>) -> Result<()> {
         let name = key.text();
         let wrong =
@@ -164,13 +164,13 @@ impl Xsensor {
         }
         match self.place {
             Place::Keys { sensor } if self.sensors[sensor].first.is_none() => {
-                let of = &mut self.sensors[sensor];
+                let known = &mut self.sensors[sensor];
                 match &*name {
-                    "Rows" => of.grid.rows = count()?,
-                    "Columns" => of.grid.columns = count()?,
-                    key if key.starts_with("Sensel Width") => of.width_m = Some(length()?),
-                    key if key.starts_with("Sensel Height") => of.height_m = Some(length()?),
-                    key if key.starts_with("Total Area") => of.total_area_m2 = Some(area()?),
+                    "Rows" => known.grid.rows = count()?,
+                    "Columns" => known.grid.columns = count()?,
+                    key if key.starts_with("Sensel Width") => known.width_m = Some(length()?),
+                    key if key.starts_with("Sensel Height") => known.height_m = Some(length()?),
+                    key if key.starts_with("Total Area") => known.total_area_m2 = Some(area()?),
                     _ => {}
                 }
             }

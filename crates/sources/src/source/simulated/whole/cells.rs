@@ -82,7 +82,7 @@ impl Cells {
     }
 
     /// The taxel in whose cell the point `p` of `mesh` lies, where the normal is `normal`.
-    pub(super) fn of(&self, p: DVec3, normal: DVec3, mesh: u32) -> Option<u32> {
+    pub(super) fn taxel_at(&self, p: DVec3, normal: DVec3, mesh: u32) -> Option<u32> {
         let (mut best, mut least_m) = (None, f64::INFINITY);
         for (other, squared) in self.tree.nearest_neighbor_iter_with_distance_2(p.to_array()) {
             // Along the surface nothing is nearer than straight.

@@ -65,8 +65,8 @@ pub(super) fn principal(moments: DMat3) -> Option<(DVec3, f64, f64)> {
         Some((direction, direction.dot(matrix * direction)))
     };
     let (direction, first) = strongest(moments)?;
-    let of = |a: f64| direction * (a * first);
-    let rest = moments - DMat3::from_cols(of(direction.x), of(direction.y), of(direction.z));
+    let point = |a: f64| direction * (a * first);
+    let rest = moments - DMat3::from_cols(point(direction.x), point(direction.y), point(direction.z));
     Some((direction, first, strongest(rest).map_or(0.0, |(_, second)| second.max(0.0))))
 }
 

@@ -16,12 +16,12 @@ use super::surface::{Spot, WholeSurface};
 use crate::body::{Body, area_vector};
 use crate::signal::RawValue;
 
-/// The pressure ends at so many standard deviations: 0.03 % of a point's force lie beyond.
+/// The pressure ends at this many standard deviations: 0.03 % of a point's force lie beyond.
 const REACH_SIGMAS: f64 = 4.0;
 /// Edges of the pieces of the surface, and distances of the points of a line, in standard deviations at most.
 const PIECE_SIGMAS: f64 = 0.25;
 const LINE_SIGMAS: f64 = 0.3;
-/// A place of the skin lies within so many sides of a taxel's cell of that taxel, and faces as it does to 60°.
+/// A place of the skin belongs to a taxel at most this many sides of its cell away, if both face the same way to 60°.
 const NEAR_SIDES: f64 = 1.2;
 const NEAR_COSINE: f64 = 0.5;
 

@@ -17,7 +17,7 @@ const ENOUGH: usize = 2000;
 const MIN_EDGE_M: f64 = 3e-5;
 /// Attempts at pieces of the right size.
 const ATTEMPTS: u32 = 10;
-/// Forces are put together in larger cubes until there are at most so many.
+/// Forces are put together in larger cubes until there are at most this many.
 const MANY: usize = 4000;
 
 /// The surface that a touch presses, and the layer over it.

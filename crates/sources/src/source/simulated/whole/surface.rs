@@ -172,7 +172,7 @@ impl WholeSurface {
                 |_, _| true,
                 |corners, area_m2| {
                     let middle = middle(corners);
-                    let taxel = cells.of(middle, facet.normal, facet.mesh).unwrap_or(UNFELT);
+                    let taxel = cells.taxel_at(middle, facet.normal, facet.mesh).unwrap_or(UNFELT);
                     found.push(Piece { middle, area_m2, taxel });
                 },
             );

@@ -128,10 +128,10 @@ impl BodySkin {
         let loads = || pressure.loads.iter().filter(|load| load.part == *part && is_beside(load.normal, sensor.normal));
         let at = |p: DVec3| -> f64 {
             let pressures = loads().filter(|load| load.spread_m2 > 0.0);
-            let of = |load: &super::press::Load| {
+            let pressure_of = |load: &super::press::Load| {
                 load.force_newton * skin.share(load, p - load.position, sensor.normal) / load.spread_m2
             };
-            pressures.map(of).sum()
+            pressures.map(pressure_of).sum()
         };
         let nodes = NODES.iter().flat_map(|a| NODES.iter().map(move |b| (a, b)));
         let mean: f64 = nodes.map(|((x, p), (y, q))| p * q * at(sensor.position + u * *x + v * *y)).sum();

@@ -22,7 +22,7 @@ pub(super) fn numbers(lines: &[Heard], kinds: &[Kind], known: Known<'_>) -> Resu
         whole.iter().zip(kinds).filter(|(_, kind)| **kind == Kind::Numbers).map(|(line, _)| &*line.text).collect();
     let separator = separator(&of_numbers);
     let width = usual(of_numbers.iter().map(|line| width_of(line, separator)));
-    let rows: Vec<Row<'_>> = whole.iter().map(|line| Row::of(line, separator)).collect();
+    let rows: Vec<Row<'_>> = whole.iter().map(|line| Row::from_heard(line, separator)).collect();
     let of_width: Vec<&Row<'_>> = rows
         .iter()
         .zip(kinds)
@@ -84,7 +84,7 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    fn of(heard: &'a Heard, separator: Separator) -> Self {
+    fn from_heard(heard: &'a Heard, separator: Separator) -> Self {
         let mut cells = Vec::new();
         separator.split(&heard.text, &mut cells);
         Self { line: &heard.text, at: heard.at, width: count(&cells), cells }
@@ -219,7 +219,7 @@ fn by_values(columns: &mut Columns, rows: &[&Row<'_>], of_frame: usize) {
     }
 }
 
-/// The unit of a time of which its name does not say it.
+/// Finds the unit of a time column whose name does not give it.
 fn by_clock(columns: &mut Columns, rows: &[&Row<'_>]) {
     let Some(index) = columns.uses.iter().position(|column| *column == Use::Time) else { return };
     let given = rows.iter().filter_map(|row| Some((row.number(index)?, row.at)));

@@ -1,13 +1,13 @@
-//! What a message tells of joints' positions.
+//! The joint positions in a message.
 
 use super::messages::JointState;
 use crate::error::{Result, failed};
 
-/// The joints of `state` with their positions, rad or m. A state without positions tells of none.
+/// The joints of `state` with their positions, rad or m. A state without positions has none.
 ///
 /// # Errors
 /// It has not a position for each name.
-pub(super) fn told_positions(state: &JointState) -> Result<impl Iterator<Item = (&String, f64)>> {
+pub(super) fn joint_positions(state: &JointState) -> Result<impl Iterator<Item = (&String, f64)>> {
     if !state.position.is_empty() && state.position.len() != state.name.len() {
         return Err(failed!(
             "a state has {} names and {} positions; send one for each",
