@@ -64,6 +64,12 @@ pub mod run;
 mod scene_file;
 
 // Rooms that only `internal` shows.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+mod contents;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+mod convert;
 #[doc(hidden)]
 mod expected;
 #[cfg(feature = "cli")]
@@ -102,6 +108,14 @@ pub mod internal {
     pub use somatic_sources::{board, source};
     pub use somatic_wire as wire;
 
+    #[cfg(feature = "cli")]
+    pub mod contents {
+        pub use crate::contents::*;
+    }
+    #[cfg(feature = "cli")]
+    pub mod convert {
+        pub use crate::convert::*;
+    }
     #[cfg(feature = "cli")]
     pub mod figure {
         pub use crate::figure::*;

@@ -1,4 +1,4 @@
-"""The command's other subcommands: `info`, `inspect`, `outputs`, `plan`, `bench` and `plot`."""
+"""The command's other subcommands: `info`, `inspect`, `compare`, `outputs`, `plan`, `bench` and `plot`."""
 
 from __future__ import annotations
 
@@ -22,11 +22,20 @@ def _of(body: _native.Body | _Path) -> _native.Body:
     return body if isinstance(body, _native.Body) else _native._body(body)
 
 
-def info(source: _Path, *, rate_hz: float | None = None) -> dict[str, Any]:
+def info(
+    source: _Path,
+    *,
+    rate_hz: float | None = None,
+    format: str | None = None,
+    grid: str | None = None,
+    pitch: str | None = None,
+    unit: str | None = None,
+    layout: _Path | None = None,
+) -> dict[str, Any]:
     """What is in the recording at `source`, as `somatic info` tells it, but for contacts.
 
     Of a recording `kind`, `bytes`, `taxels`, `frames`, `start` and `duration` in seconds, `rate_hz`, `gaps`, `longest_gap`, `backwards`, `losses`; of an MCAP
-    `topics` and `attached` too, of an export `unit` and `panels`; of a ROS 2 bag its `topics`.
+    `topics` and `attached` too, of an export `unit` and `panels`; of a ROS 2 bag its `topics`. The keywords are those of `read`.
 
     >>> import pathlib, tempfile
     >>> import somatic_touch as st
@@ -36,23 +45,41 @@ def info(source: _Path, *, rate_hz: float | None = None) -> dict[str, Any]:
     >>> known["kind"], known["frames"], known["duration"], [file["name"] for file in known["attached"]]
     ('MCAP', 280, 5.58, ['hand'])
     """
-    known: dict[str, Any] = json.loads(_native._info(os.fspath(source), rate_hz))
+    known: dict[str, Any] = json.loads(_native._info(os.fspath(source), rate_hz, format, grid, pitch, unit, layout))
     return known
 
 
-def inspect(body: _native.Body | _Path, *, contact_tolerance_m: float | None = None) -> dict[str, Any]:
+def inspect(body: _native.Body | _Path, *, contact_tolerance_m: float | None = None, errors: bool = False) -> dict[str, Any]:
     """What `body` holds, and what is odd about it, as `somatic inspect` tells it: `links`, `fields`, `skin`, `holes`, `islands` and `findings`.
 
     Areas are in m²; `covered` is how much of them is near a taxel. `near_at_rest` counts pairs of links whose taxels are closer at rest than
-    `contact_tolerance_m`.
+    `contact_tolerance_m`. With `errors` touches are simulated on it: `errors` then has the median and the 95th percentile of how far off their
+    place is (m), their axis (rad) and their force (a share of it), and the same of an `ideal` skin.
 
     >>> import somatic_touch as st
     >>> seen = st.inspect("hand")
     >>> seen["taxels"], len(seen["fields"]), seen["islands"]
     (40, 13, 5)
     """
-    seen: dict[str, Any] = json.loads(_native._inspect(_of(body), contact_tolerance_m))
+    seen: dict[str, Any] = json.loads(_native._inspect(_of(body), contact_tolerance_m, errors))
     return seen
+
+
+def compare(first: _native.Body | _Path, second: _native.Body | _Path, *, touches: int = 400) -> dict[str, Any]:
+    """How far off so many simulated touches are on two layouts, as `somatic author --compare` tells it.
+
+    `layouts` has for each what `inspect(errors=True)` has as `errors`, and `frame_s`, the time of a live frame. `second_is_nearer` is the share of
+    touches that the second layout places better, where both have one surface (`same_places`).
+
+    >>> import somatic_touch as st
+    >>> told = st.compare(st.Body.grid(4, 4, 0.01), st.Body.grid(8, 8, 0.005), touches=60)
+    >>> [layout["taxels"] for layout in told["layouts"]]
+    [16, 64]
+    >>> told["layouts"][0]["place"]["median"] > told["layouts"][1]["place"]["median"]
+    True
+    """
+    told: dict[str, Any] = json.loads(_native._compare(_of(first), _of(second), touches))
+    return told
 
 
 def outputs() -> Table:
@@ -143,5 +170,5 @@ def plot(
     _native._plot(read, path, list(outputs), [fields] if isinstance(fields, str) else list(fields), force)
 
 
-for _public in (info, inspect, outputs, plan, bench, plot):
+for _public in (info, inspect, compare, outputs, plan, bench, plot):
     _public.__module__ = "somatic_touch"

@@ -25,6 +25,7 @@ __all__ = [
     "__version__",
     "_body",
     "_calibrate",
+    "_compare",
     "_gains",
     "_info",
     "_inspect",
@@ -101,6 +102,7 @@ class Body:
         name: str = "grid",
         order: Literal["rows", "columns"] = "rows",
         regions: tuple[int, int] | None = None,
+        cells: npt.ArrayLike | None = None,
     ) -> Body: ...
     @staticmethod
     def _of_bytes(name: str, bytes: bytes) -> Body: ...
@@ -330,6 +332,8 @@ class Touches:
     def flags(self) -> npt.NDArray[np.uint32]: ...
     @property
     def wrenches(self) -> npt.NDArray[np.void]: ...
+    @property
+    def taxels(self) -> list[npt.NDArray[np.uint32]]: ...
     @overload
     def __getitem__(self, name: Literal["link"], /) -> list[str]: ...  # type: ignore[overload-overlap]
     @overload
@@ -540,6 +544,7 @@ def render(
     uv: str | None = None,
     look_at: str | None = None,
     ids: bool = False,
+    edges: bool = False,
     size: int | tuple[int, int] = ...,
 ) -> Picture: ...
 def simulate(
@@ -597,6 +602,11 @@ def convert(
     body: Body | _Path | None = None,
     calibration: Calibration | None = None,
     rate_hz: float | None = None,
+    format: str | None = None,
+    grid: str | None = None,
+    pitch: str | None = None,
+    unit: str | None = None,
+    layout: _Path | None = None,
     force: bool = False,
 ) -> int: ...
 def _body(body: Body | _Path) -> Body: ...
@@ -624,8 +634,17 @@ def _gains(
     progress: bool | Callable[[float], object] | None,
 ) -> tuple[str, str]: ...
 def _live(scene: Scene | dict[str, Any] | _Path | None, keys: dict[str, Any]) -> Live: ...
-def _info(source: str, rate_hz: float | None) -> str: ...
-def _inspect(body: Body, contact_tolerance_m: float | None) -> str: ...
+def _info(
+    source: str,
+    rate_hz: float | None,
+    format: str | None,
+    grid: str | None,
+    pitch: str | None,
+    unit: str | None,
+    layout: _Path | None,
+) -> str: ...
+def _inspect(body: Body, contact_tolerance_m: float | None, errors: bool) -> str: ...
+def _compare(first: Body, second: Body, touches: int) -> str: ...
 def _outputs() -> str: ...
 def _plot(
     recordings: Sequence[Recording], to: _Path, outputs: Sequence[str], fields: Sequence[str], force: bool

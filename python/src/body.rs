@@ -7,7 +7,6 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use somatic::field::FieldSet;
-use somatic::internal::author::{GridOrder, SheetGrid, author_sheets};
 use somatic::internal::body::{LinkMotion, Original, WORLD_FROM_BODY};
 use somatic::internal::error::suggestion;
 use somatic::signal::Pose;
@@ -19,6 +18,7 @@ use crate::error::{OrRaise, unknown_name, usage};
 use crate::field::{PitchOfGrid, PyField};
 use crate::kinematics::{Positions, joints};
 use crate::same::{hash_of, same};
+use crate::sheet::Sheet;
 use crate::stream::in_python;
 use crate::threads::free;
 
@@ -97,14 +97,18 @@ impl PyBody {
     /// A flat sheet of `rows` × `columns` sensors that are `pitch_m` apart, in metres: a mat, an insole, an array.
     ///
     /// The field is called `name`; `regions` (rows, columns) makes fields of parts below it. Ids count from 0 along each row,
-    /// or with `order="columns"` along each column.
+    /// or with `order="columns"` along each column. `cells`, bool [rows, columns], is False where there is no sensor; ids stay as
+    /// in the full grid.
     ///
     /// >>> import somatic_touch as st
     /// >>> mat = st.Body.grid(31, 11, 0.0086, name="mat", regions=(3, 1))
     /// >>> len(mat.taxels), sorted(mat.fields)[:2]
     /// (341, ['mat', 'mat/r1_c1'])
+    /// >>> st.Body.grid(2, 2, 0.01, cells=[[True, False], [True, True]]).taxels["id"].tolist()
+    /// [0, 2, 3]
     #[staticmethod]
-    #[pyo3(signature = (rows, columns, pitch_m, *, name = "grid", order = "rows", regions = None))]
+    #[pyo3(signature = (rows, columns, pitch_m, *, name = "grid", order = "rows", regions = None, cells = None))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords")]
     fn grid(
         py: Python<'_>,
         rows: u32,
@@ -113,24 +117,9 @@ impl PyBody {
         name: &str,
         order: &str,
         regions: Option<(u32, u32)>,
+        cells: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let (row_pitch_m, column_pitch_m) = match pitch_m {
-            PitchOfGrid::Both(pitch) => (pitch, pitch),
-            PitchOfGrid::Each(rows, columns) => (rows, columns),
-        };
-        let order = match order {
-            "rows" => GridOrder::Rows,
-            "columns" => GridOrder::Columns,
-            other => return Err(usage(py, format!("there is no order `{other}`; it is rows or columns"))),
-        };
-        let regions = regions.map(|(rows, columns)| [rows, columns]);
-        let grid =
-            SheetGrid { row_pitch_m, column_pitch_m, order, regions, ..SheetGrid::new(rows, columns, row_pitch_m) };
-        free(py, || {
-            let authored = author_sheets(name, &[grid.sheet(name)?])?;
-            Self::of_bytes(name, authored.file.to_glb()?)
-        })
-        .or_raise(py)
+        Sheet { size: [rows, columns], pitch_m, name, order, regions, cells }.body(py)
     }
 
     /// Writes it to `path` as .glb; a file that exists is replaced only with `force`.

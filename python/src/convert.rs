@@ -3,39 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use somatic::internal::author::mesh::urdf_of_skin;
-use somatic::internal::body::taxel_table;
+use somatic::internal::convert::{FrameFile, SkinFormat, is_body};
 use somatic::internal::recording::{BODY, CALIBRATION};
-use somatic::internal::source::CsvFile;
 use somatic::output::OutputPaths;
-use somatic::recording::Recorder;
-use somatic::source::{Cut, Source, SourceSpec, VendorOptions};
-use somatic::{Error, Frame, OutputPath, Result, bundled};
+use somatic::source::{Cut, Source, SourceSpec};
+use somatic::{Error, OutputPath, Result};
 
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, interrupted, warn};
 use crate::given::InMemory;
-use crate::opening::{body_of, open, text_of};
+use crate::opening::{Keys, body_of, open, text_of};
 use crate::recording::PyRecording;
-use crate::threads::free;
+use crate::threads::{free, goes_on};
 
 /// Frames that are copied until Ctrl-C is heard.
-const FRAMES_BETWEEN: usize = 1 << 10;
-
-enum Target {
-    Csv(CsvFile),
-    Mcap(Box<Recorder>),
-}
-
-impl Target {
-    fn frame(&mut self, frame: &Frame) -> Result<()> {
-        match self {
-            Self::Csv(file) => file.frame(frame),
-            Self::Mcap(recorder) => recorder.frame(frame),
-        }
-    }
-}
+const FRAMES_BETWEEN: u64 = 1 << 10;
 
 /// What is copied, and what lies beside it.
 struct Copied {
@@ -60,70 +43,45 @@ impl Copied {
         raised: &mut Option<PyErr>,
     ) -> Result<Option<(u64, Vec<String>)>> {
         self.source.report_stale();
-        let is_csv = matches!(to, SourceSpec::Csv(_));
-        let mut target = match is_csv {
-            true => Target::Csv(CsvFile::create(output, self.source.taxels())?),
-            false => {
-                let mut recorder = Recorder::create_whole(output, self.source.taxels())?;
-                if let Some(body) = &self.body {
-                    let name = Path::new(&body.inner.name).file_name().map(|name| name.to_string_lossy().into_owned());
-                    recorder.attach(&name.unwrap_or_default(), BODY, &body.bytes)?;
-                }
-                if let Some(text) = &self.calibration {
-                    recorder.attach(CALIBRATION, "application/toml", text.as_bytes())?;
-                }
-                Target::Mcap(Box::new(recorder))
-            }
+        let mut attached = Vec::new();
+        if let Some(body) = &self.body {
+            let name = Path::new(&body.inner.name).file_name().map(|name| name.to_string_lossy().into_owned());
+            attached.push((name.unwrap_or_default(), BODY.to_owned(), body.bytes.to_vec()));
+        }
+        if let Some(text) = &self.calibration {
+            attached.push((CALIBRATION.to_owned(), "application/toml".to_owned(), text.clone().into_bytes()));
+        }
+        let taxels = self.source.taxels().to_vec();
+        let source = &mut *self.source;
+        let mut file = match to {
+            SourceSpec::Csv(_) => FrameFile::csv(output, &taxels)?,
+            _ => FrameFile::mcap(output, &taxels, &attached)?,
         };
-        let mut frame = Frame::missing(0.0, self.source.taxels().len());
-        let (mut frames, mut posed) = (0_u64, 0_u64);
-        while self.source.next_frame(&mut frame)? {
-            target.frame(&frame)?;
-            frames += 1;
-            posed += u64::from(!frame.pose.is_empty());
-            if frames.is_multiple_of(FRAMES_BETWEEN as u64) {
-                *raised = Python::attach(|py| py.check_signals().err());
-                if raised.is_some() {
-                    return Ok(None);
-                }
-            }
+        let copied =
+            file.copy(source, |frames, _| frames == 0 || !frames.is_multiple_of(FRAMES_BETWEEN) || goes_on(raised))?;
+        if !copied.is_whole {
+            return Ok(None);
         }
-        match target {
-            Target::Csv(file) => file.finish()?,
-            Target::Mcap(recorder) => recorder.finish()?,
-        }
-        let mut said = self.source.losses();
-        if is_csv && posed > 0 {
-            said.push(format!("a CSV has no place for poses: those of {posed} frames are left out"));
-        }
-        if is_csv && self.source.has_stale() {
-            said.push("a CSV cannot mark stale values: they are missing there".to_owned());
-        }
-        if is_csv && (self.body.is_some() || self.calibration.is_some()) {
-            said.push("a CSV has no place for a body and a calibration: they are left out".to_owned());
-        }
-        Ok(Some((frames, said)))
+        let names: Vec<&str> = attached.iter().map(|(name, ..)| name.as_str()).collect();
+        let mut said = source.losses();
+        said.extend(file.left_behind(source, &copied, &names));
+        file.finish()?;
+        Ok(Some((copied.frames, said)))
     }
 }
 
 /// Writes the taxels of `body` to `path`; gives how many, and what is to be said of it.
 fn skin(body: &PyBody, path: &Path, force: bool) -> Result<(u64, Vec<String>)> {
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    let is_table = match ending.as_deref() {
-        Some("csv") => true,
-        Some("urdf") => false,
-        _ => return Err(Error::usage("the skin of a body becomes a .csv or a .urdf").at(path.display())),
+    let Some(format) = SkinFormat::of(path) else {
+        return Err(Error::usage("the skin of a body becomes a .csv or a .urdf").at(path.display()));
     };
     let body = &*body.inner;
     if body.taxels.is_empty() {
         return Err(Error::failed("it has no taxels; place some on it, with `author`").at(&body.name));
     }
-    let (text, mut said) = if is_table { (taxel_table(body), Vec::new()) } else { urdf_of_skin(body) };
+    let (text, mut said) = format.text(body);
     OutputPath::new(path, force, &[])?.write(text.as_bytes())?;
-    if !body.fields.is_empty() {
-        let what = if is_table { "table" } else { "URDF" };
-        said.push(format!("a {what} has no place for fields: {} left out", body.fields.len()));
-    }
+    said.extend(format.without_fields(body));
     Ok((body.taxels.len() as u64, said))
 }
 
@@ -137,6 +95,8 @@ fn skin(body: &PyBody, path: &Path, force: bool) -> Result<(u64, Vec<String>)> {
 ///     Of a recording a .csv or a .mcap, of a body a .csv or a .urdf.
 /// body, calibration : Body or path, and Calibration, optional
 ///     What an MCAP gets beside its frames; by default what comes with the recording.
+/// rate_hz, format, grid, pitch, unit, layout : optional
+///     How a table or a pressure system's export is read, as for `read`.
 /// force : bool
 ///     Whether a file that exists is replaced.
 ///
@@ -155,7 +115,8 @@ fn skin(body: &PyBody, path: &Path, force: bool) -> Result<(u64, Vec<String>)> {
 /// >>> len(st.read(folder / "touch.mcap").body.taxels)
 /// 40
 #[pyfunction]
-#[pyo3(signature = (source, to, *, body = None, calibration = None, rate_hz = None, force = false))]
+#[pyo3(signature = (source, to, *, body = None, calibration = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, force = false))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn convert(
     py: Python<'_>,
     source: &Bound<'_, PyAny>,
@@ -163,6 +124,11 @@ pub(crate) fn convert(
     body: Option<&Bound<'_, PyAny>>,
     calibration: Option<&PyCalibration>,
     rate_hz: Option<f64>,
+    format: Option<&str>,
+    grid: Option<&str>,
+    pitch: Option<&str>,
+    unit: Option<&str>,
+    layout: Option<PathBuf>,
     force: bool,
 ) -> PyResult<u64> {
     let to = text_of(to)?;
@@ -170,9 +136,7 @@ pub(crate) fn convert(
     let skinned = match source.cast::<PyBody>() {
         Ok(skinned) => Some(skinned.clone().unbind()),
         Err(_) => match text_of(source) {
-            Ok(name) if name.ends_with(".glb") || name.ends_with(".gltf") || bundled::body(&name).is_some() => {
-                Some(body_of(py, source)?)
-            }
+            Ok(name) if is_body(&name) => Some(body_of(py, source)?),
             _ => None,
         },
     };
@@ -191,7 +155,8 @@ pub(crate) fn convert(
             (None, Copied { source: Box::new(InMemory::from_recording(py, known)?), body: own, calibration: text })
         }
         Err(_) => {
-            let options = VendorOptions { rate_hz, ..VendorOptions::default() };
+            let keys = Keys { rate_hz, format, grid, pitch, unit, layout, ..Keys::default() };
+            let options = keys.options().or_raise(py)?;
             let from = text_of(source)?.parse::<SourceSpec>().or_raise(py)?.with_content(&options);
             let file = from.file().map(Path::to_owned);
             let given = body.as_ref().map(Py::get);

@@ -89,7 +89,8 @@ impl Wish<'_> {
         let set = FieldSet::new(body)?;
         let named = |globs: &[String]| choose_fields(&set, globs).map_err(|e| e.at(&body.name));
         let chosen = if self.fields.is_empty() { Vec::new() } else { named(&self.fields)? };
-        let options = Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone(), edges: false };
+        let options =
+            Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone(), edges: self.edges };
         if let Some(read) = read {
             let touches = somatic::touch::Options::default();
             let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).coordinates(Coordinates::Anchor);

@@ -1,5 +1,8 @@
 //! `Engine`: frames in, percepts out, without Python's lock.
 
+mod inner;
+mod wish;
+
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -9,9 +12,11 @@ use pyo3::types::{PyDict, PyTuple};
 use somatic::internal::signal::FrameBlock;
 use somatic::page::Listen;
 use somatic::signal::Pose;
-use somatic::{Agreement, BackendKind, Engine, Error, Frame, Percepts};
+use somatic::{Agreement, Error, Frame, Percepts};
 
-use crate::agreement::agreement_dict;
+use self::inner::Inner;
+use self::wish::Wish;
+use crate::agreement::told;
 use crate::arrays::{Values, poses, time_s, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
@@ -29,8 +34,6 @@ use crate::view::{Page, PyView};
 const LONG: usize = 1 << 20;
 /// Bytes of percepts from which on it is asked whether there is room for them.
 const LARGE: usize = 1 << 28;
-/// Batches that may be lent to Python and wait for their memory to come back.
-const LENT: usize = 4;
 
 /// Turns touch frames into percepts.
 ///
@@ -57,68 +60,6 @@ pub(crate) struct PyEngine {
     /// The values of a frame.
     width: usize,
     wish: Wish,
-}
-
-/// What an engine was made of.
-#[derive(Clone)]
-struct Wish {
-    body: PyBody,
-    scene: String,
-    calibration: Option<PyCalibration>,
-    backend: Option<String>,
-    taxels: Option<Vec<u32>>,
-    batch: usize,
-}
-
-impl Wish {
-    fn make(self, py: Python<'_>) -> PyResult<PyEngine> {
-        let scene = PyScene::of_text(py, &self.scene)?;
-        let Self { body, calibration, backend, taxels, batch, .. } = &self;
-        let backend = backend.as_deref().map(str::parse::<BackendKind>).transpose().or_raise(py)?;
-        let made = free(py, || {
-            let options = scene.options(calibration.as_ref().map(|calibration| &calibration.inner), backend, *batch)?;
-            let mut engine = Engine::new(&body.inner, options)?;
-            if let Some(taxels) = taxels {
-                engine.set_channels(taxels).map_err(|e| e.at("taxels"))?;
-            }
-            Ok::<_, Error>(engine)
-        });
-        let engine = made.or_raise(py)?;
-        let text = calibration.as_ref().map(|calibration| calibration.text.as_str());
-        let run = Arc::new(Run::new(&engine, &body.inner, &body.bytes, &self.scene, text));
-        let channels = taxels.clone().unwrap_or_else(|| body.ids());
-        let inner = Mutex::new(Inner { engine, lent: Vec::new(), page: None });
-        Ok(PyEngine { inner, run, width: channels.len(), channels, wish: self })
-    }
-}
-
-struct Inner {
-    engine: Engine,
-    /// Batches that were given to Python, whose memory is used again when nobody needs them.
-    lent: Vec<Arc<Percepts>>,
-    /// What shows them in a browser.
-    page: Option<Arc<Page>>,
-}
-
-impl Inner {
-    /// The percepts of the last call, to keep, and what the engine has to say: a GPU that was lost.
-    fn take(&mut self) -> (Arc<Percepts>, Option<String>) {
-        let free = self.lent.iter().position(|lent| Arc::strong_count(lent) == 1);
-        let spare = free.and_then(|free| Arc::into_inner(self.lent.swap_remove(free)));
-        let percepts = Arc::new(self.engine.take_percepts(spare));
-        if self.lent.len() == LENT {
-            self.lent.remove(0);
-        }
-        self.lent.push(Arc::clone(&percepts));
-        (percepts, self.engine.notice())
-    }
-
-    /// Shows the last frame of a call that began at `began`, where somebody looks.
-    fn show(&self, block: &FrameBlock<'_>, began: Instant) {
-        if let Some(page) = &self.page {
-            page.show(&self.engine, block, began);
-        }
-    }
 }
 
 impl PyEngine {

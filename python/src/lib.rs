@@ -30,6 +30,7 @@ mod same;
 mod scene;
 mod self_contacts;
 mod session;
+mod sheet;
 mod simulation;
 mod sinks;
 mod state;
@@ -47,7 +48,7 @@ mod native {
     use super::*;
 
     #[pymodule_export]
-    use about::{info, inspect, outputs};
+    use about::{compare, info, inspect, outputs};
     #[pymodule_export]
     use accuracy::{calibrate, gains, tradeoff};
     #[pymodule_export]

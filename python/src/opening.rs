@@ -96,7 +96,7 @@ pub(crate) fn open(
     Ok((source, own, calibration))
 }
 
-/// The keywords of `read` and `open`.
+/// The keywords of `read`, `open`, `info` and `convert`.
 #[derive(Default)]
 pub(crate) struct Keys<'a, 'py> {
     pub(crate) body: Option<&'a Bound<'py, PyAny>>,
@@ -108,6 +108,22 @@ pub(crate) struct Keys<'a, 'py> {
     pub(crate) pitch: Option<&'a str>,
     pub(crate) unit: Option<&'a str>,
     pub(crate) layout: Option<PathBuf>,
+}
+
+impl Keys<'_, '_> {
+    /// How tables and exports are read.
+    pub(crate) fn options(&self) -> somatic::Result<VendorOptions> {
+        let Self { rate_hz, format, grid, pitch, unit, layout, .. } = self;
+        Ok(VendorOptions {
+            format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
+            rate_hz: *rate_hz,
+            grid: grid.map(VendorOptions::grid_of).transpose().map_err(|e| e.at("grid"))?,
+            pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
+            unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
+            layout: layout.clone(),
+            ..VendorOptions::default()
+        })
+    }
 }
 
 /// A file that is open, with what comes with it.
@@ -128,20 +144,12 @@ impl Opening {
     }
 
     pub(crate) fn new(py: Python<'_>, source: &Bound<'_, PyAny>, keys: Keys<'_, '_>) -> PyResult<Self> {
-        let Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout } = keys;
+        let Keys { body, from_s, to_s, .. } = keys;
         let text = text_of(source)?;
         let body = body.map(|body| body_of(py, body)).transpose()?;
         let cut = Cut { from_s: from_s.unwrap_or(Cut::WHOLE.from_s), to_s: to_s.unwrap_or(Cut::WHOLE.to_s), times: 1 };
         let made = || -> somatic::Result<(VendorOptions, SourceSpec)> {
-            let options = VendorOptions {
-                format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
-                rate_hz,
-                grid: grid.map(VendorOptions::grid_of).transpose().map_err(|e| e.at("grid"))?,
-                pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
-                unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
-                layout,
-                ..VendorOptions::default()
-            };
+            let options = keys.options()?;
             let spec = text.parse::<SourceSpec>()?.with_content(&options);
             Ok((options, spec))
         };

@@ -1,18 +1,20 @@
 //! `Percepts`: columns of a batch by name.
 
+mod columns;
+mod table;
+
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict, PySlice};
-use somatic::internal::error::{suggestion, unknown};
+use pyo3::types::{PyCapsule, PyDict};
+use somatic::internal::error::suggestion;
 use somatic::internal::renamed::new_name;
-use somatic::internal::scene::AskedOutputs;
 use somatic::percept::ColumnValues;
 use somatic::sink::TableKind;
-use somatic::{COLUMNS, Column, Flags, Outputs, Percepts};
+use somatic::{Flags, Outputs, Percepts};
 
 use crate::arrays::{array, time_s};
 use crate::error::{stays_here, unknown_name, usage};
@@ -83,68 +85,6 @@ impl PyPercepts {
 
     fn labels(&self) -> Vec<&str> {
         self.indices().iter().map(|&field| self.run.labels[field].as_str()).collect()
-    }
-
-    fn column(&self, py: Python<'_>, name: &str) -> PyResult<&'static Column> {
-        let outputs = self.inner.outputs();
-        if let Some(column) = outputs.columns().find(|column| column.name == name) {
-            return Ok(column);
-        }
-        Err(unknown_name(
-            py,
-            match name {
-                "touches" | "self_contacts" => format!("{name} are not a column; see `.{name}`"),
-                _ if COLUMNS.iter().any(|column| column.name == name) => {
-                    format!("`{name}` was not asked for; add it to the scene's outputs")
-                }
-                _ => {
-                    let names: Vec<String> =
-                        AskedOutputs::names().filter(|name| name.starts_with("touches.")).collect();
-                    match new_name(name, names.iter().map(String::as_str)) {
-                        Some(new) => format!("`{name}` is `{new}` now; see `.touches`"),
-                        None => unknown("output", name, outputs.columns().map(|column| column.name)),
-                    }
-                }
-            },
-        ))
-    }
-
-    /// The array called `name`, made once.
-    fn once(&self, py: Python<'_>, name: &str, make: impl FnOnce() -> PyResult<Py<PyAny>>) -> PyResult<Py<PyAny>> {
-        let made =
-            |of: &Self| of.made.lock().unwrap_or_else(PoisonError::into_inner).get(name).map(|it| it.clone_ref(py));
-        if let Some(array) = made(self) {
-            return Ok(array);
-        }
-        // Made without the lock, which a thread that waits for Python must not hold.
-        let whole = match &self.whole {
-            Some(whole) => whole.get().once(py, name, make)?,
-            None => make()?,
-        };
-        let array = self.cut(py, whole)?;
-        self.made.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), array.clone_ref(py));
-        Ok(array)
-    }
-
-    /// The part of `array`, of all frames and fields, that it has.
-    fn cut(&self, py: Python<'_>, array: Py<PyAny>) -> PyResult<Py<PyAny>> {
-        if self.is_whole() {
-            return Ok(array);
-        }
-        let mut part = array.into_bound(py);
-        part = part.get_item(PySlice::new(py, self.frames.start as isize, self.frames.end as isize, 1))?;
-        if let Some(fields) =
-            self.fields.as_ref().filter(|_| part.getattr("ndim").is_ok_and(|ndim| ndim.gt(1).unwrap_or(false)))
-        {
-            part = part.call_method1("take", (fields.to_vec(), 1))?;
-            part.call_method1("setflags", (false,))?;
-        }
-        Ok(part.unbind())
-    }
-
-    /// The frames and the fields of the whole batch.
-    fn shape(&self) -> [usize; 2] {
-        [self.inner.frames(), self.inner.fields()]
     }
 }
 
@@ -492,33 +432,5 @@ impl PyPercepts {
         let (frames, fields) = (self.frames.len(), self.indices().len());
         let s = |count: usize| if count == 1 { "" } else { "s" };
         format!("<Percepts: {frames} frame{} of {fields} field{}>", s(frames), s(fields))
-    }
-}
-
-impl PyPercepts {
-    fn table<'py>(&self, py: Python<'py>, all_fields: bool) -> PyResult<Bound<'py, PyAny>> {
-        Ok(Bound::new(py, Table { part: self.of_table(), run: Arc::clone(&self.run), all_fields })?.into_any())
-    }
-}
-
-/// A table that others take through its stream.
-#[pyclass(frozen)]
-struct Table {
-    part: Part,
-    run: Arc<Run>,
-    all_fields: bool,
-}
-
-#[pymethods]
-impl Table {
-    #[pyo3(signature = (requested_schema = None))]
-    fn __arrow_c_stream__<'py>(
-        &self,
-        py: Python<'py>,
-        requested_schema: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyCapsule>> {
-        let _ = requested_schema;
-        let kind = if self.all_fields { TableKind::AllFields } else { TableKind::Touched };
-        stream(py, &self.part, &self.run, kind)
     }
 }

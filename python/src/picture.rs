@@ -88,6 +88,7 @@ pub(crate) struct Wish<'a> {
     pub(crate) uv: Option<String>,
     pub(crate) look_at: Option<String>,
     pub(crate) ids: bool,
+    pub(crate) edges: bool,
     pub(crate) size: [u32; 2],
 }
 
@@ -100,11 +101,11 @@ pub(crate) enum SizeOfPicture {
 
 /// Draws a body with its fields, or a touch on it, as `somatic render` does.
 ///
-/// `what` is a `Body`, or a `Recording` whose body is known. Of a body the taxels have the colours of their `fields` (globs); `uv` draws the
-/// chart of one field instead; `ids` labels taxels. Of a recording they have the colours of their pressures under `calibration` (by
-/// default its own), and each touch of the body has its mark: at the time `at_s`, by default where most is pressed, or from `from_s` to
-/// `to_s` as an animation with `rate_hz` pictures a second. `views` are sides, such as 'front' and 'top', or 'all'; `look_at` is a
-/// field or link that fills the picture; `size` is the width, or width and height at most, in pixels.
+/// `what` is a `Body`, or a `Recording` whose body is known. Of a body the taxels have the colours of their `fields` (globs); `uv` draws
+/// the chart of one field instead; `ids` labels taxels, `edges` connects neighbours on the skin. Of a recording they have the colours of
+/// their pressures under `calibration` (by default its own), and each touch of the body has its mark: at the time `at_s`, by default where
+/// most is pressed, or from `from_s` to `to_s` as an animation with `rate_hz` pictures a second. `views` are sides, such as 'front' and
+/// 'top', or 'all'; `look_at` is a field or link that fills the picture; `size` is the width, or width and height at most, in pixels.
 ///
 /// It needs a wheel with the GPU, and an adapter; a software one such as Mesa's lavapipe will do.
 ///
@@ -115,7 +116,7 @@ pub(crate) enum SizeOfPicture {
 ///     ...
 /// somatic_touch.UsageError: a picture is of a Body or a Recording; this is a str
 #[pyfunction]
-#[pyo3(signature = (what, *, at_s = None, from_s = None, to_s = None, rate_hz = 12.0, calibration = None, views = Vec::new(), fields = Vec::new(), uv = None, look_at = None, ids = false, size = SizeOfPicture::Width(1600)))]
+#[pyo3(signature = (what, *, at_s = None, from_s = None, to_s = None, rate_hz = 12.0, calibration = None, views = Vec::new(), fields = Vec::new(), uv = None, look_at = None, ids = false, edges = false, size = SizeOfPicture::Width(1600)))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn render(
     py: Python<'_>,
@@ -130,6 +131,7 @@ pub(crate) fn render(
     uv: Option<String>,
     look_at: Option<String>,
     ids: bool,
+    edges: bool,
     size: SizeOfPicture,
 ) -> PyResult<PyPicture> {
     let recording = what.cast::<PyRecording>().ok().map(Bound::get);
@@ -160,8 +162,8 @@ pub(crate) fn render(
     if let Some((key, _)) = of_body.into_iter().find(|(_, given)| *given && (ids || recording.is_some())) {
         return Err(usage(py, format!("{key} is about a body's fields; it goes with neither a recording nor ids")));
     }
-    if uv.is_some() && (look_at.is_some() || !views.is_empty()) {
-        return Err(usage(py, "uv draws a chart, which has neither views nor a part to look at"));
+    if uv.is_some() && (look_at.is_some() || !views.is_empty() || edges) {
+        return Err(usage(py, "uv draws a chart, which has neither views nor a part to look at nor edges"));
     }
     let calibration = match recording {
         Some(recording) => recording.calibrated(py, calibration, body.get())?,
@@ -180,6 +182,7 @@ pub(crate) fn render(
         uv,
         look_at,
         ids,
+        edges,
         size: match size {
             SizeOfPicture::Width(width) => [width, width],
             SizeOfPicture::Both(width, height) => [width, height],

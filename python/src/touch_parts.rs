@@ -1,8 +1,9 @@
-//! What touches do to the links that they lie on.
+//! What touches have more than one of: links that they lie on, and taxels.
 
 use pyo3::prelude::*;
-use somatic::TouchFrame;
+use somatic::body::Modality;
 use somatic::percept::{LinkShare, Wrench};
+use somatic::{Body, TouchFrame};
 
 use crate::arrays::{array, structured};
 
@@ -28,4 +29,17 @@ pub(crate) fn wrenches<'py, 'a>(
         ("torque", "f8", 3, vectors(&|wrench| wrench.torque_newton_m.to_array())?),
     ];
     structured(py, count, &fields)
+}
+
+/// The ids of the pressed taxels of each touch of `frames`, on `body`.
+pub(crate) fn taxels<'a>(
+    py: Python<'_>,
+    body: &Body,
+    frames: impl Iterator<Item = &'a TouchFrame>,
+) -> PyResult<Vec<Py<PyAny>>> {
+    let can_touch = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Pressure);
+    let ids: Vec<u32> = can_touch.map(|taxel| taxel.id).collect();
+    let of_touch = |found: &'a TouchFrame| found.touches.iter().map(move |touch| found.taxels(touch));
+    let of_nodes = |nodes: &[u32]| nodes.iter().map(|&node| ids[node as usize]).collect::<Vec<u32>>();
+    frames.flat_map(of_touch).map(|nodes| array(py, of_nodes(nodes), &[nodes.len()])).collect()
 }

@@ -7,15 +7,15 @@ use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
 use somatic::internal::error::{nearest, suggestion};
 use somatic::internal::renamed::new_name;
-use somatic::percept::Unit;
+use somatic::percept::{TouchOutputs, Unit};
 use somatic::sink::TableKind;
 use somatic::{Percepts, TOUCH_COLUMNS, Touch, TouchColumn};
 
 use crate::arrays::array;
-use crate::error::{stays_here, unknown_name};
+use crate::error::{stays_here, unknown_name, usage};
 use crate::session::Run;
 use crate::stream::{Part, in_python, stream, to_arrow, to_pandas, to_polars};
-use crate::touch_parts::wrenches;
+use crate::touch_parts::{taxels, wrenches};
 
 /// The touches of some frames, a row each, in the order of frames: of the whole body, over fields and joints.
 ///
@@ -150,6 +150,20 @@ impl PyTouches {
     fn wrenches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = self.frames.clone().filter_map(|frame| self.percepts.touches(frame));
         wrenches(py, found)
+    }
+
+    /// The ids of the pressed taxels of each, a list of uint32 arrays. Needs the output `touches.taxels`.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> engine = st.Engine(st.Body.grid(1, 5, 0.01), {"outputs": ["touches.taxels"]}, backend="cpu")
+    /// >>> [taxels.tolist() for taxels in engine.process([0.0], [[3, 1, 0, 0, 5]]).touches.taxels]
+    /// [[4], [0, 1]]
+    #[getter]
+    fn taxels(&self, py: Python<'_>) -> PyResult<Vec<Py<PyAny>>> {
+        if !self.run.plan.touch_outputs().unwrap_or_default().contains(TouchOutputs::TAXELS) {
+            return Err(usage(py, "`taxels` were not asked for; add `touches.taxels` to the scene's outputs"));
+        }
+        taxels(py, &self.run.body, self.frames.clone().filter_map(|frame| self.percepts.touches(frame)))
     }
 
     /// A quantity of each touch by its name, such as `touches["principal_axis"]` or `touches["fit_place"]`, float64 [touches] or

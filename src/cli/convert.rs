@@ -7,6 +7,7 @@ use std::slice;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use somatic::internal::convert::{FrameFile, is_body};
 use somatic::internal::limits::{self, MAX_TOML_BYTES};
 use somatic::internal::recording::{BODY, CALIBRATION};
 use somatic::internal::run::left_out;
@@ -14,10 +15,9 @@ use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::attached::{self, body_bytes, file_name};
 use somatic::internal::setup::overlaid::{How, overlaid};
 use somatic::internal::setup::source_of;
-use somatic::internal::source::CsvFile;
-use somatic::recording::{Reader, Recorder};
+use somatic::recording::Reader;
 use somatic::source::{SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
-use somatic::{Error, Frame, Result};
+use somatic::{Error, Result};
 
 use super::bar::Bar;
 use super::exports::ExportFlags;
@@ -76,14 +76,9 @@ pub(super) struct Arguments {
     force: bool,
 }
 
-enum Target {
-    Csv(CsvFile),
-    Mcap(Box<Recorder>),
-}
-
 pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let to_name = arguments.to.as_deref().or(arguments.output.as_deref()).unwrap_or_default();
-    if skin::is_body(&arguments.from) {
+    if is_body(&arguments.from) {
         let is_plain = arguments.body.is_none() && arguments.calibration.is_none();
         if !is_plain || arguments.export.options()? != VendorOptions::default() {
             return Err(Error::usage("a body is converted without the flags for recordings; leave them out"));
@@ -118,81 +113,33 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     };
     source.report_stale();
     let place = output.name().display().to_string();
-    let mut target = match &to {
-        SourceSpec::Csv(path) if arguments.body.is_some() || arguments.calibration.is_some() => {
-            return Err(Error::usage("a CSV has no place for --body and --calibration").at(path.display()));
-        }
-        SourceSpec::Csv(_) => Target::Csv(CsvFile::create(output, source.taxels())?),
-        _ => {
-            let mut recorder = Recorder::create_whole(output, source.taxels())?;
-            for (name, media_type, bytes) in &attached {
-                recorder.attach(name, media_type, bytes)?;
-            }
-            Target::Mcap(Box::new(recorder))
-        }
-    };
-    let Copied { frames, posed, last_s, is_whole } = copy(&mut *source, &mut target)?;
-    source.notices().iter().for_each(|notice| say(notice));
-    let is_csv = matches!(target, Target::Csv(_));
-    if !is_whole {
-        let absent = match target {
-            Target::Csv(file) => file.finish_early()?,
-            Target::Mcap(recorder) => recorder.finish_early()?,
-        };
-        let mut losses = source.losses();
-        losses.push(left_out(&arguments.from, frames, last_s, source.progress(), absent.as_slice()));
-        return Ok(tell_losses(&losses));
+    let is_csv = matches!(to, SourceSpec::Csv(_));
+    if is_csv && (arguments.body.is_some() || arguments.calibration.is_some()) {
+        return Err(Error::usage("a CSV has no place for --body and --calibration").at(to_path.display()));
     }
-    match target {
-        Target::Csv(file) => file.finish()?,
-        Target::Mcap(recorder) => recorder.finish()?,
-    }
-    say(&format!("{} in {place}", count(frames, "frame")));
-    if is_csv && posed > 0 {
-        say(&format!("a CSV has no place for poses: the poses of {} are left out", count(posed, "frame")));
-    }
-    if is_csv && source.has_stale() {
-        say("a CSV cannot mark stale values: they are missing there");
-    }
-    if is_csv && !attached.is_empty() {
-        let names: Vec<&str> = attached.iter().map(|(name, ..)| name.as_str()).collect();
-        say(&format!("a CSV has no place for what is attached: {} left out", names.join(", ")));
-    }
-    Ok(tell_losses(&source.losses()))
-}
-
-/// What was copied.
-#[derive(Default)]
-struct Copied {
-    frames: u64,
-    /// Frames with poses.
-    posed: u64,
-    /// The time of the last frame.
-    last_s: f64,
-    /// Whether it was not interrupted.
-    is_whole: bool,
-}
-
-/// Copies all frames.
-fn copy(source: &mut dyn Source, target: &mut Target) -> Result<Copied> {
+    let taxels = source.taxels();
+    let mut file = if is_csv { FrameFile::csv(output, taxels)? } else { FrameFile::mcap(output, taxels, &attached)? };
     let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("converting");
-    let mut frame = Frame::missing(0.0, source.taxels().len());
-    let mut copied = Copied::default();
-    while source.next_frame(&mut frame)? {
-        if stop.load(Ordering::Relaxed) {
-            return Ok(copied);
-        }
-        match target {
-            Target::Csv(file) => file.frame(&frame)?,
-            Target::Mcap(recorder) => recorder.frame(&frame)?,
-        }
-        copied.frames += 1;
-        copied.posed += u64::from(!frame.pose.is_empty());
-        copied.last_s = frame.t_s;
-        bar.show(source.progress().unwrap_or(0.0));
+    let copied = file.copy(&mut *source, |_, share| {
+        bar.show(share);
+        !stop.load(Ordering::Relaxed)
+    })?;
+    drop(bar);
+    source.notices().iter().for_each(|notice| say(notice));
+    if !copied.is_whole {
+        let absent = file.finish_early()?;
+        let mut losses = source.losses();
+        let progress = source.progress();
+        losses.push(left_out(&arguments.from, copied.frames, copied.last_s, progress, absent.as_slice()));
+        return Ok(tell_losses(&losses));
     }
-    Ok(Copied { is_whole: true, ..copied })
+    let names: Vec<&str> = attached.iter().map(|(name, ..)| name.as_str()).collect();
+    let left_behind = file.left_behind(&*source, &copied, &names);
+    file.finish()?;
+    say(&format!("{} in {place}", count(copied.frames, "frame")));
+    left_behind.iter().for_each(|what| say(what));
+    Ok(tell_losses(&source.losses()))
 }
 
 /// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording or the

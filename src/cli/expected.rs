@@ -1,6 +1,5 @@
-//! Errors that are to be expected on a layout, in words and as JSON.
+//! Errors that are to be expected on a layout, in words.
 
-use serde_json::{Value, json};
 use somatic::internal::expected::{LayoutErrors, Percentiles, TestTouches, expected_and_ideal_errors};
 use somatic::{Body, Result};
 
@@ -62,29 +61,6 @@ fn short(value: f64) -> String {
     }
 }
 
-/// The errors of a layout as JSON, with those of an ideal skin.
-pub(super) fn json_beside_ideal([layout, ideal]: &[LayoutErrors; 2]) -> Value {
-    let mut object = json(layout);
-    object["ideal"] = json(ideal);
-    object
-}
-
-/// The errors as JSON: m, rad, and shares of the force.
-pub(super) fn json(errors: &LayoutErrors) -> Value {
-    let json_of = |percentiles: Option<Percentiles>| {
-        percentiles.map(|Percentiles { count, median, p95 }| json!({"touches": count, "median": median, "p95": p95}))
-    };
-    json!({
-        "taxels": errors.taxels,
-        "spacing": errors.spacing_m,
-        "touch_spacing": errors.touch_spacing_m,
-        "touches": errors.touches.len(),
-        "place": json_of(errors.place_m()),
-        "axis": json_of(errors.axis_rad()),
-        "force": json_of(errors.force()),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use somatic::internal::expected::TouchError;
@@ -105,7 +81,7 @@ mod tests {
             "place 0.52, 12.5 mm, axis 2.86, 2.86°, force 25.0, 25.0 %: median and 95th percentile of 2 of 3 touches, as fewer than 3 taxels feel the others"
         );
         assert_eq!(ideal.1, "place –, axis –, force –: the same on a flat sheet of regular hexagons as dense");
-        assert_eq!(json(&errors(vec![None]))["place"], Value::Null);
+        assert!(errors(vec![None]).as_json()["place"].is_null());
         assert_eq!([0.0, 9.996, 123.4].map(short), ["0.00", "10.0", "123"]);
     }
 }

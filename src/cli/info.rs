@@ -3,9 +3,12 @@
 mod bag;
 mod contacts;
 
+use std::path::Path;
+
 use clap::Args;
-use serde_json::{Value, json};
-use somatic::internal::recording::{Attached, BagSurvey, Rhythm, Survey};
+use serde_json::Value;
+use somatic::internal::contents::{Contents, bag_as_json};
+use somatic::internal::recording::BagSurvey;
 use somatic::internal::setup::attached;
 use somatic::internal::setup::source_of;
 use somatic::internal::source::Layout;
@@ -19,7 +22,7 @@ use super::exports::ExportFlags;
 use super::scene::said;
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
-use super::words::{between_s, number, one_line, size_words, span, title};
+use super::words::{number, one_line, size_words, span, title};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -47,63 +50,34 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-struct Known {
-    kind: &'static str,
-    bytes: u64,
-    taxels: usize,
-    survey: Survey,
-    attached: Vec<Attached>,
-    has_end: bool,
-    losses: Vec<String>,
-    /// What was understood of a table.
-    notes: Vec<String>,
-    /// Of a pressure system's export.
-    layout: Option<Layout>,
-    /// Of a recording that has its body.
-    contacts: Option<Contacts>,
-}
-
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("reading");
     let options = arguments.export.options()?;
     let recording = source_of(&arguments.recording, &["csv", "mcap", "ros2-mcap", "export"], &options);
-    let known = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
+    let (known, contacts) = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
         SourceSpec::Mcap(path) => {
             if arguments.export.rate.is_some() {
                 return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
             }
-            let mut reader = Reader::open(&path)?;
-            let survey = Survey::read(&mut reader, |share| bar.show(share))?;
-            let mut losses = reader.losses();
+            let mut known = Contents::of_mcap(&path, &mut Reader::open(&path)?, |share| bar.show(share))?;
             // What is attached may be damaged, and the rest is described all the same.
             let contacts = recorded(&path).unwrap_or_else(|e| {
-                losses.push(e.to_string());
+                known.losses.push(e.to_string());
                 None
             });
-            Known {
-                kind: "MCAP",
-                bytes: size(&path),
-                taxels: reader.taxels().len(),
-                attached: reader.attached().to_vec(),
-                has_end: reader.has_end(),
-                losses,
-                notes: reader.notices(),
-                layout: None,
-                contacts,
-                survey,
-            }
+            (known, contacts)
         }
         SourceSpec::Ros2Mcap(bag) => {
             let mut survey = BagSurvey::read(&bag.path, |share| bar.show(share))?;
             survey.topics.retain(|topic| bag.topics.is_empty() || bag.topics.contains(&topic.name));
             drop(bar);
-            let json = arguments.json.then(|| format!("{}\n", bag::as_json(&survey)));
+            let json = arguments.json.then(|| format!("{}\n", bag_as_json(&survey)));
             print(&json.unwrap_or_else(|| bag::text(&arguments.recording, &survey)))?;
             return Ok(ended(&survey.losses));
         }
         SourceSpec::Csv(path) => {
             let mut source = CsvSource::open(&path, options.rate_hz)?;
-            of_frames("CSV", size(&path), &mut source, None, None, &mut bar)?
+            (of_frames("CSV", &path, &mut source, None, &mut bar)?, None)
         }
         SourceSpec::Vendor(path) => {
             let mut source = VendorSource::open(&path, &options)?;
@@ -111,13 +85,17 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
             let body = Body::from_bytes(&source.body_name(), &source.body()?)?;
             let ids = source.taxels().to_vec();
             let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids)).transpose()?;
-            let contacts = Contacts::new(&body, calibration, &source)?;
-            of_frames(source.format().title(), size(&path), &mut source, Some(layout), Some(contacts), &mut bar)?
+            let mut contacts = Contacts::new(&body, calibration, &source)?;
+            let known = of_frames(source.format().title(), &path, &mut source, Some(&mut contacts), &mut bar)?;
+            (Contents { layout: Some(layout), ..known }, Some(contacts))
         }
         _ => unreachable!("it is of one of these kinds"),
     };
     drop(bar);
-    print(&if arguments.json { format!("{}\n", as_json(&known)) } else { text(&arguments.recording, &known) })?;
+    print(&match arguments.json {
+        true => format!("{}\n", as_json(&known, contacts.as_ref())),
+        false => text(&arguments.recording, &known, contacts.as_ref()),
+    })?;
     known.notes.iter().for_each(|note| say(note));
     Ok(ended(&known.losses))
 }
@@ -128,45 +106,29 @@ fn ended(losses: &[String]) -> u8 {
     if losses.is_empty() { DONE } else { LOST }
 }
 
-/// What a recording of nothing but frames has, which is read to its end.
+/// What a recording of nothing but frames has, which is read to its end, and what `contacts` sees there.
 fn of_frames(
     kind: &'static str,
-    bytes: u64,
+    path: &Path,
     source: &mut dyn Source,
-    layout: Option<Layout>,
-    mut contacts: Option<Contacts>,
+    mut contacts: Option<&mut Contacts>,
     bar: &mut Bar,
-) -> Result<Known> {
-    let mut rhythm = Rhythm::default();
-    let mut frame = Frame::missing(0.0, source.taxels().len());
-    while source.next_frame(&mut frame)? {
-        rhythm.see(frame.t_s);
+) -> Result<Contents> {
+    let known = Contents::of_frames(kind, path, source, |frame, share| {
         if let Some(contacts) = &mut contacts {
-            contacts.see(&frame)?;
+            contacts.see(frame)?;
         }
-        bar.show(source.progress().unwrap_or(0.0));
-    }
-    rhythm.finish();
-    if let Some(contacts) = &mut contacts {
+        bar.show(share);
+        Ok(true)
+    })?;
+    if let Some(contacts) = contacts {
         contacts.finish()?;
     }
-    let (losses, notes) = (source.losses(), source.notices());
-    Ok(Known {
-        notes,
-        kind,
-        bytes,
-        taxels: source.taxels().len(),
-        survey: Survey { rhythm, ..Survey::default() },
-        attached: Vec::new(),
-        has_end: losses.is_empty(),
-        losses,
-        layout,
-        contacts,
-    })
+    Ok(known.expect("it goes on to the end"))
 }
 
 /// The contacts in the recording at `path`, if it has its body.
-fn recorded(path: &std::path::Path) -> Result<Option<Contacts>> {
+fn recorded(path: &Path) -> Result<Option<Contacts>> {
     let Some((name, bytes)) = attached::body(path)? else { return Ok(None) };
     let Ok(body) = Body::from_bytes(&name, &bytes) else { return Ok(None) };
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
@@ -191,43 +153,15 @@ fn panels(layout: &Layout) -> String {
     format!(": {}{placed}", words.collect::<Vec<_>>().join(", "))
 }
 
-fn size(path: &std::path::Path) -> u64 {
-    std::fs::metadata(path).map_or(0, |metadata| metadata.len())
+/// What is known, with the contacts of each field.
+fn as_json(known: &Contents, contacts: Option<&Contacts>) -> Value {
+    let mut json = known.as_json();
+    json["fields"] = contacts.map_or(Value::Null, |contacts| contacts.as_json().into());
+    json
 }
 
-fn duration_s(rhythm: &Rhythm) -> Option<f64> {
-    rhythm.span_s.map(|[first, last]| between_s(first, last))
-}
-
-fn as_json(known: &Known) -> Value {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts, notes } = known;
-    let rhythm = &survey.rhythm;
-    let topics: Vec<Value> = survey
-        .topics
-        .iter()
-        .map(|t| json!({"topic": t.name, "encoding": t.encoding, "messages": t.messages, "bytes": t.bytes}))
-        .collect();
-    let attached: Vec<Value> =
-        attached.iter().map(|a| json!({"name": a.name, "media_type": a.media_type, "bytes": a.bytes})).collect();
-    json!({
-        "kind": kind, "bytes": bytes, "taxels": taxels, "frames": rhythm.frames,
-        "start": rhythm.span_s.map(|span| span[0]), "duration": duration_s(rhythm), "rate_hz": rhythm.rate_hz(),
-        "gaps": rhythm.gaps, "longest_gap": rhythm.longest_gap_s.map(|gap| json!({
-            "seconds": between_s(gap[1], gap[1] + gap[0]), "after": gap[1],
-        })),
-        "backwards": rhythm.backwards, "posed_frames": survey.posed, "topics": topics, "attached": attached,
-        "ended": has_end, "losses": losses, "notes": notes,
-        "fields": contacts.as_ref().map(Contacts::as_json),
-        "unit": layout.as_ref().map(|layout| layout.unit.symbol()),
-        "panels": layout.as_ref().map(|layout| layout.panels.iter().map(|panel| json!({
-            "name": panel.name, "taxels": panel.cells.len(), "placed": panel.is_placed,
-            "area": panel.cells.iter().map(|cell| cell.area_m2).sum::<f64>(),
-        })).collect::<Vec<_>>()),
-    })
-}
-
-fn text(name: &str, known: &Known) -> String {
-    let Known { kind, bytes, taxels, survey, attached, has_end, losses, layout, contacts, .. } = known;
+fn text(name: &str, known: &Contents, contacts: Option<&Contacts>) -> String {
+    let Contents { kind, bytes, taxels, survey, attached, has_end, losses, layout, .. } = known;
     let rhythm = &survey.rhythm;
     let mut text = format!("{}\n", title(name));
     let mut line = |what: &str, value: String| text += &format!("  {what:<12}{}\n", one_line(&value));
@@ -235,7 +169,7 @@ fn text(name: &str, known: &Known) -> String {
     let rate = rhythm.rate_hz().map_or(String::new(), |rate| format!(" at {} Hz", number(rate)));
     let whole = if losses.is_empty() { "" } else { " whole" };
     line("frames", format!("{}{whole}{rate}", rhythm.frames));
-    if let (Some(duration), Some([start, _])) = (duration_s(rhythm), rhythm.span_s) {
+    if let (Some(duration), Some([start, _])) = (known.duration_s(), rhythm.span_s) {
         line("duration", format!("{} ({duration} s from t = {start} s)", span(duration)));
     }
     line("taxels", format!("{taxels}{}", layout.as_ref().map_or(String::new(), panels)));
@@ -260,7 +194,7 @@ fn text(name: &str, known: &Known) -> String {
     for file in attached {
         line("attached", format!("{} ({}, {})", file.name, file.media_type, size_words(file.bytes)));
     }
-    text += &contacts.as_ref().map_or(String::new(), Contacts::text);
+    text += &contacts.map_or(String::new(), Contacts::text);
     if !survey.topics.is_empty() {
         let mut table = plain(["topic", "encoding", "messages", "size"], 2..4);
         for topic in &survey.topics {

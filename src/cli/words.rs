@@ -65,15 +65,6 @@ pub(super) fn span(seconds: f64) -> String {
     }
 }
 
-/// The time from `first` to `last`, s, without digits that come from rounding these: the nearest number with as many decimals
-/// as both have.
-pub(super) fn between_s(first: f64, last: f64) -> f64 {
-    let step = f64::EPSILON * first.abs().max(last.abs());
-    let decimals = if step > 0.0 { (-step.log10()).floor().clamp(0.0, 12.0) as usize } else { 12 };
-    let apart = last - first;
-    format!("{apart:.decimals$}").parse().unwrap_or(apart)
-}
-
 /// `2s`, `500ms`, `10min`, as `--for` has them.
 pub(super) fn seconds(text: &str) -> Result<Duration> {
     let unit = |suffix: &str, factor: f64| Some(text.strip_suffix(suffix)?.trim().parse::<f64>().ok()? * factor);
@@ -143,21 +134,6 @@ mod tests {
             [0.0123, -0.00001, -0.9999, 12.0, -99.0].map(millimetres),
             ["12.3", "0.0", "-999.9", "12000", "-99000"]
         );
-    }
-
-    #[test]
-    fn a_difference_has_the_digits_of_its_ends() {
-        for (first, last, apart) in [
-            (0.01, 6.538, 6.528),
-            (0.1, 0.3, 0.2),
-            (0.0, 0.026, 0.026),
-            (1_700_000_000.25, 1_700_000_001.35, 1.1),
-            (-0.3, 0.1, 0.4),
-            (0.0, 0.0, 0.0),
-            (2.0, 1.9, -0.1),
-        ] {
-            assert_eq!(between_s(first, last), apart);
-        }
     }
 
     #[test]

@@ -24,6 +24,7 @@
 mod compared;
 mod expect;
 mod hexagons;
+mod json;
 mod layout_errors;
 mod presses;
 mod trial;

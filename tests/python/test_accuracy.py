@@ -66,7 +66,8 @@ def test_what_cannot_be_calibrated_says_so(tmp_path: pathlib.Path) -> None:
 @pytest.mark.once
 def test_gains_are_found_from_touches() -> None:
     grid = st.Body.grid(13, 13, 0.005, name="grid")
-    touches = st.simulate(ROOT / "examples" / "simulations" / "finger.toml", body=grid).recording
+    finger = (ROOT / "examples" / "simulations" / "finger.toml").read_text()
+    touches = st.simulate(finger.replace("rate_hz = 25", "rate_hz = 10"), body=grid).recording
     shares: list[float] = []
     found = st.calibrate(grid, gains_from=touches, calibration=touches.calibration, progress=shares.append)
     told = found["pressed"] > 0
@@ -77,9 +78,9 @@ def test_gains_are_found_from_touches() -> None:
 @pytest.mark.once
 def test_a_trade_has_the_commands_rows(somatic, touch: st.Recording) -> None:
     scene = {"outputs": ["centroid", "orientation"], "fields": "hand/*"}
-    found = st.tradeoff(scene=scene, backend="cpu", seconds=0.2, frames=160, within="3 mm")
+    found = st.tradeoff(scene=scene, backend="cpu", seconds=0.02, frames=160, within="3 mm")
     told = json.loads(somatic(
-        "tradeoff", "--outputs", "centroid,orientation", "--fields", "hand/*", "--backend", "cpu", "--seconds", "0.2", "--frames", 160,
+        "tradeoff", "--outputs", "centroid,orientation", "--fields", "hand/*", "--backend", "cpu", "--seconds", "0.02", "--frames", 160,
         "--json",
     ))
     names = ["way", "backend", "arithmetic", "charts", "orientation_by", "coverage", "cadence"]

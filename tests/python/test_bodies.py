@@ -120,6 +120,16 @@ def test_other_arrays_are_no_body_and_say_why(keys, says: str) -> None:
         st.Body.from_arrays(**{"positions": POSITIONS, "normals": UP, **keys})
 
 
+def test_a_sheet_has_the_cells_that_are_there() -> None:
+    there = np.array([[1, 0, 1], [1, 1, 1]])
+    whole, sheet = st.Body.grid(2, 3, 0.01), st.Body.grid(2, 3, 0.01, cells=there)
+    assert sheet.taxels["id"].tolist() == [0, 2, 3, 4, 5]
+    assert np.array_equal(sheet.taxels["place"], whole.taxels["place"][there.ravel() > 0])
+    for cells in ([[True, False]], np.ones((3, 2)), "all", [[True] * 3, [True] * 2]):
+        with pytest.raises(st.UsageError, match=r"cells should be bool of shape \[rows, columns\] = \[2, 3\]"):
+            st.Body.grid(2, 3, 0.01, cells=cells)
+
+
 @pytest.fixture(scope="module")
 def arm() -> st.Body:
     return st.author(ROBOTS / "arm.urdf", taxels=80, seed=1)

@@ -27,7 +27,7 @@ def test_all_that_the_command_lists_is_callable(somatic) -> None:
 @pytest.mark.once
 def test_info_is_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
     assert st.convert(touch, tmp_path / "touch.mcap") == 280
-    with pytest.warns(UserWarning, match="no place for a body"):
+    with pytest.warns(UserWarning, match="no place for what is attached: hand"):
         assert st.convert(tmp_path / "touch.mcap", tmp_path / "touch.csv") == 280
     for name in ("touch.mcap", "touch.csv"):
         told = json.loads(somatic("info", tmp_path / name, "--json"))
@@ -62,6 +62,35 @@ def test_bodies_and_quantities_are_the_commands(somatic) -> None:
     assert [row["name"] for row in listed["touches"] + listed["fields"]] == st.outputs()["name"].tolist()
     assert [row["unit"] for row in listed["touches"] + listed["fields"]] == st.outputs()["unit"].tolist()
     assert [row["default"] for row in listed["touches"] + listed["fields"]] == st.outputs()["default"].tolist()
+
+
+@pytest.mark.once
+def test_errors_of_a_layout_are_the_commands(somatic, tmp_path: pathlib.Path) -> None:
+    coarse = st.Body.grid(5, 5, 0.01, name="coarse")
+    coarse.save(tmp_path / "coarse.glb")
+    told = json.loads(somatic("inspect", tmp_path / "coarse.glb", "--errors", "--json"))
+    assert st.inspect(coarse, errors=True)["errors"] == told["errors"] and st.inspect(coarse)["errors"] is None
+    compared = st.compare(coarse, tmp_path / "coarse.glb", touches=40)
+    one, other = ({**layout, "frame_s": 0, "body": ""} for layout in compared["layouts"])
+    assert one == other and one["place"]["touches"] <= one["touches"] == 40
+    with pytest.raises(st.UsageError, match="1 or more"):
+        st.compare(coarse, coarse, touches=0)
+    assert compared["same_places"] and compared["second_is_nearer"] == 0 and compared["layouts"][1]["frame_s"] > 0
+
+
+@pytest.mark.once
+def test_exports_are_described_and_converted(somatic, tmp_path: pathlib.Path) -> None:
+    plain = tmp_path / "plain.txt"
+    plain.write_text("\n".join(" ".join(map(str, row)) for row in np.arange(24).reshape(8, 3)))
+    keys = {"grid": "4x3", "pitch": "10mm", "rate_hz": 50, "format": "matrix", "unit": "kPa"}
+    flags = ("--grid", "4x3", "--pitch", "10mm", "--rate", 50, "--format", "matrix", "--unit", "kPa")
+    told, known = json.loads(somatic("info", plain, *flags, "--json")), st.info(plain, **keys)
+    assert known == {key: value for key, value in told.items() if key != "fields"}
+    assert (known["frames"], known["unit"], known["panels"][0]["taxels"]) == (2, "kPa", 12)
+    somatic("convert", plain, tmp_path / "theirs.csv", *flags)
+    with pytest.warns(UserWarning, match="what is attached"):
+        assert st.convert(plain, tmp_path / "mine.csv", **keys) == 2
+    assert (tmp_path / "mine.csv").read_bytes() == (tmp_path / "theirs.csv").read_bytes()
 
 
 @pytest.mark.once
@@ -131,7 +160,7 @@ def test_skins_that_come_with_their_places(tmp_path: pathlib.Path) -> None:
         st.convert(body, tmp_path / "skin.urdf")
     skin = st.author(urdf_skin=tmp_path / "skin.urdf", geometry="none")
     assert skin.taxels["id"].tolist() == body.taxels["id"].tolist()
-    mirrored = st.author("humanoid", taxels=100, seed=1, mirror="y").taxels["place"]
+    mirrored = st.author("mat", taxels=30, seed=1, mirror="y").taxels["place"]
     assert np.allclose(np.sort(mirrored[:, 1]), np.sort(-mirrored[:, 1]), atol=1e-3)
     (tmp_path / "pad.xml").write_text(MODEL)
     model = st.author(mjcf_skin=tmp_path / "pad.xml")

@@ -134,6 +134,17 @@ def test_touches_are_walked_by_touch_and_by_frame(p: st.Percepts) -> None:
     assert touches.unit("total") == "count" and touches.unit("spread") == "m" and touches.unit("flags") == "1"
 
 
+def test_touches_have_the_ids_of_their_taxels(p: st.Percepts) -> None:
+    touch = st.read("hand")
+    touches = touch.engine({"outputs": ["touches", "touches.taxels"]}, backend="cpu").process(touch.t, touch.values).touches
+    assert len(touches) > 100 and [len(taxels) for taxels in touches.taxels] == touches.active.tolist()
+    for frame, total, taxels in zip(touches.frame, touches.total, touches.taxels, strict=True):
+        columns = [touch.taxels.index(id) for id in taxels]
+        assert touch.values[frame, columns].sum() == pytest.approx(total)
+    with pytest.raises(st.UsageError, match="touches.taxels"):
+        p.touches.taxels
+
+
 def test_touches_and_self_contacts_go_into_tables(p: st.Percepts) -> None:
     assert p.touches.to_pandas()["touch"].tolist() == p.touches.to_polars()["touch"].to_list() == p.touches.id.tolist()
     assert p.touches.to_arrow().num_rows == len(p.touches)

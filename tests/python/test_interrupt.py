@@ -21,6 +21,7 @@ import somatic_touch.batch
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are sent as POSIX has them")
 SENSORS = st.Body.grid(8, 8, 0.01, name="array")
 SCENE = {"outputs": ["total", "centroid", "principal_axis", "speed", "touches"]}
+FIELDS = {"outputs": ["total", "centroid", "orientation"]}
 
 
 @contextlib.contextmanager
@@ -67,8 +68,8 @@ def test_process_leaves_the_engine_as_it_was() -> None:
     humanoid = st.Body.bundled("humanoid")
     t, values = pressed(humanoid, 400)
     t, values = np.arange(20_000) * 0.01, np.tile(values, (50, 1))
-    engine = st.Engine(humanoid, backend="reference")
-    wanted = st.Engine(humanoid, backend="reference").process(t[:50], values[:50])["total"]
+    engine = st.Engine(humanoid, FIELDS, backend="reference")
+    wanted = st.Engine(humanoid, FIELDS, backend="reference").process(t[:50], values[:50])["total"]
     with ctrl_c():
         engine.process(t, values)
     p = engine.process(t[:50], values[:50])
@@ -91,7 +92,7 @@ def test_verify() -> None:
     humanoid = st.Body.bundled("humanoid")
     t, values = pressed(humanoid, 400)
     with ctrl_c():
-        st.Engine(humanoid, backend="cpu").verify(np.arange(20_000) * 0.01, np.tile(values, (50, 1)))
+        st.Engine(humanoid, FIELDS, backend="cpu").verify(np.arange(20_000) * 0.01, np.tile(values, (50, 1)))
 
 
 def test_simulate() -> None:
@@ -114,8 +115,8 @@ def test_author() -> None:
     with ctrl_c(0.1):
         st.author("humanoid", taxels=100_000, seed=1)
     with pytest.raises(ZeroDivisionError):
-        st.author("hand", taxels=60, seed=1, progress=lambda share: 1 // 0)
-    assert len(st.author("hand", taxels=60, seed=1).taxels) == 60
+        st.author("hand", taxels=20, seed=1, progress=lambda share: 1 // 0)
+    assert len(st.author("hand", taxels=20, seed=1).taxels) == 20
 
 
 def test_write(tmp_path: pathlib.Path) -> None:

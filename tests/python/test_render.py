@@ -28,8 +28,9 @@ def adapter() -> None:
     ("flags", "keys"),
     [
         ([], {}),
-        (["--view", "top,bottom", "--field", "hand/palm*"], {"views": ["top", "bottom"], "fields": ["hand/palm*"]}),
+        (["--view", "top,bottom", "--field", "hand/palm*", "--size", "600"], {"views": ["top", "bottom"], "fields": ["hand/palm*"], "size": 600}),
         (["--uv", "hand/palm", "--size", "700"], {"uv": "hand/palm", "size": 700}),
+        (["--edges", "--view", "front", "--size", "400"], {"edges": True, "views": ["front"], "size": 400}),
         (["--ids", "--look-at", "hand/palm", "--view", "all"], {"ids": True, "look_at": "hand/palm", "views": ["all"]}),
         ([*TOUCH], {}),
         ([*TOUCH, "--at", "2.9", "--size", "800x600"], {"at_s": 2.9, "size": (800, 600)}),
@@ -90,6 +91,7 @@ def test_a_calibration_gives_the_unit(hand: st.Body, touch: st.Recording) -> Non
         ({"at_s": 1.0}, "at_s is about a touch"),
         ({"ids": True, "fields": ["hand/palm"]}, "goes with neither"),
         ({"uv": "hand/palm", "views": ["top"]}, "neither views"),
+        ({"uv": "hand/palm", "edges": True}, "nor edges"),
     ],
 )
 def test_other_pictures_are_refused(hand: st.Body, keys: dict, why: str) -> None:

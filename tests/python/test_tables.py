@@ -181,8 +181,15 @@ def test_simulations(somatic, tmp_path: pathlib.Path) -> None:
 
 @pytest.mark.once
 def test_bodies(somatic, tmp_path: pathlib.Path) -> None:
-    body = st.Body.bundled("humanoid")
-    told = json.loads(somatic("inspect", "humanoid", "--json"))
+    arm = ROOT / "examples" / "robots" / "arm.urdf"
+    skin = st.author(arm, taxels=40, seed=3)
+    somatic("author", arm, "--taxels", 40, "--seed", 3, "-o", tmp_path / "skin.glb")
+    skin.save(tmp_path / "mine.glb")
+    assert (tmp_path / "mine.glb").read_bytes() == (tmp_path / "skin.glb").read_bytes()
+    body = st.Body.load(tmp_path / "mine.glb")
+    assert np.array_equal(body.taxels, skin.taxels) and list(body.fields) == list(skin.fields) and body.links == skin.links
+    told = json.loads(somatic("inspect", tmp_path / "skin.glb", "--json"))
+    assert len(told["links"]) > 3 and len(told["fields"]) > 3
     taxels = body.taxels
     assert taxels["id"].tolist() == [taxel["id"] for taxel in told["taxels"]]
     assert np.array_equal(taxels["position"], [taxel["position"] for taxel in told["taxels"]])
@@ -194,21 +201,16 @@ def test_bodies(somatic, tmp_path: pathlib.Path) -> None:
         assert (mine.uv is None) == (field["chart"] is None)
         if mine.uv is not None:
             assert np.array_equal(mine.uv, [member["uv"] for member in field["members"]])
-    skin = st.author("humanoid", taxels=200, seed=3)
-    somatic("author", "humanoid", "--taxels", 200, "--seed", 3, "-o", tmp_path / "skin.glb")
-    skin.save(tmp_path / "mine.glb")
-    assert (tmp_path / "mine.glb").read_bytes() == (tmp_path / "skin.glb").read_bytes()
-    again = st.Body.load(tmp_path / "mine.glb")
-    assert np.array_equal(again.taxels, skin.taxels) and list(again.fields) == list(skin.fields) and again.links == skin.links
     shares: list[float] = []
-    st.author("hand", spacing="6 mm", progress=shares.append)
+    even = st.author("hand", taxels=20, progress=shares.append)
     assert shares and 0 <= min(shares) <= max(shares) <= 1
-    scattered = st.author("hand", taxels=60, even=False, hidden="keep", clear="1 mm")
+    assert len(st.author(arm, spacing="60 mm").taxels) < len(st.author(arm, spacing="40 mm").taxels)
+    scattered = st.author("hand", taxels=20, even=False, hidden="keep", clear="1 mm")
     flags = ("--even", "off", "--hidden", "keep", "--clear", "1mm")
-    somatic("author", "hand", "--taxels", 60, *flags, "-o", tmp_path / "scattered.glb")
+    somatic("author", "hand", "--taxels", 20, *flags, "-o", tmp_path / "scattered.glb")
     scattered.save(tmp_path / "mine.glb", force=True)
     assert (tmp_path / "mine.glb").read_bytes() == (tmp_path / "scattered.glb").read_bytes()
-    assert not np.array_equal(scattered.taxels, st.author("hand", taxels=60).taxels)
+    assert not np.array_equal(scattered.taxels, even.taxels)
     with pytest.raises(st.UsageError, match="'drop' or 'keep'"):
         st.author("hand", taxels=60, hidden="yes")  # type: ignore[arg-type]
     with pytest.raises(st.UsageError, match="clear"):

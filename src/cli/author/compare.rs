@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use comfy_table::Cell;
-use serde_json::{Value, json};
 use somatic::body::Body;
 use somatic::internal::author::cell_spread;
 use somatic::internal::expected::{ComparedLayouts, LayoutErrors, TestTouches, compare_layouts};
@@ -59,7 +58,7 @@ pub(super) fn run(names: [&str; 2], output: Option<&Path>, force: bool, as_json:
         plot.draw(|| figure.svg(), || figure.png())?;
     }
     print(&match as_json {
-        true => format!("{}\n", json(names, &bodies, &compared)),
+        true => format!("{}\n", compared.as_json(names, [&bodies[0], &bodies[1]])),
         false => text(names, &bodies, &compared),
     })?;
     Ok(DONE)
@@ -108,21 +107,6 @@ fn text(names: [&str; 2], bodies: &[Body; 2], compared: &ComparedLayouts) -> Str
         text += &bullet(&format!("{nearer} is nearer to the true place in {:.0} % of the touches", 100.0 * share));
     }
     text
-}
-
-fn json(names: [&str; 2], bodies: &[Body; 2], compared: &ComparedLayouts) -> Value {
-    let layout = |side: usize| {
-        let mut object = expected::json_beside_ideal(&[compared.layouts[side].clone(), compared.ideal[side].clone()]);
-        object["body"] = names[side].into();
-        object["cells"] = json!(cells(&bodies[side]).map(|[low, high]| json!({"p5": low, "p95": high})));
-        object["frame_s"] = compared.frame_s[side].into();
-        object
-    };
-    json!({
-        "layouts": [layout(0), layout(1)],
-        "same_places": compared.same_places,
-        "second_is_nearer": compared.second_is_nearer(),
-    })
 }
 
 fn cells(body: &Body) -> Option<[f64; 2]> {

@@ -171,7 +171,7 @@ pub(super) fn summary(output: &Path, authored: &Authored, errors: Option<&[Layou
         "notes": authored.notes,
     });
     if let Some(errors) = errors {
-        summary["errors"] = expected::json_beside_ideal(errors);
+        summary["errors"] = errors[0].as_json_with_ideal(&errors[1]);
     }
     summary
 }

@@ -1,26 +1,10 @@
-//! What is in a bag of ROS 2, for people and machines.
+//! What is in a bag of ROS 2, for people.
 
-use serde_json::{Value, json};
-use somatic::FrameTime;
-use somatic::internal::recording::{BagSurvey, SurveyedTopic};
-use somatic::internal::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
+use somatic::internal::contents::{read_as, seconds_of};
+use somatic::internal::recording::BagSurvey;
 
 use super::super::table::{plain, shown};
 use super::super::words::{count, number, size_words, span, title};
-
-/// What runs read messages of the type `kind` as, if they do.
-fn read_as(kind: &str) -> Option<&'static str> {
-    match kind {
-        PointCloud2::TYPE | Float32MultiArray::TYPE => Some("frames"),
-        JointState::TYPE => Some("joint states"),
-        _ => None,
-    }
-}
-
-/// `ns` nanoseconds in seconds.
-fn seconds_of(ns: u64) -> f64 {
-    FrameTime::from_ns(i64::try_from(ns).unwrap_or(i64::MAX)).s
-}
 
 pub(super) fn text(name: &str, survey: &BagSurvey) -> String {
     let spans = survey.topics.iter().filter_map(|topic| topic.span_ns);
@@ -50,18 +34,4 @@ pub(super) fn text(name: &str, survey: &BagSurvey) -> String {
     text += "\n";
     text += &shown(&table);
     text
-}
-
-pub(super) fn as_json(survey: &BagSurvey) -> Value {
-    let BagSurvey { files, bytes, topics, losses } = survey;
-    let topic = |topic: &SurveyedTopic| {
-        json!({
-            "topic": topic.name, "type": topic.kind, "encoding": topic.encoding, "messages": topic.messages,
-            "bytes": topic.bytes, "start": topic.span_ns.map(|span| seconds_of(span[0])),
-            "end": topic.span_ns.map(|span| seconds_of(span[1])),
-            "rate_hz": topic.rate_hz(), "read_as": read_as(&topic.kind),
-        })
-    };
-    let topics: Vec<Value> = topics.iter().map(topic).collect();
-    json!({"kind": "bag of ROS 2", "files": files, "bytes": bytes, "topics": topics, "losses": losses})
 }

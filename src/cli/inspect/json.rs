@@ -7,7 +7,6 @@ use somatic::field::{Field, WORLD};
 use somatic::internal::author::cell_spread;
 
 use super::inspection::Inspection;
-use crate::cli::expected;
 
 /// One object and a newline.
 pub(super) fn text(seen: &Inspection) -> String {
@@ -56,7 +55,7 @@ pub(super) fn text(seen: &Inspection) -> String {
         whole["cells"] = json!({"p5": low, "p95": high});
     }
     if let Some(errors) = &seen.errors {
-        whole["errors"] = expected::json_beside_ideal(errors);
+        whole["errors"] = errors[0].as_json_with_ideal(&errors[1]);
     }
     for (name, value) in seen.graph.json(body) {
         whole[name] = value;
