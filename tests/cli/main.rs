@@ -3,6 +3,7 @@
 mod arduino;
 mod author;
 mod bags;
+mod bags_db3;
 mod bags_merged;
 mod bench;
 #[cfg(feature = "page")]
