@@ -200,11 +200,11 @@ impl Input {
             }
             if let (Some(spec @ SourceSpec::Ros2Mcap(bag)), Some(body)) = (&spec, &of_bag) {
                 spec.check_options(&options)?;
-                return Ok(Box::new(BagSource::open(bag, body)?));
+                return Ok(Box::new(BagSource::open(bag, body)?.skip_bad(options.skip_bad)));
             }
             match &spec {
                 Some(SourceSpec::Stdin) if strict && rate_hz.is_none() => {
-                    Ok(Box::new(NdjsonSource::stdin(ids.clone()).strict()))
+                    Ok(Box::new(NdjsonSource::stdin(ids.clone()).strict().skip_bad(options.skip_bad)))
                 }
                 Some(spec) => spec.open(&ids, &options),
                 None => {

@@ -63,6 +63,7 @@ mod serial;
 mod signals;
 mod simulate;
 mod skins;
+mod skip_bad;
 mod sources;
 mod tables;
 #[cfg(unix)]

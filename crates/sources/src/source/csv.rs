@@ -14,10 +14,14 @@ use csv::{ByteRecord, ErrorKind};
 use super::Source;
 use super::csv_cells::{number, shortened, trimmed};
 use super::csv_header::{self, Header};
+use super::skipped_bad::SkippedBad;
 use super::time_column::TimeColumn;
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_LINE_BYTES;
 use crate::signal::{Frame, RawValue};
+
+/// What is wrong with rows of words or quotes.
+const NO_NUMBER: &str = "a value that is not a number";
 
 /// A recording read from CSV.
 pub struct CsvSource {
@@ -36,6 +40,7 @@ pub struct CsvSource {
     frames: u64,
     notices: Vec<String>,
     losses: Vec<String>,
+    skipped: SkippedBad,
 }
 
 somatic_skin::debug_by_name!(CsvSource);
@@ -101,9 +106,17 @@ impl CsvSource {
             frames: 0,
             notices: Vec::new(),
             losses: Vec::new(),
+            skipped: SkippedBad::default(),
         };
         source.read_header(rate_hz).map_err(|e| e.at(&source.name))?;
         Ok(source)
+    }
+
+    /// Skips rows that are wrong, and counts them, if `is_asked`; else the first one is an error.
+    #[must_use]
+    pub fn skip_bad(mut self, is_asked: bool) -> Self {
+        self.skipped = SkippedBad::new(is_asked);
+        self
     }
 
     fn read_header(&mut self, rate_hz: Option<f64>) -> Result<()> {
@@ -178,9 +191,21 @@ impl CsvSource {
     }
 
     fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
-        if !self.read_row()? {
-            return Ok(false);
+        while self.read_row()? {
+            match self.frame_of_row(frame)? {
+                Ok(has_frame) => return Ok(has_frame),
+                Err((wrong, error)) => self.skipped.skip("row", wrong, error)?,
+            }
+            if let Time::Rate(_) = self.time {
+                // It was measured, too: those after it keep their times.
+                self.frames += 1;
+            }
         }
+        Ok(false)
+    }
+
+    /// Reads the current row; or says what is wrong with it, in short and in full. `false` where it is the last and cut short.
+    fn frame_of_row(&mut self, frame: &mut Frame) -> Result<Result<bool, (&'static str, Error)>> {
         let wanted = self.time.columns() + self.taxels.len() + self.left_out.len();
         // Many programs end a row with a comma.
         if self.row.len() > wanted && self.row.iter().skip(wanted).all(|cell| trimmed(cell).is_empty()) {
@@ -192,16 +217,18 @@ impl CsvSource {
         if found != wanted {
             // Only the last row may be cut short: the recorder was stopped while writing it.
             if self.read_row()? {
+                self.ahead.push_front((std::mem::take(&mut self.row), self.line));
                 let ragged =
                     || failed!("{found} values where the header has {wanted} columns; complete or delete the row");
-                return Err(at_line(quote.unwrap_or_else(ragged)));
+                let wrong = if quote.is_some() { NO_NUMBER } else { "more or fewer values than columns" };
+                return Ok(Err((wrong, at_line(quote.unwrap_or_else(ragged)))));
             }
             let how = if found < wanted { "truncated" } else { "too long" };
             self.losses.push(format!("{}: line {line}: last row {how}: {found} of {wanted} values", self.name));
-            return Ok(false);
+            return Ok(Ok(false));
         }
         if let Some(quote) = quote {
-            return Err(at_line(quote));
+            return Ok(Err((NO_NUMBER, at_line(quote))));
         }
         frame.clear();
         frame.values.resize(self.taxels.len(), RawValue::MISSING);
@@ -209,7 +236,10 @@ impl CsvSource {
         frame.t_s = match &mut self.time {
             Time::Column(column) => {
                 let word = trimmed(cells.next().unwrap_or_default());
-                column.read(&String::from_utf8_lossy(word), number(word)).map_err(at_line)?
+                match column.read(&String::from_utf8_lossy(word), number(word)) {
+                    Ok(t_s) => t_s,
+                    Err(e) => return Ok(Err(("no time", at_line(e)))),
+                }
             }
             Time::Rate(rate) => self.frames as f64 / *rate,
         };
@@ -217,16 +247,17 @@ impl CsvSource {
             *value = parse_value(cell).map_err(|e| at_line(e.at(format!("taxel {id}"))))?;
             Ok(())
         };
-        if self.left_out.is_empty() {
-            for ((value, cell), id) in frame.values.iter_mut().zip(cells).zip(&self.taxels) {
-                set(value, cell, id)?;
-            }
+        let mut values = frame.values.iter_mut().zip(&self.taxels);
+        let read = if self.left_out.is_empty() {
+            values.zip(cells).try_for_each(|((value, id), cell)| set(value, cell, id))
         } else {
             let first = self.time.columns();
-            let cells = cells.enumerate().filter(|(index, _)| self.left_out.binary_search(&(index + first)).is_err());
-            for ((value, (_, cell)), id) in frame.values.iter_mut().zip(cells).zip(&self.taxels) {
-                set(value, cell, id)?;
-            }
+            let mut cells =
+                cells.enumerate().filter(|(index, _)| self.left_out.binary_search(&(index + first)).is_err());
+            values.try_for_each(|(value, id)| cells.next().map_or(Ok(()), |(_, cell)| set(value, cell, id)))
+        };
+        if let Err(e) = read {
+            return Ok(Err((NO_NUMBER, e)));
         }
         if let Time::Column(column) = &mut self.time {
             if self.frames == 0
@@ -237,7 +268,7 @@ impl CsvSource {
             self.notices.extend(column.doubt());
         }
         self.frames += 1;
-        Ok(true)
+        Ok(Ok(true))
     }
 }
 
@@ -256,11 +287,13 @@ impl Source for CsvSource {
     }
 
     fn notices(&mut self) -> Vec<String> {
+        self.notices.extend(self.skipped.take_notices());
         self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
     }
 
     fn losses(&self) -> Vec<String> {
-        self.losses.clone()
+        let skipped = self.skipped.losses().into_iter().map(|what| format!("{}: {what}", self.name));
+        self.losses.iter().cloned().chain(skipped).collect()
     }
 }
 
@@ -480,6 +513,47 @@ mod tests {
             why("t,4,7\n0,1\n1,3,4\n", None),
             "a.csv: line 2: 2 values where the header has 3 columns; complete or delete the row"
         );
+    }
+
+    #[test]
+    fn wrong_rows_are_skipped_on_request_and_counted_by_kind() {
+        let text = "t,4,7\n0,1,2\n1,3\n2,x,4\n,5,6\n4,7,8\n5,1,2,3\n6,\"9,9\n7,9,y\n8,9\n";
+        assert!(why(text, None).starts_with("a.csv: line 3: 2 values"));
+        let mut source = open(text, None).unwrap().skip_bad(true);
+        let mut frame = Frame::missing(0.0, 2);
+        let mut times = Vec::new();
+        while source.next_frame(&mut frame).unwrap() {
+            times.push(frame.t_s);
+        }
+        assert_eq!(times, [0.0, 4.0]);
+        let said = source.notices();
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert_eq!(
+            said[0],
+            "a.csv: a row is skipped: line 3: 2 values where the header has 3 columns; complete or delete the row; others like it \
+             are counted"
+        );
+        let losses = source.losses();
+        assert_eq!(losses[0], "a.csv: line 10: last row truncated: 2 of 3 values");
+        assert!(
+            losses[1].starts_with("a.csv: 2 rows skipped, more or fewer values than columns; the first one: line 3")
+        );
+        assert!(
+            losses[2].starts_with(
+                "a.csv: 3 rows skipped, a value that is not a number; the first one: line 4: taxel 4: `x`"
+            )
+        );
+        assert_eq!(
+            losses[3],
+            "a.csv: 1 row skipped, no time: line 5: t is blank; every row needs its time"
+        );
+        // By a rate, frames keep the times at which they were measured.
+        let mut source = open("4,7\n1,2\n3\n5,6\n", Some(10.0)).unwrap().skip_bad(true);
+        let mut times = Vec::new();
+        while source.next_frame(&mut frame).unwrap() {
+            times.push(frame.t_s);
+        }
+        assert_eq!(times, [0.0, 0.2]);
     }
 
     #[test]

@@ -24,6 +24,7 @@ pub mod send_rate;
 #[cfg(feature = "serial")]
 mod serial;
 mod simulated;
+mod skipped_bad;
 mod spec;
 mod text;
 mod time_column;
@@ -46,6 +47,7 @@ pub use replay::{Cut, Replay};
 pub use serial::{SerialOptions, SerialSource};
 pub use simulated::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 pub use simulated::{SimulatedSource, Truth, write_recording, write_recording_with_progress};
+pub use skipped_bad::SkippedBad;
 pub use spec::SourceSpec;
 pub use text::{FrameEnd, TextColumns, TextIds, TextOptions, TextPlace, TextSource, TextTime, TimeColumnName};
 pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};

@@ -128,7 +128,7 @@ impl SourceSpec {
             _ if BagName::is_folder(Path::new(text)) => ("ros2-mcap", text),
             _ if ending("csv") => ("csv", text),
             _ if ending("mcap") => ("mcap", text),
-            // Not read either; but the file says what to do.
+            // `.bag` is not read; but the file says what to do.
             _ if ending("db3") || ending("bag") => ("ros2-mcap", text),
             _ if EXPORTS.iter().any(|wanted| ending(wanted)) => ("export", text),
             Some((kind, _)) => {
@@ -237,11 +237,14 @@ impl SourceSpec {
     /// It cannot be opened, or this build does not read it; a usage error if a rate is not allowed.
     pub fn open(&self, taxels: &[u32], options: &VendorOptions) -> Result<Box<dyn Source + Send>> {
         self.check_options(options)?;
-        let rate_hz = options.rate_hz;
+        let (rate_hz, skip_bad) = (options.rate_hz, options.skip_bad);
         match self {
-            Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?)),
-            Self::CsvStdin => Ok(Box::new(CsvSource::from_reader("stdin", std::io::stdin(), None, rate_hz)?)),
-            Self::Stdin => Ok(Box::new(NdjsonSource::stdin(taxels.to_vec()))),
+            Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?.skip_bad(skip_bad))),
+            Self::CsvStdin => {
+                let source = CsvSource::from_reader("stdin", std::io::stdin(), None, rate_hz)?;
+                Ok(Box::new(source.skip_bad(skip_bad)))
+            }
+            Self::Stdin => Ok(Box::new(NdjsonSource::stdin(taxels.to_vec()).skip_bad(skip_bad))),
             #[cfg(feature = "mcap")]
             Self::Mcap(path) => Ok(Box::new(crate::recording::Reader::open(path)?)),
             #[cfg(not(feature = "mcap"))]
