@@ -8,7 +8,9 @@ use crate::bundled;
 use crate::error::{Error, Result};
 use crate::robot::BagSource;
 use crate::signal::Wiring;
-use crate::source::{CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, VendorOptions};
+use crate::source::{
+    CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, TextOptions, VendorOptions,
+};
 
 /// Frames a call for recordings, unless told otherwise.
 pub const RECORDED_BATCH: usize = 256;
@@ -210,6 +212,10 @@ impl Input {
                 None => {
                     // It is a table like any other.
                     SourceSpec::CsvStdin.check_options(&options)?;
+                    if options.text != TextOptions::default() {
+                        // Its columns are known.
+                        SourceSpec::Stdin.check_options(&options)?;
+                    }
                     let length = Some(bundled::TOUCH.len() as u64);
                     Ok(Box::new(CsvSource::from_reader(&name, bundled::TOUCH, length, rate_hz)?))
                 }

@@ -10,6 +10,7 @@ mod csv;
 mod csv_cells;
 mod csv_file;
 mod csv_header;
+mod csv_named;
 mod joint_states;
 #[cfg(feature = "zenoh")]
 mod limbs;

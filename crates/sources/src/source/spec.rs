@@ -191,6 +191,8 @@ impl SourceSpec {
     #[must_use]
     pub fn with_content(self, options: &VendorOptions) -> Self {
         match self {
+            // Named columns are of a table.
+            Self::Csv(path) if options.text.given().is_some() => Self::Csv(path),
             Self::Csv(path) if options.format.or_else(|| VendorSource::detect(&path)).is_some() => Self::Vendor(path),
             Self::Csv(path) if options.grid.is_some() => Self::Vendor(path),
             other => other,
@@ -217,8 +219,14 @@ impl SourceSpec {
         if !matches!(self, Self::Vendor(_)) {
             options.check_unused(matches!(self, Self::Text(_)))?;
         }
-        if let Some(flag) = options.text.given().filter(|_| !matches!(self, Self::Text(_))) {
-            return Err(Error::usage(format!("{flag} is for lines of text; add --source text:PORT, or leave it out")));
+        let is_table = matches!(self, Self::Csv(_) | Self::CsvStdin);
+        if is_table && options.text.frame_end.is_some() {
+            return Err(Error::usage("--frame-end is for lines of text; leave it out here"));
+        }
+        if let Some(flag) = options.text.given().filter(|_| !matches!(self, Self::Text(_)) && !is_table) {
+            return Err(Error::usage(format!(
+                "{flag} is for lines of text and tables; add --source text:PORT or a CSV, or leave it out"
+            )));
         }
         let is_text_stdin = matches!(self, Self::Text(TextPlace::Stdin));
         if options.rate_hz.is_some()
@@ -237,12 +245,11 @@ impl SourceSpec {
     /// It cannot be opened, or this build does not read it; a usage error if a rate is not allowed.
     pub fn open(&self, taxels: &[u32], options: &VendorOptions) -> Result<Box<dyn Source + Send>> {
         self.check_options(options)?;
-        let (rate_hz, skip_bad) = (options.rate_hz, options.skip_bad);
+        let skip_bad = options.skip_bad;
         match self {
-            Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?.skip_bad(skip_bad))),
+            Self::Csv(path) => Ok(Box::new(CsvSource::open_for(path, options, taxels)?)),
             Self::CsvStdin => {
-                let source = CsvSource::from_reader("stdin", std::io::stdin(), None, rate_hz)?;
-                Ok(Box::new(source.skip_bad(skip_bad)))
+                Ok(Box::new(CsvSource::from_reader_for("stdin", std::io::stdin(), None, options, taxels)?))
             }
             Self::Stdin => Ok(Box::new(NdjsonSource::stdin(taxels.to_vec()).skip_bad(skip_bad))),
             #[cfg(feature = "mcap")]
