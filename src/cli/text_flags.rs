@@ -8,14 +8,14 @@ use somatic::source::TextOptions;
 /// The form of the lines of sources text:. What is left out is found out from the first second of them.
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct TextFlags {
-    /// For text:, the columns that are sensors, such as 2-17, 1,3,8-10 or 'A*' [default: all but times, counts and
+    /// For text: and CSV, the columns that are sensors, such as 2-17, 1,3,8-10 or 'A*' [default: all but times, counts and
     /// words].
     ///
     /// They are given by number from 1, or by name.
     #[arg(long, help_heading = "Live", value_name = "COLUMNS")]
     pub(super) columns: Option<String>,
 
-    /// For text:, the taxels of these columns, such as 4-19, or names [default: as names say, else the body's in
+    /// For text: and CSV, the taxels of these columns, such as 4-19, or names [default: as names say, else the body's in
     /// ascending order].
     ///
     /// With names, columns are called by the ids of their taxels.
@@ -28,7 +28,7 @@ pub(super) struct TextFlags {
     #[arg(long, help_heading = "Live", value_name = "TEXT")]
     pub(super) frame_end: Option<String>,
 
-    /// For text:, the column of the time and its unit, such as 1:ms [default: as found out].
+    /// For text: and CSV, the column of the time and its unit, such as 1:ms [default: as found out].
     ///
     /// The column is given by number or name, the unit is s, ms, us or iso. With arrival, frames have the time when
     /// they come.

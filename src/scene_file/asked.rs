@@ -149,6 +149,7 @@ impl SceneFile {
             pitch_m: self.pitch.as_deref().map(VendorOptions::pitch_of).transpose()?,
             unit: self.unit.as_deref().map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("`unit`"))?,
             layout: self.layout.clone(),
+            skip_bad: self.skip_bad,
             text: self.text.options()?,
         })
     }

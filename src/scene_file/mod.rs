@@ -220,6 +220,11 @@ pub struct SceneFile {
     /// with 3].
     pub strict: bool,
 
+    /// Skip lines, rows and messages that are wrong, count them by kind, and exit with 3 [default: fail at the first].
+    ///
+    /// For CSV, NDJSON, exports with a line for each frame, ROS 2 bags, and joint states; `text:` does so always.
+    pub skip_bad: bool,
+
     /// The board and the channel of each taxel, a TOML file [default: taxels in ascending order of their ids].
     ///
     /// By default the boards, one per port, share the taxels. `somatic board --help` shows such a file.
@@ -252,7 +257,7 @@ pub struct SceneFile {
 
     /// A recording of joint states, or ros2:/TOPIC, live [default: those in the frames, or in their bag].
     ///
-    /// A recording is a CSV under t,<joint>,..., NDJSON, or a ROS 2 bag in MCAP: a .mcap, a folder, or
+    /// A recording is a CSV under t,<joint>,..., NDJSON, or a ROS 2 bag: a .mcap, a .db3, a folder, or
     /// ros2-mcap:PATH:/TOPIC.
     pub joint_states: Option<PathBuf>,
 

@@ -8,7 +8,9 @@ use crate::bundled;
 use crate::error::{Error, Result};
 use crate::robot::BagSource;
 use crate::signal::Wiring;
-use crate::source::{CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, VendorOptions};
+use crate::source::{
+    CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, TextOptions, VendorOptions,
+};
 
 /// Frames a call for recordings, by default.
 pub const RECORDED_BATCH: usize = 256;
@@ -200,16 +202,20 @@ impl Input {
             }
             if let (Some(spec @ SourceSpec::Ros2Mcap(bag)), Some(body)) = (&spec, &of_bag) {
                 spec.check_options(&options)?;
-                return Ok(Box::new(BagSource::open(bag, body)?));
+                return Ok(Box::new(BagSource::open(bag, body)?.skip_bad(options.skip_bad)));
             }
             match &spec {
                 Some(SourceSpec::Stdin) if strict && rate_hz.is_none() => {
-                    Ok(Box::new(NdjsonSource::stdin(ids.clone()).strict()))
+                    Ok(Box::new(NdjsonSource::stdin(ids.clone()).strict().skip_bad(options.skip_bad)))
                 }
                 Some(spec) => spec.open(&ids, &options),
                 None => {
                     // It is a table like any other.
                     SourceSpec::CsvStdin.check_options(&options)?;
+                    if options.text != TextOptions::default() {
+                        // Its columns are known.
+                        SourceSpec::Stdin.check_options(&options)?;
+                    }
                     let length = Some(bundled::TOUCH.len() as u64);
                     Ok(Box::new(CsvSource::from_reader(&name, bundled::TOUCH, length, rate_hz)?))
                 }

@@ -52,11 +52,11 @@ impl Setup {
                         "{e}; or name another file with joint states (joint_states, --joint-states FILE)"
                     )),
                 };
-                options.states = Some(crate::robot::joint_states_of_bag(&bag).map_err(failed)?);
+                options.states = Some(crate::robot::joint_states_of_bag(&bag, self.skip_bad).map_err(failed)?);
                 source
             }
             Some(StatesSpec::File(file)) => {
-                options.states = Some(JointStates::open(file)?);
+                options.states = Some(JointStates::open_with(file, self.skip_bad)?);
                 source
             }
         };

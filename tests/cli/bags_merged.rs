@@ -354,7 +354,7 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
     let sink = format!("ros2-mcap:{}", text_of(&bag));
     let told = ["--joint-states", text_of(&states), "--sink", &sink];
     let first = done(&with(&run_of(&body, &example("gripper-touch.csv")), &[&joints[..], &told].concat()));
-    let written = somatic::internal::robot::joint_states_of_bag(&BagName::new(&bag)).unwrap();
+    let written = somatic::internal::robot::joint_states_of_bag(&BagName::new(&bag), false).unwrap();
     assert_eq!((written.joint_names(), written.span_s()), (&["grip".to_owned()][..], Some([0.0, 1.1])));
     // At the frame's time, between two states of the recording.
     assert!((written.at(0, 0.02, false).unwrap().position - 0.000546 * 0.4).abs() < 1e-9);
@@ -381,7 +381,7 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
     assert!(told.matches(&line).count() == 1, "{told}");
     let (carried, told) = run(&[]);
     assert!(found != carried && !told.contains("frames carry"), "{told}");
-    let written = somatic::internal::robot::joint_states_of_bag(&BagName::new(&both)).unwrap();
+    let written = somatic::internal::robot::joint_states_of_bag(&BagName::new(&both), false).unwrap();
     let used = JointStates::open(&states).unwrap();
     assert_eq!(written.at(0, 0.5, false), used.at(0, 0.5, false));
 }

@@ -3,6 +3,7 @@
 mod arduino;
 mod author;
 mod bags;
+mod bags_db3;
 mod bags_merged;
 mod bench;
 #[cfg(feature = "page")]
@@ -62,6 +63,7 @@ mod serial;
 mod signals;
 mod simulate;
 mod skins;
+mod skip_bad;
 mod sources;
 mod tables;
 #[cfg(unix)]

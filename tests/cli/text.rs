@@ -226,8 +226,8 @@ fn flags_say_what_is_not_found_out() {
         assert!(said.contains(why) && output.status.code() == Some(code), "{flags:?}: {said}");
         assert!(output.stdout.is_empty(), "{flags:?}");
     }
-    let said = super::fails(2, &["run", "--source", "touch.csv", "--columns", "2"]);
-    assert!(said.contains("--columns is for lines of text"), "{said}");
+    let said = super::fails(2, &["run", "--source", "touch.csv", "--frame-end", "x"]);
+    assert!(said.contains("--frame-end is for lines of text"), "{said}");
 }
 
 #[test]

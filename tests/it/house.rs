@@ -281,6 +281,7 @@ fn each_heavy_dependency_has_one_door() {
         ("getrandom", "page/token.rs"),
         ("roxmltree", "author/mesh"),
         ("mcap", "recording"),
+        ("rusqlite", "recording/sqlite.rs"),
         ("crc32fast", "recording"),
         ("lz4_flex", "recording"),
         ("prost", "recording"),

@@ -2,7 +2,8 @@
 
     write.py HOW MESSAGES.json BAG
 
-HOW is `rosbags`, a folder with chunks in zstd; `rosbags-file`, which is compressed as a file; `mcap-lz4`, an MCAP file with chunks
+HOW is `rosbags`, a folder with chunks in zstd; `rosbags-file`, which is compressed as a file; `rosbags-message`, each message in
+zstd; `rosbags-db3` and `rosbags-db3-message`, the same in SQLite, without compression and with it; `mcap-lz4`, an MCAP file with chunks
 in LZ4 without checksums; or `mcap-plain`, one without chunks. MESSAGES.json is a list, in the order in which they came, of
 {"topic", "log_ns", "stamp_ns", "name", "position"} for joint states, and {"topic", "log_ns", "stamp_ns", "link", "taxel", "value"}
 for clouds of points.
@@ -36,10 +37,10 @@ def message(given):
     return kind, STORE.types[kind](header, 1, len(points), fields, False, step, step * len(points), data, True)
 
 
-def by_rosbags(messages, path, mode):
+def by_rosbags(messages, path, mode, plugin="MCAP"):
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-    writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer = Writer(path, version=9, storage_plugin=StoragePlugin[plugin])
     writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
     with writer:
         topics = {}
@@ -78,6 +79,12 @@ if __name__ == "__main__":
             by_rosbags(messages, path, "STORAGE")
         case "rosbags-file":
             by_rosbags(messages, path, "FILE")
+        case "rosbags-message":
+            by_rosbags(messages, path, "MESSAGE")
+        case "rosbags-db3":
+            by_rosbags(messages, path, "NONE", "SQLITE3")
+        case "rosbags-db3-message":
+            by_rosbags(messages, path, "MESSAGE", "SQLITE3")
         case "mcap-lz4":
             by_mcap(messages, path, compression=CompressionType.LZ4)
         case "mcap-plain":

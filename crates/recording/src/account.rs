@@ -48,6 +48,11 @@ impl Account {
     /// For the file called `name` with `summary`; `thing` is what is read.
     pub(super) fn new(name: &str, thing: &'static str, summary: &Summary) -> Self {
         let Summary { trust, shift, gone, gone_ns, .. } = *summary;
+        let listed = summary.chunks.len() + gone;
+        Self::of(name, thing, SummaryState { trust, shift, gone, gone_ns, listed })
+    }
+
+    fn of(name: &str, thing: &'static str, summary: SummaryState) -> Self {
         Self {
             name: name.to_owned(),
             thing,
@@ -59,10 +64,16 @@ impl Account {
             after_s: None,
             before_s: None,
             cut: None,
-            summary: SummaryState { trust, shift, gone, gone_ns, listed: summary.chunks.len() + gone },
+            summary,
             counts: None,
             strange: 0,
         }
+    }
+
+    /// Of the file called `name`, which has no summary, of which `thing` is read.
+    #[cfg(feature = "sqlite")]
+    pub(super) fn without_summary(name: &str, thing: &'static str) -> Self {
+        Self::of(name, thing, SummaryState { trust: Trust::Absent, shift: 0, gone: 0, gone_ns: None, listed: 0 })
     }
 
     /// What is read, such as `frame`.

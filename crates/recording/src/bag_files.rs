@@ -5,6 +5,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::bag::BAG_METADATA;
+use super::stored::{SQLITE, ZSTD};
 use super::yaml_list::{listed, value};
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_METADATA_BYTES};
@@ -16,23 +17,23 @@ const REINDEXED: &str = "write it anew: ros2 bag reindex BAG";
 
 /// What to say of a file that begins with `first`, which is not as MCAP does.
 pub(super) fn not_mcap(first: &[u8]) -> String {
-    if first.starts_with(b"SQLite format 3\0") {
-        return format!("its storage is sqlite3, and MCAP is read here; {}", CONVERTED.replace("BAG", "FOLDER"));
+    if first.starts_with(SQLITE) {
+        return "it is a ROS 2 bag in SQLite, which is named ros2-mcap:PATH".to_owned();
     }
     if first.starts_with(b"#ROSBAG V") {
-        return format!("it is a ROS 1 bag, and MCAP is read here; {CONVERTED}");
+        return format!("it is a ROS 1 bag, and bags of ROS 2 are read here; {CONVERTED}");
     }
-    if first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD]) {
+    if first.starts_with(ZSTD) {
         return "it is compressed as a whole; unpack it: unzstd FILE".to_owned();
     }
     "this is not an MCAP file: its first bytes differ".to_owned()
 }
 
-/// The MCAP files of the bag at `path`: itself, or those of a folder in the order of its metadata, or, where a recorder was killed
+/// The files of the bag at `path`: itself, or those of a folder in the order of its metadata, or, where a recorder was killed
 /// before it wrote these, of their numbers.
 ///
 /// # Errors
-/// It is not there, or is not a bag in MCAP.
+/// It is not there, or is not a bag in MCAP or SQLite.
 pub(super) fn bag_files(path: &Path) -> Result<Vec<PathBuf>> {
     if !fs::metadata(path).map_err(|e| Error::io(path, &e))?.is_dir() {
         return Ok(vec![path.to_owned()]);
@@ -48,19 +49,25 @@ pub(super) fn bag_files(path: &Path) -> Result<Vec<PathBuf>> {
     }
 }
 
-/// The MCAP files in `folder`, by the numbers in their names.
+/// The files in `folder`, by the numbers in their names: those of MCAP, or of SQLite where there are none.
 fn unlisted(folder: &Path) -> Result<Vec<PathBuf>> {
     let failed = |e: std::io::Error| Error::io(folder, &e);
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        if path.extension().is_some_and(|ending| ending == "mcap") {
+        if path.extension().is_some_and(|ending| ending == "mcap" || ending == "db3") {
             files.push(path);
         }
     }
+    let is_mcap = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "mcap");
+    if files.iter().any(is_mcap) {
+        files.retain(is_mcap);
+    }
     if files.is_empty() {
-        return Err(Error::failed("there is no bag in this folder: it has neither metadata.yaml nor a file .mcap")
-            .at(folder.display()));
+        return Err(Error::failed(
+            "there is no bag in this folder: it has neither metadata.yaml nor a file .mcap or .db3",
+        )
+        .at(folder.display()));
     }
     // `bag_10` comes after `bag_9`.
     files.sort_by_cached_key(|path| {
@@ -74,15 +81,16 @@ fn unlisted(folder: &Path) -> Result<Vec<PathBuf>> {
 /// The names of files in a bag's metadata.
 fn names_in(text: &str) -> Result<Vec<String>> {
     let storage = value(text, "storage_identifier")?.unwrap_or_default();
-    if !["mcap", ""].contains(&storage.as_str()) {
-        return Err(failed!("its storage is {storage}, and MCAP is read here; {CONVERTED}"));
+    if !["mcap", "sqlite3", ""].contains(&storage.as_str()) {
+        return Err(failed!("its storage is {storage}, and mcap and sqlite3 are read here; {CONVERTED}"));
     }
     let mode = value(text, "compression_mode")?.unwrap_or_default();
-    if ["file", "message"].iter().any(|other| mode.eq_ignore_ascii_case(other)) {
-        return Err(failed!(
-            "each {} is compressed by itself, and chunks of MCAP are read here; {CONVERTED}",
-            mode.to_lowercase()
-        ));
+    if mode.eq_ignore_ascii_case("file") {
+        return Err(failed!("each file is compressed by itself, and single messages may be; {CONVERTED}"));
+    }
+    let format = value(text, "compression_format")?.unwrap_or_default();
+    if mode.eq_ignore_ascii_case("message") && format != "zstd" {
+        return Err(failed!("its messages are compressed with `{format}`, and zstd is read here; {CONVERTED}"));
     }
     let list = listed(text, "relative_file_paths").map_err(|e| failed!("{e}; {REINDEXED}"))?;
     let mut names: Vec<String> = Vec::new();
@@ -117,7 +125,11 @@ mod tests {
             names.iter().map(|name| folder.path().join(name).display().to_string()).collect()
         };
         assert!(files().unwrap_err().to_string().contains("no bag in this folder"), "{:?}", files());
-        for name in ["b_10.mcap", "b_9.mcap", "a.mcap", "other.txt"] {
+        for name in ["b_10.db3", "b_9.db3", "other.txt"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(files(), Ok(inside(&["b_9.db3", "b_10.db3"])));
+        for name in ["b_10.mcap", "b_9.mcap", "a.mcap"] {
             fs::write(folder.path().join(name), "").unwrap();
         }
         assert_eq!(files(), Ok(inside(&["a.mcap", "b_9.mcap", "b_10.mcap"])));
@@ -139,8 +151,11 @@ mod tests {
     fn bags_that_are_not_read_say_what_to_do() {
         let why = |text: &str| names_in(text).unwrap_err().to_string();
         assert!(
-            why("  storage_identifier: sqlite3\n")
-                .contains("its storage is sqlite3, and MCAP is read here; convert it")
+            why("  storage_identifier: mine\n")
+                .contains("its storage is mine, and mcap and sqlite3 are read here; convert it")
+        );
+        assert!(
+            why("  compression_mode: MESSAGE\n  compression_format: lz5\n").contains("with `lz5`, and zstd is read")
         );
         assert!(
             why("  storage_identifier: mcap\n  compression_mode: FILE\n").contains("each file is compressed by itself")
@@ -187,9 +202,9 @@ mod tests {
             (
                 "a.db3",
                 &b"SQLite format 3\0\x10\0\x01\x01"[..],
-                "its storage is sqlite3, and MCAP is read here; convert it",
+                "it is a ROS 2 bag in SQLite, which is named ros2-mcap:",
             ),
-            ("a.bag", b"#ROSBAG V2.0\nE\0\0\0", "it is a ROS 1 bag, and MCAP is read here; convert it"),
+            ("a.bag", b"#ROSBAG V2.0\nE\0\0\0", "it is a ROS 1 bag, and bags of ROS 2 are read here; convert it"),
             ("a.mcap.zstd", b"\x28\xB5\x2F\xFD\0", "it is compressed as a whole; unpack it"),
             ("a.mcap", b"mine", "this is not an MCAP file"),
         ] {

@@ -1,10 +1,10 @@
-//! Topics of a bag of ROS 2 being read: an MCAP, or several one after the other.
+//! Topics of a bag of ROS 2 being read: a file, or several one after the other.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::bag_files::bag_files;
-use super::reader::Reader;
+use super::storage::Storage;
 use crate::error::{Error, Result, failed};
 
 /// The encoding of messages that is read.
@@ -37,7 +37,7 @@ pub struct BagReader {
     lengths: Vec<u64>,
     /// How many files have been opened.
     opened: usize,
-    reader: Option<Reader>,
+    storage: Option<Storage>,
     topics: Vec<String>,
     kind: String,
     losses: Vec<String>,
@@ -47,10 +47,10 @@ pub struct BagReader {
 type Topics = BTreeMap<String, BTreeSet<(String, String)>>;
 
 impl BagReader {
-    /// Opens the bag at `path`, an MCAP file or a folder of such.
+    /// Opens the bag at `path`, a file in MCAP or SQLite, or a folder of such.
     ///
     /// # Errors
-    /// It cannot be read, is not a bag in MCAP, or has no such topics, or too many; their messages are not in CDR.
+    /// It cannot be read, is not a bag, or has no such topics, or too many; their messages are not in CDR.
     pub fn open(path: &Path, wanted: &WantedTopics<'_>) -> Result<Self> {
         let files = bag_files(path)?;
         let (topics, kind) = choose(&topics_of(&files)?, wanted, path).map_err(|e| e.at(path.display()))?;
@@ -59,7 +59,7 @@ impl BagReader {
             lengths: files.iter().map(length).collect(),
             files,
             opened: 0,
-            reader: None,
+            storage: None,
             topics,
             kind,
             losses: Vec::new(),
@@ -70,12 +70,14 @@ impl BagReader {
 
     /// Goes on with the next file, if there is one.
     fn open_next(&mut self) -> Result<()> {
-        if let Some(reader) = self.reader.take() {
-            self.losses.append(&mut reader.losses());
+        if let Some(storage) = self.storage.take() {
+            self.losses.append(&mut storage.losses());
         }
         if let Some(file) = self.files.get(self.opened) {
             self.opened += 1;
-            self.reader = Some(Reader::open_any(file)?);
+            let mut storage = Storage::open(file)?;
+            storage.only(&self.topics);
+            self.storage = Some(storage);
         }
         Ok(())
     }
@@ -100,57 +102,53 @@ impl BagReader {
     /// # Errors
     /// A file cannot be read.
     pub fn next_message(&mut self) -> Result<Option<BagMessage<'_>>> {
-        let (topic, message) = loop {
-            let Some(reader) = &mut self.reader else { return Ok(None) };
-            let Some(message) = reader.next_message()? else {
+        let (topic, log_ns) = loop {
+            let Some(storage) = &mut self.storage else { return Ok(None) };
+            let Some(message) = storage.next_message()? else {
                 self.open_next()?;
                 continue;
             };
-            match reader.channels.get(&message.channel) {
-                Some(channel) => {
-                    if let Some(topic) = self.topics.iter().position(|topic| *topic == channel.topic) {
-                        break (topic, message);
+            match storage.topic_name(message.topic) {
+                Some(name) => {
+                    if let Some(topic) = self.topics.iter().position(|topic| topic == name) {
+                        break (topic, message.log_ns);
                     }
                 }
                 None => {
-                    let bytes = reader.data(&message).len() as u64;
-                    reader.damaged(bytes);
+                    let bytes = storage.data().len() as u64;
+                    storage.damaged(bytes);
                 }
             }
         };
-        Ok(self.reader.as_ref().map(|reader| BagMessage {
-            topic,
-            log_ns: message.log_time,
-            data: reader.data(&message),
-        }))
+        Ok(self.storage.as_ref().map(|storage| BagMessage { topic, log_ns, data: storage.data() }))
     }
 
     /// Notes that the last message was whole, and of the time `t_s`.
     pub fn saw(&mut self, t_s: f64) {
-        if let Some(reader) = &mut self.reader {
-            reader.saw(t_s);
+        if let Some(storage) = &mut self.storage {
+            storage.saw(t_s);
         }
     }
 
     /// Notes that the last message, of `bytes`, was not to be read.
     pub fn damaged(&mut self, bytes: usize) {
-        if let Some(reader) = &mut self.reader {
-            reader.damaged(bytes as u64);
+        if let Some(storage) = &mut self.storage {
+            storage.damaged(bytes as u64);
         }
     }
 
     /// How much of the bag has been read, in 0..=1.
     pub fn progress(&self) -> f64 {
-        let own = self.reader.as_ref().zip(self.opened.checked_sub(1).and_then(|own| self.lengths.get(own)));
-        let own = own.map_or(0.0, |(reader, length)| reader.progress() * *length as f64);
-        let done = self.lengths.iter().take(self.opened - usize::from(self.reader.is_some())).sum::<u64>() as f64;
+        let own = self.storage.as_ref().zip(self.opened.checked_sub(1).and_then(|own| self.lengths.get(own)));
+        let own = own.map_or(0.0, |(storage, length)| storage.progress() * *length as f64);
+        let done = self.lengths.iter().take(self.opened - usize::from(self.storage.is_some())).sum::<u64>() as f64;
         ((done + own) / self.lengths.iter().sum::<u64>().max(1) as f64).min(1.0)
     }
 
     /// What of the bag was not read so far, in a line each; complete once the last message is.
     pub fn losses(&self) -> Vec<String> {
         let mut losses = self.losses.clone();
-        losses.extend(self.reader.iter().flat_map(Reader::losses));
+        losses.extend(self.storage.iter().flat_map(Storage::losses));
         losses
     }
 }
@@ -159,29 +157,11 @@ impl BagReader {
 fn topics_of(files: &[PathBuf]) -> Result<Topics> {
     let mut topics = Topics::new();
     for file in files {
-        let mut reader = Reader::open_any(file)?;
-        if !reader.has_summary {
-            // Channels are described at their first messages.
-            while reader.next_message()?.is_some() {}
-        }
-        if reader.channels.is_empty() && !reader.has_end() {
-            return Err(Error::failed("it is cut off before its first whole chunk; nothing of it can be read")
-                .at(file.display()));
-        }
-        for channel in reader.channels.values() {
-            let kind = reader.schemas.get(&channel.schema).cloned().unwrap_or_default();
-            topics.entry(channel.topic.clone()).or_default().insert((whole(&kind), channel.encoding.clone()));
+        for topic in Storage::open(file)?.topics().map_err(|e| e.at(file.display()))? {
+            topics.entry(topic.name).or_default().insert((topic.kind, topic.encoding));
         }
     }
     Ok(topics)
-}
-
-/// A type as ROS 2 spells it; ROS 1 has no `msg` in it.
-pub(super) fn whole(kind: &str) -> String {
-    match kind.split('/').count() {
-        2 => kind.replacen('/', "/msg/", 1),
-        _ => kind.to_owned(),
-    }
 }
 
 /// The topics that are `wanted` of the bag at `path`, and their type.
@@ -279,13 +259,14 @@ fn kind_of(topics: &Topics, wanted: &WantedTopics<'_>, name: &str) -> Result<Str
 fn not_cdr(encoding: &str) -> String {
     let encoding: String = encoding.chars().take(20).collect();
     format!(
-        "messages are in `{encoding}`, and CDR is read here, as `ros2 bag record --storage mcap` writes it; convert or record \
+        "messages are in `{encoding}`, and CDR is read here, as `ros2 bag record` writes it; convert or record \
          them so"
     )
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::stored::whole;
     use super::*;
 
     fn topics(all: &[(&str, &str, &str)]) -> Topics {

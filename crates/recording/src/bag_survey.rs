@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::bag_files::bag_files;
-use super::bag_reader::whole;
-use super::reader::Reader;
+use super::storage::Storage;
 use crate::error::Result;
 
 /// What is in a bag of ROS 2: all of it, whether it is read as touch or not.
@@ -49,45 +48,42 @@ impl SurveyedTopic {
 }
 
 impl BagSurvey {
-    /// Reads the bag at `path`, an MCAP file or a folder of such, to its end; `progress` gets the share that has been read.
+    /// Reads the bag at `path`, a file in MCAP or SQLite or a folder of such, to its end; `progress` gets the share that has been read.
     ///
     /// # Errors
-    /// It cannot be read, or is not a bag in MCAP.
+    /// It cannot be read, or is not a bag.
     pub fn read(path: &Path, mut progress: impl FnMut(f64)) -> Result<Self> {
         let files = bag_files(path)?;
         let mut survey = Self { files: files.len(), ..Self::default() };
         let mut topics: BTreeMap<(String, String), SurveyedTopic> = BTreeMap::new();
         for (index, file) in files.iter().enumerate() {
-            let mut reader = Reader::open_any(file)?;
+            let mut storage = Storage::open(file)?;
             survey.bytes += std::fs::metadata(file).map_or(0, |there| there.len());
             let mut count = 0_u64;
-            while let Some(message) = reader.next_message()? {
-                let bytes = reader.data(&message).len() as u64;
-                let Some(channel) = reader.channels.get(&message.channel) else {
-                    reader.damaged(bytes);
+            while let Some(message) = storage.next_message()? {
+                let bytes = storage.data().len() as u64;
+                let Some(stored) = storage.topic(message.topic) else {
+                    storage.damaged(bytes);
                     continue;
                 };
-                let kind = whole(reader.schemas.get(&channel.schema).map_or("", String::as_str));
-                let topic = topics.entry((channel.topic.clone(), kind)).or_default();
-                topic.encoding.clone_from(&channel.encoding);
+                let topic = topics.entry((stored.name, stored.kind)).or_default();
+                topic.encoding = stored.encoding;
                 topic.messages += 1;
                 topic.bytes += bytes;
-                let log_ns = message.log_time;
+                let log_ns = message.log_ns;
                 let [first_ns, last_ns] = topic.span_ns.unwrap_or([log_ns; 2]);
                 topic.span_ns = Some([first_ns.min(log_ns), last_ns.max(log_ns)]);
-                reader.saw(log_ns as f64 / 1e9);
+                storage.saw(log_ns as f64 / 1e9);
                 count += 1;
                 if count.is_multiple_of(1024) {
-                    progress((index as f64 + reader.progress()) / files.len() as f64);
+                    progress((index as f64 + storage.progress()) / files.len() as f64);
                 }
             }
             // Topics that have no message yet.
-            for channel in reader.channels.values() {
-                let kind = whole(reader.schemas.get(&channel.schema).map_or("", String::as_str));
-                let topic = topics.entry((channel.topic.clone(), kind)).or_default();
-                topic.encoding.clone_from(&channel.encoding);
+            for stored in storage.known_topics() {
+                topics.entry((stored.name, stored.kind)).or_default().encoding = stored.encoding;
             }
-            survey.losses.extend(reader.losses());
+            survey.losses.extend(storage.losses());
         }
         survey.topics = topics.into_iter().map(|((name, kind), topic)| SurveyedTopic { name, kind, ..topic }).collect();
         Ok(survey)

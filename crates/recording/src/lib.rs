@@ -23,6 +23,10 @@ mod reader;
 mod recorder;
 mod records;
 mod schemas;
+#[cfg(feature = "sqlite")]
+mod sqlite;
+mod storage;
+mod stored;
 mod summary;
 mod survey;
 mod unpack;

@@ -19,6 +19,14 @@ pub(super) fn unpacked(compression: &str, bytes: &[u8], length: u64) -> Option<V
     (read.is_ok() && unpacked.len() as u64 == length).then_some(unpacked)
 }
 
+/// Decompresses a message in zstd; `None` if that fails, or gives more than a chunk may have.
+pub(super) fn unpacked_message(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut unpacked = Vec::new();
+    let decoder = ruzstd::decoding::StreamingDecoder::new(bytes).ok()?;
+    decoder.take(MAX_CHUNK_BYTES + 1).read_to_end(&mut unpacked).ok()?;
+    (unpacked.len() as u64 <= MAX_CHUNK_BYTES).then_some(unpacked)
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Write as _;
@@ -40,6 +48,9 @@ mod tests {
             assert_eq!(unpacked(compression, &packed, length + 1), None, "{compression}: shorter than it says");
             assert_eq!(unpacked(compression, &packed, u64::MAX), None, "{compression}: beyond all memory");
             assert_eq!(unpacked(compression, &packed[..packed.len() / 2], length), None, "{compression}: cut");
+            let as_message = unpacked_message(&packed);
+            assert!(as_message.as_ref() == (compression == "zstd").then_some(&bytes), "{compression}: as a message");
+            assert_eq!(unpacked_message(&packed[..packed.len() / 2]), None, "{compression}: a message, cut");
             for at in (0..packed.len()).step_by(97) {
                 // Another answer, which a checksum tells, or none: no panic.
                 let mut damaged = packed.clone();

@@ -56,7 +56,7 @@ limits! {
     MAX_STATES_BYTES: u64 = 1 << 30;
     /// Size of what a recorder writes beside a bag, `metadata.yaml`
     MAX_METADATA_BYTES: u64 = 16 << 20;
-    /// Size of a chunk of an MCAP when it is unpacked, or of its summary
+    /// Size of a chunk of an MCAP when it is unpacked, of its summary, or of a message of a bag in SQLite
     MAX_CHUNK_BYTES: u64 = 256 << 20;
     /// Size of what is kept between runs, or read of the operating system
     MAX_SYSTEM_BYTES: u64 = 16 << 20;

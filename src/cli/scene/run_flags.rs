@@ -201,6 +201,12 @@ pub(in crate::cli) struct RunFlags {
     #[arg(long, help_heading = RECORDINGS, value_name = "FILE.csv")]
     pub(in crate::cli) layout: Option<PathBuf>,
 
+    /// Skip lines, rows and messages that are wrong, count them by kind, and exit with 3 [default: fail at the first].
+    ///
+    /// For CSV, NDJSON, exports with a line for each frame, ROS 2 bags, and joint states; `text:` does so always.
+    #[arg(long, help_heading = RECORDINGS)]
+    pub(in crate::cli) skip_bad: bool,
+
     /// What mcap:FILE holds: raw frames (frames), percepts, and what viewers show (view) [default: all].
     #[arg(long, help_heading = RECORDINGS, value_name = "PART,...", value_delimiter = ',',
         value_parser = one_of::<RecordPart>(&["frames", "percepts", "view"]))]
@@ -251,7 +257,7 @@ pub(in crate::cli) struct RunFlags {
 
     /// A recording of joint states, or ros2:/TOPIC, live [default: those in the frames, or in their bag].
     ///
-    /// A recording is a CSV under t,<joint>,..., NDJSON, or a ROS 2 bag in MCAP: a .mcap, a folder, or
+    /// A recording is a CSV under t,<joint>,..., NDJSON, or a ROS 2 bag: a .mcap, a .db3, a folder, or
     /// ros2-mcap:PATH:/TOPIC.
     #[arg(long, help_heading = ROBOT, value_name = "FILE")]
     pub(in crate::cli) joint_states: Option<PathBuf>,
@@ -380,7 +386,7 @@ impl RunFlags {
                 format grid pitch unit layout live_rate_hz board_rate_hz batch playback_speed from_s to_s repeat max_age_s max_gap_s
                 contact_tolerance_m coordinates relative_to filter_window filter_by filter_time_s filter_over_s,
             lists: allow_hosts outputs fields letters signal record,
-            switches: all_fields header tare strict overwrite verify quiet
+            switches: all_fields header tare strict skip_bad overwrite verify quiet
         }
         if !self.sources.is_empty() {
             file.sources = self.sources.iter().map(|text| text.parse()).collect::<Result<_>>()?;

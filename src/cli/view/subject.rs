@@ -37,6 +37,7 @@ pub(super) fn subject(what: Option<&str>, asked: &RunFlags) -> Result<Subject> {
         _ if what.starts_with("ros2-mcap:") => as_source(""),
         _ if BagName::is_folder(Path::new(what)) => as_source("ros2-mcap"),
         Some("mcap") => as_source("mcap"),
+        Some("db3") => as_source("ros2-mcap"),
         Some("csv") => as_source("csv"),
         Some("asf" | "lst" | "asc" | "txt" | "tsv") => as_source(""),
         Some("toml") if SimulatedSource::is_named(what) => as_source("sim"),

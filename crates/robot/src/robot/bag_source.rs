@@ -7,7 +7,7 @@ use crate::body::Body;
 use crate::error::{Error, Result, failed};
 use crate::recording::{BagMessage, BagReader, WantedTopics};
 use crate::signal::{Frame, FrameTime};
-use crate::source::{BagName, Source};
+use crate::source::{BagName, SkippedBad, Source};
 
 /// The time `log_ns` by a recorder's clock.
 pub(super) fn time_of(log_ns: u64) -> FrameTime {
@@ -25,7 +25,7 @@ pub(super) fn frames_of(bag: &BagName) -> Result<BagReader> {
     BagReader::open(&bag.path, &wanted)
 }
 
-/// Frames from topics of a bag in MCAP, for the taxels of a body: clouds of points, or numbers in the body's order.
+/// Frames from topics of a bag in MCAP or SQLite, for the taxels of a body: clouds of points, or numbers in the body's order.
 ///
 /// The time of a frame is its cloud's stamp. Where that is 0, and of numbers, which have none, it is when the message came, by
 /// the recorder's clock. Clouds of several topics are merged as frames of several boards are: a topic whose last cloud is older
@@ -38,6 +38,7 @@ pub struct BagSource {
     places: Places,
     kind: Kind,
     notices: Vec<String>,
+    skipped: SkippedBad,
 }
 
 somatic_skin::debug_by_name!(BagSource);
@@ -69,7 +70,15 @@ impl BagSource {
             places: Places::new(body),
             kind,
             notices: Vec::new(),
+            skipped: SkippedBad::default(),
         })
+    }
+
+    /// Skips messages that do not fit the body, and counts them, if `is_asked`; else the first one is an error.
+    #[must_use]
+    pub fn skip_bad(mut self, is_asked: bool) -> Self {
+        self.skipped = SkippedBad::new(is_asked);
+        self
     }
 
     /// `error` of a message of topic `topic` that came at `log_s`.
@@ -155,7 +164,11 @@ impl Source for BagSource {
             let (topic, bytes, log_s) = (message.topic, message.data.len(), time_of(message.log_ns).s);
             match self.kind.read(&message, &mut self.places, &self.topics, frame) {
                 Some(Ok(t_s)) => self.bag.saw(t_s),
-                Some(Err(e)) => return Err(self.placed(e, topic, log_s)),
+                Some(Err(e)) => {
+                    let error = self.placed(e, topic, log_s);
+                    self.skipped.skip("message", "values that do not fit", error)?;
+                    continue;
+                }
                 None => {
                     self.bag.damaged(bytes);
                     continue;
@@ -185,11 +198,12 @@ impl Source for BagSource {
         let of_places = std::mem::take(&mut self.places.notices);
         let mut notices: Vec<String> = of_places.into_iter().map(|what| format!("{}: {what}", self.path)).collect();
         notices.append(&mut self.notices);
+        notices.extend(self.skipped.take_notices());
         notices
     }
 
     fn losses(&self) -> Vec<String> {
-        self.bag.losses()
+        self.bag.losses().into_iter().chain(self.skipped.losses()).collect()
     }
 }
 
@@ -270,7 +284,7 @@ mod tests {
             // In a double alone they are not.
             assert!(times.windows(2).any(|pair| (pair[1].s - pair[0].s - 0.010_000_077).abs() > 1e-7), "{topic}");
         }
-        let states = super::super::joint_states_of_bag(&BagName::new(&path)).unwrap();
+        let states = super::super::joint_states_of_bag(&BagName::new(&path), false).unwrap();
         let at = FrameTime::from_ns((FIRST_NS + 10_000_077 + 100) as i64);
         let found = states.at(0, at, false).unwrap();
         assert_eq!((found.age_s, found.position), (1e-7, 1.0 + 1e-7 / 0.010_000_077));
@@ -309,7 +323,7 @@ mod tests {
                 }
                 Err(e) => assert_eq!(e.to_string().lines().count(), 1, "{e}"),
             }
-            if let Err(e) = super::super::joint_states_of_bag(&BagName::new(&path)) {
+            if let Err(e) = super::super::joint_states_of_bag(&BagName::new(&path), false) {
                 assert_eq!(e.to_string().lines().count(), 1, "{e}");
             }
             assert!(began.elapsed().as_secs() < 5, "round {round} of seed {seed} took {:?}", began.elapsed());

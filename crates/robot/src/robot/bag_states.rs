@@ -5,7 +5,7 @@ use super::joint_positions::joint_positions;
 use super::messages::{JointState, Message as _};
 use crate::error::{Error, Result, failed};
 use crate::recording::{BagReader, WantedTopics};
-use crate::source::{BagName, JointStates};
+use crate::source::{BagName, JointStates, SkippedBad};
 
 /// What is read of a bag, where joint states are.
 pub(super) fn states_of(bag: &BagName) -> Result<BagReader> {
@@ -17,15 +17,16 @@ pub(super) fn states_of(bag: &BagName) -> Result<BagReader> {
     BagReader::open(&bag.path, &WantedTopics { topics: &bag.topics, kinds: &[JointState::TYPE], merged: None })
 }
 
-/// Reads `sensor_msgs/msg/JointState` from a bag in MCAP: from the topic that is named, or the only one of that type.
+/// Reads `sensor_msgs/msg/JointState` from a bag in MCAP or SQLite: from the topic that is named, or the only one of that type.
 ///
 /// The time of a state is its stamp; that of one whose stamp is 0 is when it came, by the recorder's clock. Several
 /// publishers may each tell of some joints. A position that is not a finite number tells nothing, and is among
-/// [`JointStates::losses`], as is what is damaged or cut off.
+/// [`JointStates::losses`], as is what is damaged or cut off; and with `skip_bad`, a state that has not as many positions as names.
 ///
 /// # Errors
 /// The bag cannot be read, or has no such topic, or several; no state has positions, or one has not as many as names.
-pub fn joint_states_of_bag(bag: &BagName) -> Result<JointStates> {
+pub fn joint_states_of_bag(bag: &BagName, skip_bad: bool) -> Result<JointStates> {
+    let mut skipped = SkippedBad::new(skip_bad);
     let mut reader = states_of(bag)?;
     let name = format!("{}: {}", bag.path.display(), reader.topics().join(", "));
     let mut states = JointStates::named(name.clone());
@@ -41,7 +42,18 @@ pub fn joint_states_of_bag(bag: &BagName) -> Result<JointStates> {
         let time = if stamp.nanoseconds() == 0 { time_of(log_ns) } else { stamp.frame_time() };
         let t_s = time.s;
         reader.saw(t_s);
-        for (joint, position) in joint_positions(&state).map_err(|e| e.at(format!("{name}: at {t_s} s")))? {
+        let positions = match joint_positions(&state) {
+            Ok(positions) => positions,
+            Err(e) => {
+                skipped.skip(
+                    "message",
+                    "another number of positions than of names",
+                    e.at(format!("{name}: at {t_s} s")),
+                )?;
+                continue;
+            }
+        };
+        for (joint, position) in positions {
             if position.is_finite() {
                 states.add(joint, time, position);
             } else {
@@ -52,6 +64,7 @@ pub fn joint_states_of_bag(bag: &BagName) -> Result<JointStates> {
     }
     let mut losses = reader.losses();
     losses.extend(odd.map(|(count, first)| format!("{name}: positions that are not finite numbers: {count}, {first}")));
+    losses.extend(skipped.losses());
     states.sort(losses);
     if states.joint_names().is_empty() {
         return Err(

@@ -9,7 +9,7 @@ use crate::error::{Error, Result, failed};
 /// Topics of a bag of ROS 2 as people name them: `PATH[:/TOPIC[,/TOPIC]...][@TYPE]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BagName {
-    /// An MCAP file, or a folder of such.
+    /// A file in MCAP or SQLite, or a folder of such.
     pub path: PathBuf,
     /// The topics' names, from `/` on; without any, what fits is meant.
     pub topics: Vec<String>,

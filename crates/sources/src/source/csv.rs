@@ -14,10 +14,17 @@ use csv::{ByteRecord, ErrorKind};
 use super::Source;
 use super::csv_cells::{number, shortened, trimmed};
 use super::csv_header::{self, Header};
+use super::csv_named;
+use super::skipped_bad::SkippedBad;
+use super::text::TextOptions;
 use super::time_column::TimeColumn;
+use super::vendor::VendorOptions;
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_LINE_BYTES;
 use crate::signal::{Frame, RawValue};
+
+/// What is wrong with rows of words or quotes.
+const NO_NUMBER: &str = "a value that is not a number";
 
 /// A recording read from CSV.
 pub struct CsvSource {
@@ -33,28 +40,22 @@ pub struct CsvSource {
     /// Columns that are not a sensor, from 0, ascending.
     left_out: Vec<usize>,
     time: Time,
+    /// The column of the time, from 0, if there is one, and how many there are.
+    time_at: usize,
+    width: usize,
     frames: u64,
     notices: Vec<String>,
     losses: Vec<String>,
+    skipped: SkippedBad,
 }
 
 somatic_skin::debug_by_name!(CsvSource);
 
 enum Time {
-    /// The first column.
+    /// A column.
     Column(TimeColumn),
     /// Frames come at this rate, the first at 0.
     Rate(f64),
-}
-
-impl Time {
-    /// Columns before the first taxel's.
-    fn columns(&self) -> usize {
-        match self {
-            Self::Column(_) => 1,
-            Self::Rate(_) => 0,
-        }
-    }
 }
 
 impl CsvSource {
@@ -69,6 +70,18 @@ impl CsvSource {
         Self::from_reader(path.display().to_string(), file, length, rate_hz)
     }
 
+    /// The same with columns that are named instead of found out, if [`VendorOptions::text`] names any: for a body with the taxels
+    /// `ids`.
+    ///
+    /// # Errors
+    /// As [`CsvSource::open`]; a usage error if there are no such columns, or not as many as taxels.
+    pub fn open_for(path: impl AsRef<Path>, options: &VendorOptions, ids: &[u32]) -> Result<Self> {
+        let path = path.as_ref();
+        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+        let length = file.metadata().ok().filter(std::fs::Metadata::is_file).map(|m| m.len());
+        Self::from_reader_for(path.display().to_string(), file, length, options, ids)
+    }
+
     /// Reads a recording from `reader`, called `name` in messages. `total_bytes` is for [`Source::progress`].
     ///
     /// # Errors
@@ -78,6 +91,21 @@ impl CsvSource {
         reader: impl Read + Send + 'static,
         total_bytes: Option<u64>,
         rate_hz: Option<f64>,
+    ) -> Result<Self> {
+        let options = VendorOptions { rate_hz, ..VendorOptions::default() };
+        Self::from_reader_for(name, reader, total_bytes, &options, &[])
+    }
+
+    /// The same with columns that are named, as [`CsvSource::open_for`] has them.
+    ///
+    /// # Errors
+    /// As [`CsvSource::open_for`].
+    pub fn from_reader_for(
+        name: impl Into<String>,
+        reader: impl Read + Send + 'static,
+        total_bytes: Option<u64>,
+        options: &VendorOptions,
+        ids: &[u32],
     ) -> Result<Self> {
         let name = name.into();
         let reader = csv::ReaderBuilder::new()
@@ -98,26 +126,35 @@ impl CsvSource {
             taxels: Vec::new(),
             left_out: Vec::new(),
             time: Time::Rate(1.0),
+            time_at: 0,
+            width: 0,
             frames: 0,
             notices: Vec::new(),
             losses: Vec::new(),
+            skipped: SkippedBad::new(options.skip_bad),
         };
-        source.read_header(rate_hz).map_err(|e| e.at(&source.name))?;
+        source.read_header(options.rate_hz, &options.text, ids).map_err(|e| e.at(&source.name))?;
         Ok(source)
     }
 
-    fn read_header(&mut self, rate_hz: Option<f64>) -> Result<()> {
+    fn read_header(&mut self, rate_hz: Option<f64>, asked: &TextOptions, ids: &[u32]) -> Result<()> {
         if !self.read_row()? {
             return Err(Error::failed("the file is empty; its first row should be `t,<taxel id>,<taxel id>,...`"));
         }
         let row = self.row.clone();
-        if csv_header::is_doubtful(&row) {
+        let is_named = asked.given().is_some();
+        if !is_named && csv_header::is_doubtful(&row) {
             while self.ahead.len() < csv_header::ROWS_BELOW && self.read_row_anew()? {
                 self.ahead.push_back((self.row.clone(), self.line));
             }
         }
         let below: Vec<ByteRecord> = self.ahead.iter().map(|(row, _)| row.clone()).collect();
-        let Header { time, taxels, left_out, notes } = csv_header::read(&row, &below, rate_hz.is_some())?;
+        let header = match is_named {
+            true => csv_named::header_of(&row, asked, ids, rate_hz.is_some()),
+            false => csv_header::read(&row, &below, rate_hz.is_some()),
+        };
+        let Header { time, time_at, taxels, left_out, notes } = header?;
+        (self.time_at, self.width) = (time_at, left_out.len() + taxels.len() + usize::from(time.is_some()));
         self.time = match (time, rate_hz) {
             (Some(column), _) => Time::Column(column),
             (None, Some(rate)) if rate.is_finite() && rate > 0.0 => Time::Rate(rate),
@@ -170,18 +207,36 @@ impl CsvSource {
             return None;
         }
         let (index, cell) = self.row.iter().enumerate().find(|(_, cell)| trimmed(cell).contains(&b'"'))?;
-        let before = self.time.columns() + self.left_out.iter().filter(|&&left_out| left_out < index).count();
-        let taxel = index.checked_sub(before).and_then(|index| self.taxels.get(index));
+        let before = (0..index).filter(|&index| !self.is_sensor(index)).count();
+        let taxel = self.is_sensor(index).then(|| self.taxels.get(index - before)).flatten();
         let place = taxel.map_or(format!("column {}", index + 1), |id| format!("column {} (taxel {id})", index + 1));
         let word = shortened(&String::from_utf8_lossy(cell.trim_ascii()));
         Some(failed!("`{word}` has a quote; numbers have no quotes: remove it").at(place))
     }
 
+    /// Whether the column at `index` is a sensor's.
+    fn is_sensor(&self, index: usize) -> bool {
+        let is_time = matches!(self.time, Time::Column(_)) && index == self.time_at;
+        !is_time && self.left_out.binary_search(&index).is_err()
+    }
+
     fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
-        if !self.read_row()? {
-            return Ok(false);
+        while self.read_row()? {
+            match self.frame_of_row(frame)? {
+                Ok(has_frame) => return Ok(has_frame),
+                Err((wrong, error)) => self.skipped.skip("row", wrong, error)?,
+            }
+            if let Time::Rate(_) = self.time {
+                // It was measured, too: those after it keep their times.
+                self.frames += 1;
+            }
         }
-        let wanted = self.time.columns() + self.taxels.len() + self.left_out.len();
+        Ok(false)
+    }
+
+    /// Reads the current row; or says what is wrong with it, in short and in full. `false` where it is the last and cut short.
+    fn frame_of_row(&mut self, frame: &mut Frame) -> Result<Result<bool, (&'static str, Error)>> {
+        let wanted = self.width;
         // Many programs end a row with a comma.
         if self.row.len() > wanted && self.row.iter().skip(wanted).all(|cell| trimmed(cell).is_empty()) {
             self.row.truncate(wanted);
@@ -192,24 +247,28 @@ impl CsvSource {
         if found != wanted {
             // Only the last row may be cut short: the recorder was stopped while writing it.
             if self.read_row()? {
+                self.ahead.push_front((std::mem::take(&mut self.row), self.line));
                 let ragged =
                     || failed!("{found} values where the header has {wanted} columns; complete or delete the row");
-                return Err(at_line(quote.unwrap_or_else(ragged)));
+                let wrong = if quote.is_some() { NO_NUMBER } else { "more or fewer values than columns" };
+                return Ok(Err((wrong, at_line(quote.unwrap_or_else(ragged)))));
             }
             let how = if found < wanted { "truncated" } else { "too long" };
             self.losses.push(format!("{}: line {line}: last row {how}: {found} of {wanted} values", self.name));
-            return Ok(false);
+            return Ok(Ok(false));
         }
         if let Some(quote) = quote {
-            return Err(at_line(quote));
+            return Ok(Err((NO_NUMBER, at_line(quote))));
         }
         frame.clear();
         frame.values.resize(self.taxels.len(), RawValue::MISSING);
-        let mut cells = self.row.iter();
         frame.t_s = match &mut self.time {
             Time::Column(column) => {
-                let word = trimmed(cells.next().unwrap_or_default());
-                column.read(&String::from_utf8_lossy(word), number(word)).map_err(at_line)?
+                let word = trimmed(self.row.get(self.time_at).unwrap_or_default());
+                match column.read(&String::from_utf8_lossy(word), number(word)) {
+                    Ok(t_s) => t_s,
+                    Err(e) => return Ok(Err(("no time", at_line(e)))),
+                }
             }
             Time::Rate(rate) => self.frames as f64 / *rate,
         };
@@ -217,27 +276,31 @@ impl CsvSource {
             *value = parse_value(cell).map_err(|e| at_line(e.at(format!("taxel {id}"))))?;
             Ok(())
         };
-        if self.left_out.is_empty() {
-            for ((value, cell), id) in frame.values.iter_mut().zip(cells).zip(&self.taxels) {
-                set(value, cell, id)?;
-            }
+        let values = frame.values.iter_mut().zip(&self.taxels);
+        let first = usize::from(matches!(self.time, Time::Column(_)));
+        let read = if self.left_out.is_empty() && self.time_at == 0 {
+            values.zip(self.row.iter().skip(first)).try_for_each(|((value, id), cell)| set(value, cell, id))
         } else {
-            let first = self.time.columns();
-            let cells = cells.enumerate().filter(|(index, _)| self.left_out.binary_search(&(index + first)).is_err());
-            for ((value, (_, cell)), id) in frame.values.iter_mut().zip(cells).zip(&self.taxels) {
-                set(value, cell, id)?;
-            }
+            let cells = self.row.iter().enumerate().filter(|(index, _)| self.is_sensor(*index));
+            values.zip(cells).try_for_each(|((value, id), (_, cell))| set(value, cell, id))
+        };
+        if let Err(e) = read {
+            return Ok(Err((NO_NUMBER, e)));
         }
         if let Time::Column(column) = &mut self.time {
             if self.frames == 0
                 && let Some(unit) = column.found_out()
             {
-                self.notices.push(format!("column 1 is read as times in {}, by the first one", unit.symbol()));
+                self.notices.push(format!(
+                    "column {} is read as times in {}, by the first one",
+                    self.time_at + 1,
+                    unit.symbol()
+                ));
             }
             self.notices.extend(column.doubt());
         }
         self.frames += 1;
-        Ok(true)
+        Ok(Ok(true))
     }
 }
 
@@ -256,11 +319,13 @@ impl Source for CsvSource {
     }
 
     fn notices(&mut self) -> Vec<String> {
+        self.notices.extend(self.skipped.take_notices());
         self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
     }
 
     fn losses(&self) -> Vec<String> {
-        self.losses.clone()
+        let skipped = self.skipped.losses().into_iter().map(|what| format!("{}: {what}", self.name));
+        self.losses.iter().cloned().chain(skipped).collect()
     }
 }
 
@@ -327,6 +392,11 @@ mod tests {
     fn open(text: &str, rate: Option<f64>) -> Result<CsvSource> {
         let bytes = text.as_bytes().to_vec();
         CsvSource::from_reader("a.csv", io::Cursor::new(bytes), Some(text.len() as u64), rate)
+    }
+
+    fn skipping(text: &str, rate_hz: Option<f64>) -> CsvSource {
+        let options = VendorOptions { rate_hz, skip_bad: true, ..VendorOptions::default() };
+        CsvSource::from_reader_for("a.csv", io::Cursor::new(text.as_bytes().to_vec()), None, &options, &[]).unwrap()
     }
 
     /// A frame's time and its values in words.
@@ -447,6 +517,54 @@ mod tests {
     }
 
     #[test]
+    fn columns_are_named_instead_of_found_out() {
+        let text = "frame,pressure_0,temperature,pressure_1,timestamp_ms,9\n1,5,20,6,1000,7\n2,7,20,8,1500,9\n";
+        let open = |columns: Option<&str>, time: Option<&str>, ids: Option<&str>, rate_hz: Option<f64>| {
+            let text_options = TextOptions {
+                columns: columns.map(|word| word.parse().unwrap()),
+                time: time.map(|word| word.parse().unwrap()),
+                ids: ids.map(|word| word.parse().unwrap()),
+                ..TextOptions::default()
+            };
+            let options = VendorOptions { rate_hz, text: text_options, ..VendorOptions::default() };
+            CsvSource::from_reader_for("a.csv", io::Cursor::new(text.as_bytes().to_vec()), None, &options, &[12, 4])
+        };
+        let read = |source: Result<CsvSource>| {
+            let mut source = source.unwrap();
+            let (mut frame, mut rows) = (Frame::missing(0.0, source.taxels().len()), Vec::new());
+            while source.next_frame(&mut frame).unwrap() {
+                rows.push(format!("{} {:?}", frame.t_s, frame.values));
+            }
+            (source.taxels().to_vec(), rows.join("; "), source.notices().join("; "))
+        };
+        let (taxels, rows, said) = read(open(Some("pressure_*"), Some("timestamp_ms"), None, None));
+        assert_eq!((taxels, rows.as_str()), (vec![4, 12], "1 [5, 6]; 1.5 [7, 8]"));
+        assert_eq!(
+            said,
+            "a.csv: 2 of 6 columns are sensors: column 2, column 4; column 5 (`timestamp_ms`) is the time"
+        );
+        let (taxels, rows, _) = read(open(Some("2-4"), Some("1:s"), Some("7,1,3"), None));
+        assert_eq!((taxels, rows.as_str()), (vec![7, 1, 3], "1 [5, 20, 6]; 2 [7, 20, 8]"));
+        let (taxels, rows, _) = read(open(Some("6"), None, None, Some(10.0)));
+        assert_eq!((taxels, rows.as_str()), (vec![9], "0 [7]; 0.1 [9]"));
+        let why = |columns, time, ids, rate| {
+            let error = open(columns, time, ids, rate).err().unwrap();
+            assert!(error.is_usage(), "{error}");
+            error.to_string()
+        };
+        assert!(
+            why(Some("force_*"), Some("5"), None, None)
+                .contains("--columns force_*: there is no such column; the header has frame, ")
+        );
+        assert!(why(None, Some("stamp"), None, None).contains("--time stamp: there is no such column"));
+        assert!(why(Some("2-4"), Some("5"), None, None).contains("3 columns are sensors, for 2 taxels"));
+        assert!(why(Some("2,4"), None, None, None).contains("column 1 is not the time; name the column"));
+        assert!(why(Some("2,4"), Some("5"), None, Some(1.0)).contains("give one of them"));
+        assert!(why(Some("2,4"), Some("arrival"), None, None).contains("--time arrival is for lines as they come"));
+        assert!(why(Some("2,4"), Some("5"), Some("names"), None).contains("called by a number"));
+    }
+
+    #[test]
     fn times_are_in_the_unit_of_their_head_or_of_their_size() {
         let times = |text: &str| {
             let mut source = open(text, None).unwrap();
@@ -480,6 +598,44 @@ mod tests {
             why("t,4,7\n0,1\n1,3,4\n", None),
             "a.csv: line 2: 2 values where the header has 3 columns; complete or delete the row"
         );
+    }
+
+    #[test]
+    fn wrong_rows_are_skipped_on_request_and_counted_by_kind() {
+        let text = "t,4,7\n0,1,2\n1,3\n2,x,4\n,5,6\n4,7,8\n5,1,2,3\n6,\"9,9\n7,9,y\n8,9\n";
+        assert!(why(text, None).starts_with("a.csv: line 3: 2 values"));
+        let mut source = skipping(text, None);
+        let mut frame = Frame::missing(0.0, 2);
+        let mut times = Vec::new();
+        while source.next_frame(&mut frame).unwrap() {
+            times.push(frame.t_s);
+        }
+        assert_eq!(times, [0.0, 4.0]);
+        let said = source.notices();
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert_eq!(
+            said[0],
+            "a.csv: a row is skipped: line 3: 2 values where the header has 3 columns; complete or delete the row; others like it \
+             are counted"
+        );
+        let losses = source.losses();
+        assert_eq!(losses[0], "a.csv: line 10: last row truncated: 2 of 3 values");
+        assert!(
+            losses[1].starts_with("a.csv: 2 rows skipped, more or fewer values than columns; the first one: line 3")
+        );
+        assert!(
+            losses[2].starts_with(
+                "a.csv: 3 rows skipped, a value that is not a number; the first one: line 4: taxel 4: `x`"
+            )
+        );
+        assert_eq!(losses[3], "a.csv: 1 row skipped, no time: line 5: t is blank; every row needs its time");
+        // By a rate, frames keep the times at which they were measured.
+        let mut source = skipping("4,7\n1,2\n3\n5,6\n", Some(10.0));
+        let mut times = Vec::new();
+        while source.next_frame(&mut frame).unwrap() {
+            times.push(frame.t_s);
+        }
+        assert_eq!(times, [0.0, 0.2]);
     }
 
     #[test]

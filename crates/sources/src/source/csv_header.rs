@@ -15,8 +15,9 @@ pub(super) const ROWS_BELOW: usize = 3;
 
 /// What the first row says.
 pub(super) struct Header {
-    /// The first column, if it is the time.
+    /// The times, if there are any, and their column, from 0.
     pub(super) time: Option<TimeColumn>,
+    pub(super) time_at: usize,
     pub(super) taxels: Vec<u32>,
     /// Columns that are not a sensor, from 0, ascending.
     pub(super) left_out: Vec<usize>,
@@ -44,8 +45,13 @@ pub(super) fn read(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> 
     if unit.is_none() && !is_plain && is_frame(first, below) {
         return Err(no_header(first, below, has_rate));
     }
-    let mut header =
-        Header { time: unit.map(TimeColumn::new), taxels: Vec::new(), left_out: Vec::new(), notes: Vec::new() };
+    let mut header = Header {
+        time: unit.map(TimeColumn::new),
+        time_at: 0,
+        taxels: Vec::new(),
+        left_out: Vec::new(),
+        notes: Vec::new(),
+    };
     let skipped = usize::from(header.time.is_some());
     let has_ids = first.iter().skip(skipped).any(|cell| word(cell).parse::<u32>().is_ok());
     let mut columns = HashMap::new();

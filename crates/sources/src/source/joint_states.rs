@@ -8,6 +8,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::skipped_bad::SkippedBad;
 use super::time_column::{TimeColumn, unit_in_head};
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_STATES_BYTES};
@@ -46,13 +47,24 @@ impl JointStates {
     /// # Errors
     /// It cannot be read, or a line is not a joint state; with the line.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::open_with(path, false)
+    }
+
+    /// The same; with `skip_bad`, lines that are not joint states are skipped, and counted in [`JointStates::losses`].
+    ///
+    /// # Errors
+    /// As [`JointStates::open`].
+    pub fn open_with(path: impl AsRef<Path>, skip_bad: bool) -> Result<Self> {
         let path = path.as_ref();
+        let mut skipped = SkippedBad::new(skip_bad);
         let failed = |e: std::io::Error| Error::io(path, &e);
         let mut reader = BufReader::new(limits::open(path, MAX_STATES_BYTES).map_err(failed)?);
         let is_json = reader.fill_buf().map_err(failed)?.trim_ascii_start().first() == Some(&b'{');
         let mut states = Self { name: path.display().to_string(), ..Self::default() };
-        let read = if is_json { states.read_ndjson(reader) } else { states.read_csv(reader) };
+        let read =
+            if is_json { states.read_ndjson(reader, &mut skipped) } else { states.read_csv(reader, &mut skipped) };
         read.map_err(|e| e.at(path.display()))?;
+        states.losses = skipped.losses().into_iter().map(|what| format!("{}: {what}", path.display())).collect();
         if states.names.is_empty() {
             return Err(Error::failed("it has no joints; write a CSV under t,<joint>,...").at(path.display()));
         }
@@ -63,7 +75,7 @@ impl JointStates {
         Ok(states)
     }
 
-    fn read_ndjson(&mut self, mut reader: impl std::io::BufRead) -> Result<()> {
+    fn read_ndjson(&mut self, mut reader: impl std::io::BufRead, skipped: &mut SkippedBad) -> Result<()> {
         let mut text = String::new();
         for number in 1.. {
             text.clear();
@@ -74,18 +86,20 @@ impl JointStates {
             if text.trim().is_empty() {
                 continue;
             }
-            let Line { t, joints } = serde_json::from_str(&text).map_err(|e| {
+            let read = serde_json::from_str::<Line>(&text).map_err(|e| {
                 at(format!("{e}; a joint state is one line like {{\"t\":0.5,\"joints\":{{\"wrist\":0.1}}}}"))
-            })?;
-            for (joint, position) in joints {
-                let index = self.joint(joint);
-                self.push(index, t, position).map_err(|e| e.at(format!("line {number}")))?;
-            }
+            });
+            let read = read.and_then(|Line { t, joints }| {
+                let joints: Vec<(usize, f64)> =
+                    joints.into_iter().map(|(joint, position)| (self.joint(joint), position)).collect();
+                self.push(&joints, t).map_err(|e| e.at(format!("line {number}")))
+            });
+            read.or_else(|e| skipped.skip("line", "not a joint state", e))?;
         }
         Ok(())
     }
 
-    fn read_csv(&mut self, reader: impl std::io::Read) -> Result<()> {
+    fn read_csv(&mut self, reader: impl std::io::Read, skipped: &mut SkippedBad) -> Result<()> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(reader);
         let header = reader.headers().map_err(|e| Error::failed(e.to_string()))?.clone();
         let first = header.get(0).map(|name| name.trim_start_matches('\u{feff}')).unwrap_or_default();
@@ -105,27 +119,30 @@ impl JointStates {
         }
         let mut row = csv::StringRecord::new();
         while reader.read_record(&mut row).map_err(|e| Error::failed(e.to_string()))? {
-            let at = || format!("line {}", row.position().map_or(0, csv::Position::line));
-            let number = |column: usize| {
-                let text = row.get(column).unwrap_or_default();
-                text.parse::<f64>()
-                    .map_err(|_| failed!("column `{}` is `{text}`; write a number", &header[column]).at(at()))
-            };
-            if row.len() != header.len() {
-                return Err(failed!(
-                    "{} cells, and the header has {}; complete or delete the row",
-                    row.len(),
-                    header.len()
-                )
-                .at(at()));
-            }
-            let t_s = time.read(&row[0], row[0].parse().ok()).map_err(|e| e.at(at()))?;
-            // An empty cell is a joint without a position.
-            for column in (1..header.len()).filter(|&column| !row[column].is_empty()) {
-                self.push(column - 1, t_s, number(column)?).map_err(|e| e.at(at()))?;
-            }
+            let line = row.position().map_or(0, csv::Position::line);
+            self.read_row(&row, &header, &mut time)
+                .or_else(|e| skipped.skip("row", "not a joint state", e.at(format!("line {line}"))))?;
         }
         Ok(())
+    }
+
+    fn read_row(&mut self, row: &csv::StringRecord, header: &csv::StringRecord, time: &mut TimeColumn) -> Result<()> {
+        if row.len() != header.len() {
+            return Err(failed!(
+                "{} cells, and the header has {}; complete or delete the row",
+                row.len(),
+                header.len()
+            ));
+        }
+        let t_s = time.read(&row[0], row[0].parse().ok())?;
+        let number = |column: usize| {
+            let text = &row[column];
+            let wrong = |_| failed!("column `{}` is `{text}`; write a number", &header[column]);
+            text.parse::<f64>().map(|position| (column - 1, position)).map_err(wrong)
+        };
+        // An empty cell is a joint of which nothing is told.
+        let joints = (1..header.len()).filter(|&column| !row[column].is_empty()).map(number);
+        self.push(&joints.collect::<Result<Vec<_>>>()?, t_s)
     }
 
     /// The index of the joint called `name`, which may be new.
@@ -139,16 +156,20 @@ impl JointStates {
         self.names.len() - 1
     }
 
-    fn push(&mut self, joint: usize, t_s: f64, position: f64) -> Result<()> {
-        let name = &self.names[joint];
-        if !t_s.is_finite() || !position.is_finite() {
-            return Err(failed!("joint `{name}` is at {position} at {t_s} s; write finite numbers"));
+    /// Adds a state of `joints` at `t_s`; all of it or nothing.
+    fn push(&mut self, joints: &[(usize, f64)], t_s: f64) -> Result<()> {
+        for &(joint, position) in joints {
+            let name = &self.names[joint];
+            if !t_s.is_finite() || !position.is_finite() {
+                return Err(failed!("joint `{name}` is at {position} at {t_s} s; write finite numbers"));
+            }
+            if let Some((last, _)) = self.tracks[joint].last().filter(|(last, _)| t_s < last.s) {
+                return Err(failed!("time goes back from {} s to {t_s} s; sort the states by time", last.s));
+            }
         }
-        let track = &mut self.tracks[joint];
-        if let Some((last, _)) = track.last().filter(|(last, _)| t_s < last.s) {
-            return Err(failed!("time goes back from {} s to {t_s} s; sort the states by time", last.s));
+        for &(joint, position) in joints {
+            self.tracks[joint].push((t_s.into(), position));
         }
-        track.push((t_s.into(), position));
         Ok(())
     }
 

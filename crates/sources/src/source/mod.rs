@@ -10,6 +10,7 @@ mod csv;
 mod csv_cells;
 mod csv_file;
 mod csv_header;
+mod csv_named;
 mod joint_states;
 #[cfg(feature = "zenoh")]
 mod limbs;
@@ -24,6 +25,7 @@ pub mod send_rate;
 #[cfg(feature = "serial")]
 mod serial;
 mod simulated;
+mod skipped_bad;
 mod spec;
 mod text;
 mod time_column;
@@ -46,6 +48,7 @@ pub use replay::{Cut, Replay};
 pub use serial::{SerialOptions, SerialSource};
 pub use simulated::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 pub use simulated::{SimulatedSource, Truth, write_recording, write_recording_with_progress};
+pub use skipped_bad::SkippedBad;
 pub use spec::SourceSpec;
 pub use text::{FrameEnd, TextColumns, TextIds, TextOptions, TextPlace, TextSource, TextTime, TimeColumnName};
 pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};

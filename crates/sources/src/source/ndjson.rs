@@ -13,6 +13,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess
 
 use super::Source;
 use super::csv::is_csv_row;
+use super::skipped_bad::SkippedBad;
 use super::unknown_taxels::UnknownTaxels;
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_LINE_BYTES;
@@ -29,6 +30,7 @@ pub struct NdjsonSource {
     line_number: u64,
     taxels: Taxels,
     losses: Vec<String>,
+    skipped: SkippedBad,
 }
 
 somatic_skin::debug_by_name!(NdjsonSource);
@@ -54,6 +56,7 @@ impl NdjsonSource {
             line_number: 0,
             taxels: Taxels { ids, index, last_line, unknown: UnknownTaxels::default() },
             losses: Vec::new(),
+            skipped: SkippedBad::default(),
         }
     }
 
@@ -67,6 +70,13 @@ impl NdjsonSource {
     #[must_use]
     pub fn strict(mut self) -> Self {
         self.taxels.unknown.refused = true;
+        self
+    }
+
+    /// Skips lines that are wrong, and counts them, if `is_asked`; else the first one is an error.
+    #[must_use]
+    pub fn skip_bad(mut self, is_asked: bool) -> Self {
+        self.skipped = SkippedBad::new(is_asked);
         self
     }
 
@@ -94,7 +104,17 @@ impl NdjsonSource {
     }
 
     fn read_frame(&mut self, frame: &mut Frame) -> Result<bool> {
-        let Some(has_newline) = self.read_line()? else { return Ok(false) };
+        while let Some(has_newline) = self.read_line()? {
+            match self.frame_of_line(has_newline, frame) {
+                Ok(has_frame) => return Ok(has_frame),
+                Err((wrong, error)) => self.skipped.skip("line", wrong, error)?,
+            }
+        }
+        Ok(false)
+    }
+
+    /// Reads the current line; or says what is wrong with it, in short and in full. `false` where it is the last and cut short.
+    fn frame_of_line(&mut self, has_newline: bool, frame: &mut Frame) -> Result<bool, (&'static str, Error)> {
         frame.clear();
         frame.values.resize(self.taxels.ids.len(), RawValue::MISSING);
         let line = if self.line_number == 1 {
@@ -116,10 +136,14 @@ impl NdjsonSource {
                 Ok(false)
             }
             Err(_) if is_csv_row(line) => {
-                Err(Error::failed("this is CSV, and `-` reads a line of JSON a frame; use --source csv:-")
-                    .at(format!("line {}", self.line_number)))
+                let error = Error::failed("this is CSV, and `-` reads a line of JSON a frame; use --source csv:-")
+                    .at(format!("line {}", self.line_number));
+                Err(("CSV", error))
             }
-            Err(e) => Err(explained(&e, self.line_number)),
+            Err(e) => {
+                let wrong = if e.is_data() { "not a frame" } else { "not JSON" };
+                Err((wrong, explained(&e, self.line_number)))
+            }
         }
     }
 }
@@ -135,12 +159,15 @@ impl Source for NdjsonSource {
 
     fn notices(&mut self) -> Vec<String> {
         let place = |what: String| format!("{}: line {}: {what}", self.name, self.line_number);
-        self.taxels.unknown.notice().map(place).into_iter().collect()
+        let unknown = self.taxels.unknown.notice().map(place);
+        let skipped = self.skipped.take_notices().into_iter().map(|what| format!("{}: {what}", self.name));
+        unknown.into_iter().chain(skipped).collect()
     }
 
     fn losses(&self) -> Vec<String> {
         let unknown = self.taxels.unknown.loss().map(|what| format!("{}: {what}", self.name));
-        self.losses.iter().cloned().chain(unknown).collect()
+        let skipped = self.skipped.losses().into_iter().map(|what| format!("{}: {what}", self.name));
+        self.losses.iter().cloned().chain(unknown).chain(skipped).collect()
     }
 }
 
@@ -457,6 +484,25 @@ mod tests {
         let words: Vec<String> = frames.iter().map(|f| format!("{} {:?}", f.t_s, f.values)).collect();
         assert_eq!(words, ["0.5 [-1.5, missing, 12]", "1 [faulty, faulty, missing]", "2 [missing, faulty, 0]"]);
         assert!(losses.is_empty());
+    }
+
+    #[test]
+    fn wrong_lines_are_skipped_on_request_and_counted_by_kind() {
+        let text = "{\"t\":0}\n{\"t\":1,\"joints\":{\"a\":null}}\nboot\n{\"t\":2,\"values\":{\"4\":\"x\",\"7\":1}}\n1,2\n\
+            {\"t\":3,\"joints\":{\"a\":NaN}}\n{\"t\":4,\"values\":{\"7\":5}}\n";
+        let mut source = source(text).skip_bad(true);
+        let mut frame = Frame::missing(0.0, 3);
+        let mut found = Vec::new();
+        while source.next_frame(&mut frame).unwrap() {
+            found.push(format!("{} {:?} {}", frame.t_s, frame.values, frame.joints.len()));
+        }
+        assert_eq!(found, ["0 [missing, missing, missing] 0", "4 [missing, 5, missing] 0"]);
+        let said = source.notices();
+        assert!(said.len() == 3 && said[0].starts_with("stdin: a line is skipped: line 2, column "), "{said:?}");
+        let losses = source.losses();
+        assert!(losses[0].starts_with("stdin: 2 lines skipped, not a frame; the first one: line 2"), "{losses:?}");
+        assert!(losses[1].starts_with("stdin: 2 lines skipped, not JSON; the first one: line 3"), "{losses:?}");
+        assert!(losses[2].starts_with("stdin: 1 line skipped, CSV: line 5"), "{losses:?}");
     }
 
     #[test]

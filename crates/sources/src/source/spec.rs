@@ -128,7 +128,7 @@ impl SourceSpec {
             _ if BagName::is_folder(Path::new(text)) => ("ros2-mcap", text),
             _ if ending("csv") => ("csv", text),
             _ if ending("mcap") => ("mcap", text),
-            // Not read either; but the file says what to do.
+            // `.bag` is not read; but the file says what to do.
             _ if ending("db3") || ending("bag") => ("ros2-mcap", text),
             _ if EXPORTS.iter().any(|wanted| ending(wanted)) => ("export", text),
             Some((kind, _)) => {
@@ -191,6 +191,8 @@ impl SourceSpec {
     #[must_use]
     pub fn with_content(self, options: &VendorOptions) -> Self {
         match self {
+            // Named columns are of a table.
+            Self::Csv(path) if options.text.given().is_some() => Self::Csv(path),
             Self::Csv(path) if options.format.or_else(|| VendorSource::detect(&path)).is_some() => Self::Vendor(path),
             Self::Csv(path) if options.grid.is_some() => Self::Vendor(path),
             other => other,
@@ -217,8 +219,14 @@ impl SourceSpec {
         if !matches!(self, Self::Vendor(_)) {
             options.check_unused(matches!(self, Self::Text(_)))?;
         }
-        if let Some(flag) = options.text.given().filter(|_| !matches!(self, Self::Text(_))) {
-            return Err(Error::usage(format!("{flag} is for lines of text; add --source text:PORT, or leave it out")));
+        let is_table = matches!(self, Self::Csv(_) | Self::CsvStdin);
+        if is_table && options.text.frame_end.is_some() {
+            return Err(Error::usage("--frame-end is for lines of text; leave it out here"));
+        }
+        if let Some(flag) = options.text.given().filter(|_| !matches!(self, Self::Text(_)) && !is_table) {
+            return Err(Error::usage(format!(
+                "{flag} is for lines of text and tables; add --source text:PORT or a CSV, or leave it out"
+            )));
         }
         let is_text_stdin = matches!(self, Self::Text(TextPlace::Stdin));
         if options.rate_hz.is_some()
@@ -237,11 +245,13 @@ impl SourceSpec {
     /// It cannot be opened, or this build does not read it; a usage error if a rate is not allowed.
     pub fn open(&self, taxels: &[u32], options: &VendorOptions) -> Result<Box<dyn Source + Send>> {
         self.check_options(options)?;
-        let rate_hz = options.rate_hz;
+        let skip_bad = options.skip_bad;
         match self {
-            Self::Csv(path) => Ok(Box::new(CsvSource::open(path, rate_hz)?)),
-            Self::CsvStdin => Ok(Box::new(CsvSource::from_reader("stdin", std::io::stdin(), None, rate_hz)?)),
-            Self::Stdin => Ok(Box::new(NdjsonSource::stdin(taxels.to_vec()))),
+            Self::Csv(path) => Ok(Box::new(CsvSource::open_for(path, options, taxels)?)),
+            Self::CsvStdin => {
+                Ok(Box::new(CsvSource::from_reader_for("stdin", std::io::stdin(), None, options, taxels)?))
+            }
+            Self::Stdin => Ok(Box::new(NdjsonSource::stdin(taxels.to_vec()).skip_bad(skip_bad))),
             #[cfg(feature = "mcap")]
             Self::Mcap(path) => Ok(Box::new(crate::recording::Reader::open(path)?)),
             #[cfg(not(feature = "mcap"))]

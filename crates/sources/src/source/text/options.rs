@@ -36,7 +36,7 @@ impl TextOptions {
 
 /// Columns by number, counted from 1, or by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Column {
+pub(in crate::source) enum Column {
     Numbers(usize, usize),
     /// All that begin with it, if it ends with `*`.
     Name(String),
@@ -61,7 +61,7 @@ impl Column {
     }
 
     /// Whether it means the column at `index`, from 0, that is called `name`.
-    pub(super) fn is(&self, index: usize, name: Option<&str>) -> bool {
+    pub(in crate::source) fn is(&self, index: usize, name: Option<&str>) -> bool {
         match self {
             Self::Numbers(low, high) => (*low..=*high).contains(&(index + 1)),
             Self::Name(wanted) => name.is_some_and(|name| match wanted.strip_suffix('*') {
@@ -72,7 +72,7 @@ impl Column {
     }
 
     /// As it was written.
-    pub(super) fn word(&self) -> String {
+    pub(in crate::source) fn word(&self) -> String {
         match self {
             Self::Numbers(low, high) if low == high => low.to_string(),
             Self::Numbers(low, high) => format!("{low}-{high}"),
@@ -83,7 +83,7 @@ impl Column {
 
 /// Columns of sensors, such as `2-17`, `1,3,8-10` or `A*`: numbers count from 1, and a name may end with `*`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TextColumns(pub(super) Vec<Column>);
+pub struct TextColumns(pub(in crate::source) Vec<Column>);
 
 impl FromStr for TextColumns {
     type Err = Error;
@@ -169,8 +169,8 @@ pub enum TextTime {
 /// A column of times, by number or name, and its unit where one is given.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimeColumnName {
-    pub(super) column: Column,
-    pub(super) unit: Option<TimeUnit>,
+    pub(in crate::source) column: Column,
+    pub(in crate::source) unit: Option<TimeUnit>,
 }
 
 impl FromStr for TextTime {

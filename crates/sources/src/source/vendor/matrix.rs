@@ -144,6 +144,11 @@ impl Parser for Matrix {
         }
     }
 
+    fn go_on(&mut self) -> bool {
+        self.rate.pass();
+        matches!(self.shape, Some(Shape::Line { .. }))
+    }
+
     fn understood(&self) -> Option<String> {
         self.columns.as_ref().map(|columns| columns.words.clone())
     }

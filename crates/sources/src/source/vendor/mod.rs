@@ -38,6 +38,7 @@ use self::tekscan::Tekscan;
 use self::text::Separator;
 use self::xsensor::Xsensor;
 use super::Source;
+use super::skipped_bad::SkippedBad;
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, Quantity, RawValue};
 
@@ -58,6 +59,7 @@ pub struct VendorSource {
     ended: bool,
     notices: Vec<String>,
     losses: Vec<String>,
+    skipped: SkippedBad,
 }
 
 somatic_skin::debug_by_name!(VendorSource);
@@ -108,6 +110,7 @@ impl VendorSource {
             ended: false,
             notices: Vec::new(),
             losses: Vec::new(),
+            skipped: SkippedBad::new(options.skip_bad),
         };
         let mut first = Frame::missing(0.0, 0);
         if !source.read(&mut first)? {
@@ -162,12 +165,24 @@ impl VendorSource {
                     return Ok(self.cut(&error));
                 }
                 Err(error) => {
-                    self.ended = true;
-                    return Err(with_way_out(&error).at(format!("line {}", self.lines.number())));
+                    let error = with_way_out(&error).at(format!("line {}", self.lines.number()));
+                    if !self.skipped.is_on() || !self.parser.go_on() {
+                        self.ended = true;
+                        return Err(self.unskipped(error));
+                    }
+                    self.skipped.skip("line", "not a frame", error)?;
                 }
             }
         }
         Ok(false)
+    }
+
+    /// `error`, which ends the recording; with why, if it was to be skipped.
+    fn unskipped(&self, error: Error) -> Error {
+        match self.skipped.is_on() {
+            false => error,
+            true => failed!("{error}; --skip-bad skips whole frames of one line, and this is part of more"),
+        }
     }
 
     /// Notes that the last frame is cut short.
@@ -337,10 +352,11 @@ impl Source for VendorSource {
     }
 
     fn notices(&mut self) -> Vec<String> {
+        self.notices.extend(self.skipped.take_notices());
         self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
     }
 
     fn losses(&self) -> Vec<String> {
-        self.losses.iter().map(|loss| format!("{}: {loss}", self.name)).collect()
+        self.losses.iter().cloned().chain(self.skipped.losses()).map(|loss| format!("{}: {loss}", self.name)).collect()
     }
 }

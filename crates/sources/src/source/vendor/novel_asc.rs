@@ -134,6 +134,11 @@ impl Parser for NovelAsc {
         Ok(false)
     }
 
+    fn go_on(&mut self) -> bool {
+        self.rate.pass();
+        self.place == Place::Table
+    }
+
     fn layout(&self) -> Layout {
         let (mut panels, mut start, mut shift) = (Vec::new(), 0, 0_u32);
         for (name, numbers) in self.panels() {

@@ -23,6 +23,8 @@ pub struct VendorOptions {
     pub unit: Option<UnitOfP>,
     /// A table of the sensors' places, for pedar: `id,x,y`, with `area` and `link` (`left`, `right`) where they are known.
     pub layout: Option<PathBuf>,
+    /// Whether lines, rows and messages of files that are wrong are skipped and counted.
+    pub skip_bad: bool,
     /// How lines of text are written, where that is not to be found out.
     pub text: TextOptions,
 }

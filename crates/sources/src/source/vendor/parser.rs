@@ -18,6 +18,12 @@ pub(super) trait Parser: Send {
     /// The last frame is incomplete.
     fn end(&mut self, to: &mut Frame) -> Result<bool>;
 
+    /// Goes on after a line that is not what it should be, as if it were not there; its frame counts for the times that a rate
+    /// gives. `false` if that is not possible, as frames are of several lines.
+    fn go_on(&mut self) -> bool {
+        false
+    }
+
     /// What was understood of its columns, in a line, where that is not plain.
     fn understood(&self) -> Option<String> {
         None
@@ -43,6 +49,11 @@ impl Rate {
             }
             _ => Ok(Self { hz, first: None, frames: 0 }),
         }
+    }
+
+    /// Passes over a frame that is not whole.
+    pub(super) fn pass(&mut self) {
+        self.frames += 1;
     }
 
     /// The time of the next frame, which the recording says is at `t_s`, or says to have the number `number`.
