@@ -43,7 +43,7 @@ fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Res
     let known = match &source_of(text, &["csv", "mcap", "ros2-mcap", "export"], options)? {
         SourceSpec::Mcap(path) => Some(Contents::of_mcap(path, &mut Reader::open(path)?, |_| {})?),
         SourceSpec::Ros2Mcap(bag) => {
-            let mut survey = BagSurvey::of(&bag.path, |_| {})?;
+            let mut survey = BagSurvey::read(&bag.path, |_| {})?;
             survey.topics.retain(|topic| bag.topics.is_empty() || bag.topics.contains(&topic.name));
             return Ok(bag_as_json(&survey));
         }

@@ -41,7 +41,7 @@ impl Contents {
     /// # Errors
     /// The file cannot be read, or is compressed.
     pub fn of_mcap(path: &Path, reader: &mut Reader, progress: impl FnMut(f64)) -> Result<Self> {
-        let survey = Survey::of(reader, progress)?;
+        let survey = Survey::read(reader, progress)?;
         Ok(Self {
             kind: "MCAP",
             bytes: size(path),

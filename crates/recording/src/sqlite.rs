@@ -422,7 +422,7 @@ mod tests {
             }
             assert!(bag.next_message().unwrap().is_none() && bag.losses().is_empty() && bag.progress() == 1.0);
         }
-        let survey = BagSurvey::of(folder.path(), |_| {}).unwrap();
+        let survey = BagSurvey::read(folder.path(), |_| {}).unwrap();
         let told: Vec<_> =
             survey.topics.iter().map(|topic| (topic.name.as_str(), topic.messages, topic.bytes)).collect();
         assert_eq!((survey.files, told), (2, vec![("/camera", 0, 0), ("/joints", 20, 100)]));
