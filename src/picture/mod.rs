@@ -7,6 +7,7 @@ mod drawn;
 mod edges;
 mod labels;
 mod moments;
+mod outlines;
 mod shape;
 mod touch;
 mod view;
@@ -23,9 +24,10 @@ pub use moments::{Moments, Times};
 pub use touch::{MarkedTouch, Moment, TouchPicture};
 pub use view::View;
 
-use self::colour::{PALETTE, PAPER, linear};
+use self::colour::{PALETTE, PAPER, REST, RIM as DARK, linear};
 use self::edges::Lines;
 use self::labels::Labels;
+use self::outlines::Outlines;
 use self::shape::{Dots, RIM};
 use self::view::Arrangement;
 use crate::backend::gpu::raster::{self, Corner, Drawing};
@@ -67,6 +69,8 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Pictu
     let mut drawing = prepared.drawing(linear(PAPER));
     drawing.slices = dots.slices(&shown.coloured(fields), *middle, prepared.usual_radius() > 2.0);
     let mut pixels = raster::draw(&drawing)?;
+    let own = shown.of_taxels(fields, body.taxels.len());
+    prepared.outlines.draw(|taxel| [own[taxel], DARK], *size, &mut pixels)?;
     if options.edges {
         prepared.edges(body).draw(*size, &mut pixels)?;
     }
@@ -88,6 +92,8 @@ struct Prepared {
     middle: DVec3,
     arrangement: Arrangement,
     size: [u32; 2],
+    /// Of taxels under something thin.
+    outlines: Outlines,
     /// Around all that is drawn, m.
     radius_m: f64,
     corners: Vec<Corner>,
@@ -129,7 +135,8 @@ impl Prepared {
         let (arrangement, size) = arranged(&mut labels, key, size, &axes, &looked_at)?;
         let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
         let (corners, faces) = shape::surface(&triangles, middle);
-        Ok(Self { dots, views, middle, arrangement, size, radius_m, corners, faces })
+        let outlines = Outlines::new(body, &dots, &views, &arrangement, middle);
+        Ok(Self { dots, views, middle, arrangement, size, outlines, radius_m, corners, faces })
     }
 
     /// The lines between neighbouring taxels.
@@ -229,6 +236,15 @@ impl FieldColours {
 
     fn coloured<'a>(&self, fields: &'a [Field]) -> Vec<(&'a Field, [u8; 3])> {
         self.fields.iter().zip(&self.colours).map(|(&index, &colour)| (&fields[index], PALETTE[colour])).collect()
+    }
+
+    /// By taxel of `count`, the colour of the first field that has it.
+    fn of_taxels(&self, fields: &[Field], count: usize) -> Vec<[u8; 3]> {
+        let mut colours = vec![REST; count];
+        for (field, colour) in self.coloured(fields).into_iter().rev() {
+            field.members.iter().for_each(|member| colours[member.taxel] = colour);
+        }
+        colours
     }
 
     /// The legend's entries.

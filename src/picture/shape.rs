@@ -76,6 +76,11 @@ impl Dots {
         Self { places, normals, radii, spacing_m }
     }
 
+    /// Typical distance of neighbours, m.
+    pub(super) fn spacing_m(&self) -> f64 {
+        self.spacing_m
+    }
+
     /// m.
     pub(super) fn mean_radius(&self) -> f64 {
         self.radii.iter().sum::<f64>() / self.radii.len().max(1) as f64

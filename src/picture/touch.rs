@@ -4,7 +4,7 @@ use glam::DVec3;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::colour::{PALETTE, PAPER, linear};
+use super::colour::{PALETTE, PAPER, RIM, linear};
 use super::edges::{Lines, seen};
 use super::labels::{INK, Labels, PlacedId, half_of_id, write_ids};
 use super::{Options, Picture, Prepared, stem};
@@ -99,6 +99,8 @@ impl<'a> TouchPicture<'a> {
         }
         drawing.slices = dots.flat_slices(&taxels, &touched, *middle, usual > 2.0);
         let mut pixels = raster::draw(&drawing)?;
+        let of_taxel = |taxel: usize| [taxels[taxel], touched[taxel].unwrap_or(RIM)];
+        self.prepared.outlines.draw(of_taxel, *size, &mut pixels)?;
         if let Some(lines) = &self.edges {
             lines.draw(*size, &mut pixels)?;
         }

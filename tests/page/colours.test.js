@@ -128,6 +128,19 @@ test("colours that are used together differ, whatever cones one has", () => {
   assert.ok(apart([200, 80, 60], [120, 125, 40], BLINDNESS.none) > LEAST);
 });
 
+test("sensors of fig. 6, from black to red, are lighter the harder they are pressed, whatever cones one has", () => {
+  const figures = readFileSync(new URL("../../src/experiments/figures.rs", import.meta.url), "utf8");
+  assert.match(figures, /let colour = \[\(255\.0 \* signal\)\.round\(\) as u8, 0, 0\];/);
+  const lightness = (colour, matrix) => oklab(colour, matrix)[0];
+  for (const [name, matrix] of Object.entries(BLINDNESS))
+    for (const third of [0, 1, 2]) {
+      const [low, high] = [third, third + 1].map((part) => lightness([85 * part, 0, 0], matrix));
+      assert.ok(high - low >= LEAST, `${name}: from ${low.toFixed(3)} to ${high.toFixed(3)}`);
+    }
+  // A colour without the light that they see would not do.
+  assert.ok(lightness([0, 0, 85], BLINDNESS.none) - lightness([0, 0, 70], BLINDNESS.none) < LEAST);
+});
+
 /** What lies over each other on the body, and on the timeline. A diamond and a mark differ by their form, too. */
 const MARKS = {
   "on the body": ["measure", ...PALETTE.slice(0, TOGETHER).map((colour) => [...colour, 1])],
