@@ -55,6 +55,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
         "touches.test.js",
         "self_contacts.test.js",
         "hidden.test.js",
+        "pair.test.js",
         "situations.test.js",
         "tools.test.js",
     ])

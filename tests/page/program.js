@@ -28,9 +28,10 @@ export async function overlay(context) {
   if (!WEB) return;
   await context.route(/^http:.*\/([\w]+\.(js|css))?$/, async (route) => {
     const { origin, pathname } = new URL(route.request().url());
-    const path = join(WEB, pathname === "/" ? "index.html" : pathname);
+    const name = pathname.split("/").pop();
+    const path = join(WEB, name || "index.html");
     if (!existsSync(path)) return route.continue();
-    if (pathname !== "/") {
+    if (name) {
       // What another page asks for is the program's to refuse.
       const isOwn = route.request().frame().url().startsWith(origin);
       return isOwn ? route.fulfill({ path }) : route.continue();

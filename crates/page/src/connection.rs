@@ -4,8 +4,7 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use super::guard::Hosts;
-use super::http::{Decision, LATE, MAX_HEAD_BYTES, decide, file_answer, refusal, upgrade_answer};
+use super::http::{Decision, LATE, MAX_HEAD_BYTES, Site, decide, file_answer, refusal, upgrade_answer};
 use super::socket::{CloseReason, Received, Socket, accept_key, discard, end_sending};
 use super::viewer::Viewer;
 use super::wake::Interest;
@@ -35,8 +34,8 @@ enum State {
     Head(TcpStream, Vec<u8>),
     /// The answer, and how much of it has been sent; what comes then.
     Answer(TcpStream, Vec<u8>, usize, Then),
-    /// A WebSocket that has not said hello.
-    Greeting(Box<Socket>),
+    /// A WebSocket that has not said hello, and whether it is of the second of two pages.
+    Greeting(Box<Socket>, bool),
     /// A viewer.
     Viewing(Box<Socket>, Box<Viewer>),
     /// A WebSocket whose last words are being sent.
@@ -49,8 +48,8 @@ enum State {
 #[derive(Debug)]
 enum Then {
     End,
-    /// A WebSocket, which begins with these bytes.
-    Socket(Vec<u8>),
+    /// A WebSocket, which begins with these bytes; whether it is of the second of two pages.
+    Socket(Vec<u8>, bool),
 }
 
 impl Connection {
@@ -67,6 +66,11 @@ impl Connection {
 
     pub(super) fn is_over(&self) -> bool {
         matches!(self.state, State::Over)
+    }
+
+    /// Whether it is a WebSocket of the second of two pages.
+    pub(super) fn is_beside(&self) -> bool {
+        matches!(self.state, State::Greeting(_, true))
     }
 
     /// The viewer that it has become.
@@ -90,7 +94,7 @@ impl Connection {
     /// Whether it has said nothing for so long that others come first.
     pub(super) fn is_idle(&self, now: Instant) -> bool {
         match &self.state {
-            State::Head(..) | State::Greeting(_) | State::Lingering(_) => now - self.since >= IDLE_TIME,
+            State::Head(..) | State::Greeting(..) | State::Lingering(_) => now - self.since >= IDLE_TIME,
             _ => false,
         }
     }
@@ -105,7 +109,7 @@ impl Connection {
     pub(super) fn due_at(&self) -> Option<Instant> {
         match &self.state {
             State::Head(..) | State::Answer(..) => Some(self.since + HEAD_TIME),
-            State::Greeting(_) => Some(self.since + HELLO_TIME),
+            State::Greeting(..) => Some(self.since + HELLO_TIME),
             State::Closing(_) | State::Lingering(_) => Some(self.since + LINGER_TIME),
             State::Viewing(..) | State::Over => None,
         }
@@ -125,7 +129,7 @@ impl Connection {
         match &self.state {
             State::Head(stream, _) | State::Lingering(stream) => Some((stream, read)),
             State::Answer(stream, ..) => Some((stream, Interest { read: false, write: true })),
-            State::Greeting(socket) | State::Viewing(socket, _) => {
+            State::Greeting(socket, _) | State::Viewing(socket, _) => {
                 Some((socket.stream(), Interest { read: true, write: socket.is_blocked() }))
             }
             State::Closing(socket) => Some((socket.stream(), Interest { read: false, write: true })),
@@ -134,14 +138,14 @@ impl Connection {
     }
 
     /// Goes on as far as it can without waiting.
-    pub(super) fn advance(&mut self, hosts: &Hosts, now: Instant) {
+    pub(super) fn advance(&mut self, site: &Site, now: Instant) {
         loop {
             let before = std::mem::discriminant(&self.state);
             self.state = match std::mem::replace(&mut self.state, State::Over) {
-                State::Head(stream, bytes) => read_head(stream, bytes, hosts, now - self.since >= HEAD_TIME),
+                State::Head(stream, bytes) => read_head(stream, bytes, site, now - self.since >= HEAD_TIME),
                 State::Answer(..) if now - self.since >= HEAD_TIME => State::Over,
                 State::Answer(stream, bytes, sent, then) => answer(stream, bytes, sent, then),
-                State::Greeting(mut socket) if now - self.since >= HELLO_TIME => {
+                State::Greeting(mut socket, _) if now - self.since >= HELLO_TIME => {
                     socket.close(CloseReason::Policy, "no hello within 2 s");
                     State::Closing(socket)
                 }
@@ -176,11 +180,11 @@ impl Connection {
 
     /// Takes the messages that have come; whether there may be more. The number per call is limited so that others get their turn.
     pub(super) fn receive(&mut self, mut each: impl FnMut(&mut Self, String)) -> bool {
-        if let State::Greeting(socket) | State::Viewing(socket, _) = &mut self.state {
+        if let State::Greeting(socket, _) | State::Viewing(socket, _) = &mut self.state {
             socket.begin_turn();
         }
         for _ in 0..MESSAGES_AT_ONCE {
-            let (State::Greeting(socket) | State::Viewing(socket, _)) = &mut self.state else { return false };
+            let (State::Greeting(socket, _) | State::Viewing(socket, _)) = &mut self.state else { return false };
             match socket.receive() {
                 Received::Text(text) => each(self, text),
                 Received::Nothing => return socket.has_more(),
@@ -197,7 +201,7 @@ impl Connection {
 
     /// Makes a WebSocket that has said hello a viewer.
     pub(super) fn admit(&mut self, viewer: Viewer) {
-        if let State::Greeting(socket) = std::mem::replace(&mut self.state, State::Over) {
+        if let State::Greeting(socket, _) = std::mem::replace(&mut self.state, State::Over) {
             self.state = State::Viewing(socket, Box::new(viewer));
             self.was_viewer = true;
         }
@@ -206,7 +210,7 @@ impl Connection {
     /// Ends a WebSocket with a reason.
     pub(super) fn close(&mut self, reason: CloseReason, text: &str) {
         self.state = match std::mem::replace(&mut self.state, State::Over) {
-            State::Greeting(mut socket) | State::Viewing(mut socket, _) => {
+            State::Greeting(mut socket, _) | State::Viewing(mut socket, _) => {
                 socket.close(reason, text);
                 self.since = Instant::now();
                 State::Closing(socket)
@@ -225,10 +229,10 @@ impl Connection {
     }
 }
 
-fn read_head(mut stream: TcpStream, mut bytes: Vec<u8>, hosts: &Hosts, is_late: bool) -> State {
+fn read_head(mut stream: TcpStream, mut bytes: Vec<u8>, site: &Site, is_late: bool) -> State {
     let mut piece = [0; 2048];
     loop {
-        let decision = if is_late { LATE } else { decide(&bytes, hosts) };
+        let decision = if is_late { LATE } else { decide(&bytes, site) };
         let (answer, then) = match decision {
             Decision::NeedMore => {
                 let room = piece.len().min(MAX_HEAD_BYTES + 1 - bytes.len());
@@ -241,10 +245,10 @@ fn read_head(mut stream: TcpStream, mut bytes: Vec<u8>, hosts: &Hosts, is_late: 
                 }
                 continue;
             }
-            Decision::Serve { file, with_body } => (file_answer(file, with_body), Then::End),
+            Decision::Serve { file, with_body } => (file_answer(file, with_body, site.is_pair), Then::End),
             Decision::Refuse(status) => (refusal(status), Then::End),
-            Decision::Upgrade { key, head_bytes } => {
-                (upgrade_answer(&accept_key(&key)), Then::Socket(bytes.split_off(head_bytes)))
+            Decision::Upgrade { key, head_bytes, is_beside } => {
+                (upgrade_answer(&accept_key(&key)), Then::Socket(bytes.split_off(head_bytes), is_beside))
             }
         };
         return State::Answer(stream, answer, 0, then);
@@ -262,7 +266,7 @@ fn answer(mut stream: TcpStream, bytes: Vec<u8>, mut sent: usize, then: Then) ->
         }
     }
     match then {
-        Then::Socket(received) => State::Greeting(Box::new(Socket::new(stream, received))),
+        Then::Socket(received, is_beside) => State::Greeting(Box::new(Socket::new(stream, received)), is_beside),
         Then::End => {
             end_sending(&stream);
             State::Lingering(stream)

@@ -10,6 +10,19 @@ pub(super) const MAX_HEAD_BYTES: usize = 8 << 10;
 const MAX_HEADERS: usize = 64;
 /// The path of the WebSocket.
 const SOCKET_PATH: &str = "/socket";
+/// The paths of the second of two pages begin with this.
+const BESIDE: &str = "/beside";
+/// The page that has both in frames.
+pub(super) const PAIR_PATH: &str = "/pair.html";
+
+/// What is served, and to whom.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Site {
+    /// The host names that requests may be for.
+    pub(super) hosts: Hosts,
+    /// Whether there are two pages, which one page of the same site has in frames.
+    pub(super) is_pair: bool,
+}
 
 /// What is to be done about a request.
 #[derive(Debug)]
@@ -29,6 +42,8 @@ pub(super) enum Decision {
         key: String,
         /// Bytes of the head; what follows is of the WebSocket.
         head_bytes: usize,
+        /// Whether it is of the second of two pages.
+        is_beside: bool,
     },
     /// Refuse it with a status.
     Refuse(Status),
@@ -51,7 +66,7 @@ const TOO_LARGE: Status = Status(431, "Request Header Fields Too Large");
 pub(super) const LATE: Decision = Decision::Refuse(TOO_LATE);
 
 /// What is to be done about the request that begins with `bytes`.
-pub(super) fn decide(bytes: &[u8], hosts: &Hosts) -> Decision {
+pub(super) fn decide(bytes: &[u8], site: &Site) -> Decision {
     let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut request = httparse::Request::new(&mut headers);
     let head_bytes = match request.parse(bytes) {
@@ -60,11 +75,11 @@ pub(super) fn decide(bytes: &[u8], hosts: &Hosts) -> Decision {
         Ok(_) | Err(httparse::Error::TooManyHeaders) => return Decision::Refuse(TOO_LARGE),
         Err(_) => return Decision::Refuse(BAD_REQUEST),
     };
-    answer(&request, head_bytes, hosts).unwrap_or_else(Decision::Refuse)
+    answer(&request, head_bytes, site).unwrap_or_else(Decision::Refuse)
 }
 
-fn answer(request: &httparse::Request<'_, '_>, head_bytes: usize, hosts: &Hosts) -> Result<Decision, Status> {
-    let host = hosts.check(&values(request, "host")?).map_err(|refusal| match refusal {
+fn answer(request: &httparse::Request<'_, '_>, head_bytes: usize, site: &Site) -> Result<Decision, Status> {
+    let host = site.hosts.check(&values(request, "host")?).map_err(|refusal| match refusal {
         Refusal::NoHost => BAD_REQUEST,
         _ => MISDIRECTED,
     })?;
@@ -75,6 +90,11 @@ fn answer(request: &httparse::Request<'_, '_>, head_bytes: usize, hosts: &Hosts)
     let has_body = values(request, "content-length")?.iter().any(|length| *length != "0");
     if has_body || !values(request, "transfer-encoding")?.is_empty() {
         return Err(BAD_REQUEST);
+    }
+    let beside = path.strip_prefix(BESIDE).filter(|rest| site.is_pair && rest.starts_with('/'));
+    let (path, is_beside) = (beside.unwrap_or(path), beside.is_some());
+    if path == PAIR_PATH && (is_beside || !site.is_pair) {
+        return Err(NOT_FOUND);
     }
     if path != SOCKET_PATH {
         let file = file(path).ok_or(NOT_FOUND)?;
@@ -93,7 +113,9 @@ fn answer(request: &httparse::Request<'_, '_>, head_bytes: usize, hosts: &Hosts)
     }
     match values(request, "sec-websocket-key")?[..] {
         // Sixteen bytes in base64.
-        [key] if key.len() == 24 && key.ends_with("==") => Ok(Decision::Upgrade { key: key.to_owned(), head_bytes }),
+        [key] if key.len() == 24 && key.ends_with("==") => {
+            Ok(Decision::Upgrade { key: key.to_owned(), head_bytes, is_beside })
+        }
         _ => Err(BAD_REQUEST),
     }
 }
@@ -104,17 +126,24 @@ fn values<'a>(request: &httparse::Request<'_, 'a>, name: &str) -> Result<Vec<&'a
     named.map(|header| std::str::from_utf8(header.value).map_err(|_| BAD_REQUEST)).collect()
 }
 
-/// What every answer says: nothing from elsewhere, nothing inline, nowhere framed, nothing kept.
-const SECURITY: &str = "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; connect-src \
-                        'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n\
-                        X-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\nCache-Control: no-store\r\n";
+/// What every answer says: nothing from elsewhere, nothing inline, nothing kept, and only two pages of a site in frames, in a
+/// page of the same site.
+fn security(is_pair: bool) -> String {
+    let frames = if is_pair { "frame-ancestors 'self'; frame-src 'self'" } else { "frame-ancestors 'none'" };
+    format!(
+        "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src \
+         'self' data:; {frames}; base-uri 'none'; form-action 'none'\r\nX-Content-Type-Options: nosniff\r\n\
+         Referrer-Policy: no-referrer\r\nCache-Control: no-store\r\n"
+    )
+}
 
-/// The answer that sends `file`.
-pub(super) fn file_answer(file: &PageFile, with_body: bool) -> Vec<u8> {
+/// The answer that sends `file`, of two pages if `is_pair`.
+pub(super) fn file_answer(file: &PageFile, with_body: bool, is_pair: bool) -> Vec<u8> {
     let head = format!(
-        "HTTP/1.1 200 OK\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n{SECURITY}\r\n",
+        "HTTP/1.1 200 OK\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n{}\r\n",
         file.media_type,
-        file.bytes.len()
+        file.bytes.len(),
+        security(is_pair)
     );
     let mut answer = head.into_bytes();
     if with_body {
@@ -130,14 +159,16 @@ pub(super) fn refusal(Status(code, reason): Status) -> Vec<u8> {
         426 => "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n",
         _ => "",
     };
-    format!("HTTP/1.1 {code} {reason}\r\nContent-Length: 0\r\nConnection: close\r\n{more}{SECURITY}\r\n").into_bytes()
+    let security = security(false);
+    format!("HTTP/1.1 {code} {reason}\r\nContent-Length: 0\r\nConnection: close\r\n{more}{security}\r\n").into_bytes()
 }
 
 /// The answer after which the connection is a WebSocket; `accept` is made of the client's key.
 pub(super) fn upgrade_answer(accept: &str) -> Vec<u8> {
+    let security = security(false);
     format!(
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
-         Sec-WebSocket-Accept: {accept}\r\n{SECURITY}\r\n"
+         Sec-WebSocket-Accept: {accept}\r\n{security}\r\n"
     )
     .into_bytes()
 }
@@ -147,7 +178,11 @@ mod tests {
     use super::*;
 
     fn status(bytes: &[u8]) -> u16 {
-        match decide(bytes, &Hosts::default()) {
+        status_of(bytes, &Site::default())
+    }
+
+    fn status_of(bytes: &[u8], site: &Site) -> u16 {
+        match decide(bytes, site) {
             Decision::NeedMore => 0,
             Decision::Serve { .. } => 200,
             Decision::Upgrade { .. } => 101,
@@ -188,8 +223,41 @@ mod tests {
     #[test]
     fn the_head_of_an_upgrade_ends_where_the_socket_begins() {
         let bytes = [UPGRADE.as_bytes(), b"\x81\x80abcd"].concat();
-        let Decision::Upgrade { head_bytes, key } = decide(&bytes, &Hosts::default()) else { panic!("refused") };
-        assert_eq!((head_bytes, key.as_str()), (UPGRADE.len(), "dGhlIHNhbXBsZSBub25jZQ=="));
+        let Decision::Upgrade { head_bytes, key, is_beside } = decide(&bytes, &Site::default()) else {
+            panic!("refused")
+        };
+        assert_eq!((head_bytes, key.as_str(), is_beside), (UPGRADE.len(), "dGhlIHNhbXBsZSBub25jZQ==", false));
+    }
+
+    #[test]
+    fn only_a_pair_has_a_second_page_and_frames() {
+        let (alone, pair) = (Site::default(), Site { is_pair: true, ..Site::default() });
+        let get = |path: &str| format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        for (path, of_pair) in [
+            ("/pair.html", 200),
+            ("/beside/", 200),
+            ("/beside/main.js", 200),
+            ("/beside/pair.html", 404),
+            ("/beside", 404),
+            ("/besides/", 404),
+            ("/beside/beside/", 404),
+        ] {
+            assert_eq!(status_of(get(path).as_bytes(), &alone), 404, "{path}");
+            assert_eq!(status_of(get(path).as_bytes(), &pair), of_pair, "{path}");
+        }
+        assert_eq!(status_of(get("/").as_bytes(), &pair), 200);
+        let beside = UPGRADE.replacen("/socket", "/beside/socket", 1);
+        assert_eq!(status_of(beside.as_bytes(), &alone), 404);
+        for (bytes, expected) in [(UPGRADE, false), (beside.as_str(), true)] {
+            let Decision::Upgrade { is_beside, .. } = decide(bytes.as_bytes(), &pair) else { panic!("refused") };
+            assert_eq!(is_beside, expected);
+        }
+        // Another site's page is refused as for one page alone.
+        let foreign = beside.replacen("Origin: http://localhost", "Origin: http://evil.example", 1);
+        assert_eq!(status_of(foreign.as_bytes(), &pair), 403);
+        let file = PageFile { path: "/a.js", media_type: "text/javascript", bytes: b"let a;" };
+        let text = String::from_utf8(file_answer(&file, true, true)).unwrap();
+        assert!(text.contains("default-src 'none'") && text.contains("frame-ancestors 'self'; frame-src 'self'"));
     }
 
     #[test]
@@ -211,7 +279,12 @@ mod tests {
     #[test]
     fn every_answer_carries_the_security_headers() {
         let file = PageFile { path: "/a.js", media_type: "text/javascript", bytes: b"let a;" };
-        let answers = [file_answer(&file, true), file_answer(&file, false), refusal(NOT_FOUND), upgrade_answer("x")];
+        let answers = [
+            file_answer(&file, true, false),
+            file_answer(&file, false, false),
+            refusal(NOT_FOUND),
+            upgrade_answer("x"),
+        ];
         for answer in &answers {
             let text = std::str::from_utf8(answer).unwrap();
             for header in ["default-src 'none'", "frame-ancestors 'none'", "nosniff", "no-referrer", "no-store"] {

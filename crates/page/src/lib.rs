@@ -11,6 +11,7 @@ mod answers;
 mod connection;
 mod contacts;
 mod current;
+mod door;
 mod encode;
 mod exchange;
 mod files;

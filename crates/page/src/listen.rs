@@ -81,13 +81,13 @@ impl Listen {
         }
     }
 
-    /// The address of the page of a server that listens at `bound`.
-    pub(super) fn url(&self, bound: SocketAddr, token: &str) -> String {
+    /// The address of the page at `path` of a server that listens at `bound`.
+    pub(super) fn url(&self, bound: SocketAddr, path: &str, token: &str) -> String {
         let host = match self.allow_hosts.first().filter(|_| self.is_open_to_others()) {
             Some(name) => format!("{name}:{}", bound.port()),
             None => bound.to_string(),
         };
-        format!("http://{host}/#token={token}")
+        format!("http://{host}{path}#token={token}")
     }
 }
 
@@ -101,7 +101,7 @@ mod tests {
         assert!(Listen::new(Some("0.0.0.0:0"), &[]).unwrap_err().is_usage());
         let open = Listen::new(Some("0.0.0.0:0"), &robot).unwrap();
         assert!(open.is_open_to_others());
-        assert_eq!(open.url(([0, 0, 0, 0], 80).into(), "ab"), "http://robot.lan:80/#token=ab");
+        assert_eq!(open.url(([0, 0, 0, 0], 80).into(), "/", "ab"), "http://robot.lan:80/#token=ab");
         for address in ["127.0.0.1:0", "[::1]:0", "localhost:0"] {
             assert!(!Listen::new(Some(address), &[]).unwrap().is_open_to_others());
         }
@@ -117,7 +117,7 @@ mod tests {
         let (first, second) = (listen.bind().unwrap(), listen.bind().unwrap());
         let [first, second] = [first, second].map(|bound| bound.local_addr().unwrap());
         assert!(first.port() >= PORT && second.port() > first.port() && first.ip().is_loopback());
-        assert_eq!(listen.url(first, "ab"), format!("http://127.0.0.1:{}/#token=ab", first.port()));
+        assert_eq!(listen.url(first, "/", "ab"), format!("http://127.0.0.1:{}/#token=ab", first.port()));
         let taken = TcpListener::bind("127.0.0.1:0").unwrap();
         let text = taken.local_addr().unwrap().to_string();
         let error = Listen::new(Some(&text), &[]).unwrap().bind().unwrap_err().to_string();

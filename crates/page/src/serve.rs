@@ -1,7 +1,7 @@
 //! What the server's thread does: connections in, frames out.
 
 use std::io::ErrorKind;
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{SyncSender, TrySendError};
@@ -10,8 +10,10 @@ use std::time::{Duration, Instant};
 use super::answers::answer_without_player;
 use super::connection::Connection;
 use super::current::Current;
+use super::door::Door;
 use super::exchange::{Exchange, Payload, ViewerId, WAITING_ROWS};
-use super::guard::{Hosts, is_token};
+use super::guard::is_token;
+use super::http::Site;
 use super::message::{Message, Request, parse};
 use super::scene::PageScene;
 use super::series::{Series, Trail};
@@ -37,8 +39,8 @@ const ACCEPT_PERIOD: Duration = Duration::from_millis(50);
 /// The server's thread.
 #[derive(Debug)]
 pub(super) struct Serving {
-    listener: TcpListener,
-    hosts: Hosts,
+    door: Door,
+    site: Site,
     token: String,
     /// Names this start of the server.
     run: String,
@@ -73,8 +75,7 @@ struct Content {
 impl Serving {
     /// Serves `scene` to who has the first of `secrets`; the second names this run.
     pub(super) fn new(
-        listener: TcpListener,
-        hosts: Hosts,
+        (door, site): (Door, Site),
         (token, run): (String, String),
         mut scene: PageScene,
         exchange: Arc<Exchange>,
@@ -93,8 +94,8 @@ impl Serving {
         };
         let (connections, next) = (Vec::with_capacity(MAX_CONNECTIONS), None);
         Self {
-            listener,
-            hosts,
+            door,
+            site,
             token,
             run,
             exchange,
@@ -118,8 +119,9 @@ impl Serving {
             self.take_news();
             self.pass_on_replies();
             self.has_more = false;
+            self.connections.iter_mut().for_each(|(_, connection)| connection.advance(&self.site, now));
+            self.hand_on();
             for index in 0..self.connections.len() {
-                self.connections[index].1.advance(&self.hosts, now);
                 self.receive(index, now);
                 self.send(index, now);
             }
@@ -131,19 +133,20 @@ impl Serving {
         }
         for (_, connection) in &mut self.connections {
             connection.close(CloseReason::GoingAway, "the run has ended");
-            connection.advance(&self.hosts, Instant::now());
+            connection.advance(&self.site, Instant::now());
         }
     }
 
     fn wait(&self, waits: &Waits, now: Instant) {
         let published = self.content.current.snapshot().published;
         let accepts = self.next.is_none() && !self.is_full;
-        let mut due = (!accepts).then_some(now + ACCEPT_PERIOD);
+        let listener = self.door.listener();
+        let mut due = (listener.is_some() && !accepts).then_some(now + ACCEPT_PERIOD);
         for (_, connection) in &self.connections {
             due = [due, connection.due_at(), connection.taxel_due_at(published)].into_iter().flatten().min();
         }
         let most = if self.has_more { Some(Duration::ZERO) } else { due.map(|due| due.saturating_duration_since(now)) };
-        let listener = accepts.then_some(&self.listener);
+        let listener = listener.filter(|_| accepts);
         let sockets = self.connections.iter().filter_map(|(_, connection)| connection.interest());
         waits.wait(self.exchange.waker(), listener, sockets, most);
     }
@@ -151,9 +154,17 @@ impl Serving {
     /// Takes new connections. Where there is no room, one that says nothing goes; where all are viewers, the new one.
     fn accept(&mut self, now: Instant) {
         self.is_full = false;
+        while let Some(connection) = self.door.handed() {
+            // One that finds no room is closed.
+            if self.connections.len() < MAX_CONNECTIONS {
+                self.next_id += 1;
+                self.connections.push((ViewerId(self.next_id), connection));
+            }
+        }
+        let Some(listener) = self.door.listener() else { return };
         for _ in 0..ACCEPTED_AT_ONCE {
             if self.next.is_none() {
-                match self.listener.accept() {
+                match listener.accept() {
                     Ok((stream, _)) => self.next = Some(stream),
                     Err(e) => {
                         self.is_full = e.kind() != ErrorKind::WouldBlock;
@@ -273,6 +284,14 @@ impl Serving {
                 return;
             }
             connection.send();
+        }
+    }
+
+    /// Hands what is of the second of two pages on to its server.
+    fn hand_on(&mut self) {
+        while let Some(index) = self.connections.iter().position(|(_, connection)| self.door.hands_on(connection)) {
+            let (_, connection) = self.connections.remove(index);
+            self.door.hand_on(connection);
         }
     }
 

@@ -1,17 +1,18 @@
 //! `somatic view`: a body, a recording or a scene in a browser.
 
 mod checkpoints;
+mod clock;
 mod explain;
 mod peaks;
 mod player;
+mod ready;
 mod recorded;
 mod recording;
 mod shared;
 mod subject;
 mod timeline;
 
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
@@ -22,22 +23,15 @@ use somatic::internal::output::PrivateFile;
 use somatic::internal::page::{EventKind, Mode, PageInfo, PageInput, PageScene, Publisher};
 use somatic::internal::setup::Setup;
 use somatic::page::{Listen, Server};
-use somatic::source::SourceSpec;
 use somatic::{BackendKind, Body, ChosenBackend, Engine, Error, Options, Result};
 
-use self::checkpoints::Checkpoints;
-use self::explain::Explainer;
-use self::peaks::Peaks;
-use self::player::Player;
-use self::recorded::{Differences, Recorded};
-use self::recording::Recording;
-use self::shared::Shared;
+use self::clock::Clock;
+use self::ready::Ready;
 use self::subject::{Subject, subject};
 use super::browser;
 use super::interrupt::stop_soon_on_signal;
-use super::scene::{LIVE, RunFlags, grouped, in_flags, input};
+use super::scene::{LIVE, RunFlags, grouped, in_flags};
 use super::stdio::{DONE, LOST, say};
-use super::tradeoff::settled;
 use super::words;
 
 const EXAMPLES: &str = "\
@@ -46,6 +40,7 @@ Examples:
   somatic view robot.glb                          a body at rest
   somatic view touch.mcap                         a recording, with the body in it
   somatic view touch.csv --body robot.glb --calibration robot.toml
+  somatic view before.mcap --beside after.mcap    two recordings, with one clock
   somatic view robot.scene.toml --outputs touches,total
   somatic view touch.mcap --listen 127.0.0.1:8000
   ssh -L 7879:127.0.0.1:7879 robot                then open the address here, as a tunnel
@@ -64,6 +59,10 @@ pub(super) struct Arguments {
     /// .asf, .lst, .asc or .txt. A scene or a simulation is a .toml.
     #[arg(value_name = "WHAT")]
     what: Option<String>,
+
+    /// A second recording, shown next to the first with the same clock and flags; both begin together.
+    #[arg(long, value_name = "WHAT")]
+    beside: Option<String>,
 
     #[command(flatten)]
     asked: RunFlags,
@@ -104,6 +103,20 @@ const HIDDEN: [&str; 12] = [
     "board-rate",
 ];
 
+impl Arguments {
+    /// What is shown beside the first, with the same flags.
+    fn second(&self) -> Result<Option<Subject>> {
+        let Some(beside) = &self.beside else { return Ok(None) };
+        let mut asked = self.asked.clone();
+        // The first may be a body with the recording in --source; the second is then of the same body.
+        if !asked.sources.is_empty() && !self.what.as_deref().is_some_and(|what| what.ends_with(".toml")) {
+            asked.body = asked.body.or_else(|| self.what.clone());
+        }
+        asked.sources.clear();
+        subject(Some(beside), &asked).map(Some)
+    }
+}
+
 /// How a page is served and opened.
 struct Opening<'a> {
     arguments: &'a Arguments,
@@ -130,9 +143,15 @@ pub(super) fn view(arguments: &Arguments) -> Result<u8> {
     let listen = Listen::new(arguments.listen.as_deref(), &arguments.asked.allow_hosts)?;
     let lasts = arguments.lasts.as_deref().map(words::seconds).transpose()?;
     let opening = Opening { arguments, listen, until: lasts.map(|span| Instant::now() + span) };
-    match subject(arguments.what.as_deref(), &arguments.asked)? {
-        Subject::Body(body) => opening.body(&body),
-        Subject::Recording(asked) => opening.recording(&asked).map_err(in_flags),
+    match (subject(arguments.what.as_deref(), asked)?, arguments.second()?) {
+        (Subject::Body(body), None) => opening.body(&body),
+        (Subject::Recording(asked), None) => opening.recording(&asked).map_err(in_flags),
+        (Subject::Recording(first), Some(Subject::Recording(second))) => {
+            opening.pair([&first, &second]).map_err(in_flags)
+        }
+        (Subject::Body(_), Some(_)) | (_, Some(Subject::Body(_))) => {
+            Err(Error::usage("two recordings are shown side by side, and a body at rest is none").at("--beside"))
+        }
     }
 }
 
@@ -148,16 +167,21 @@ impl Opening<'_> {
     /// Serves `scene` and says where.
     fn start(&self, scene: PageScene) -> Result<Opened> {
         let (server, publisher) = Server::start(&self.listen, scene)?;
+        let handed_over = self.announce(&server);
+        Ok(Opened { server, publisher, _handed_over: handed_over })
+    }
+
+    /// Says where `server` is, and gives it to a browser: through this file, if asked for.
+    fn announce(&self, server: &Server) -> Option<PrivateFile> {
         // A closed standard error is not a reason to stop.
         somatic::internal::plain::announce(&server.announcement());
-        let handed_over = match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
+        match self.arguments.open.then(|| browser::open(&server.url())).transpose() {
             Ok(file) => file,
             Err(error) => {
                 say(&format!("{error}; open the address yourself"));
                 None
             }
-        };
-        Ok(Opened { server, publisher, _handed_over: handed_over })
+        }
     }
 
     /// A body at rest.
@@ -195,7 +219,7 @@ impl Opening<'_> {
         let looked_at = body.clone();
         // A large body takes a while, in which the page is there already. The thread ends with this one alone.
         std::thread::spawn(move || sender.send(findings(&looked_at)));
-        while !stop.load(Ordering::Relaxed) && self.until.is_none_or(|until| Instant::now() < until) {
+        while !self.is_over(&stop) {
             for finding in found.try_recv().into_iter().flatten() {
                 opened.publisher.event(EventKind::Notice, 0.0, None, finding);
             }
@@ -207,63 +231,46 @@ impl Opening<'_> {
 
     /// A recording, from its first frame on.
     fn recording(&self, asked: &Setup) -> Result<u8> {
-        let input = input(asked)?;
-        if !input.is_recording() {
-            return Err(Error::usage("a view shows recordings; show live frames with `somatic run --sink page`")
-                .at(&input.name));
-        }
-        let body = Arc::new(input.body(asked)?);
         let stop = stop_soon_on_signal()?;
-        let source = input.open_posed(&body, asked)?;
-        let Some(recording) = Recording::read(source, &stop, asked.quiet)? else { return Ok(DONE) };
-        let recording = Arc::new(recording);
-        let settled = settled(asked, Some(&input), &body, recording::CHUNK)?;
-        let mut engine = Engine::new(&body, settled.options.clone())?;
-        engine.keep_touch_taxels(true);
-        engine.set_channels(&recording.taxels).map_err(|e| e.at("header").at(&input.name))?;
-        if !asked.quiet {
-            engine.remarks().iter().for_each(|remark| say(remark));
-        }
-        let ChosenBackend { name, device, reason, .. } = engine.backend();
-        let scene = PageScene::new(
-            &body,
-            engine.plan(),
-            &PageInfo {
-                source: &input.name,
-                mode: recording.mode(),
-                backend: [name, &device, settled.why.as_deref().unwrap_or(reason)],
-                taxels: &recording.taxels,
-                wiring: None,
-                recorded_max: recording.largest_pressure(&engine),
-            },
-        );
-        // The same backend for all engines, so that they have the same bits.
-        let options = settled.options.backend(name.parse()?);
-        let checkpoints = Arc::new(Checkpoints::new(&mut engine)?);
-        let Opened { mut server, mut publisher, _handed_over } = self.start(scene)?;
-        let recorded = match input.spec {
-            Some(SourceSpec::Mcap(ref path)) => Recorded::open(path, engine.plan())?,
-            _ => None,
+        let Some(ready) = Ready::read(asked, &stop)? else { return Ok(DONE) };
+        let clock = Clock::new(1, asked.playback_speed.unwrap_or(1.0), ready.is_bundled()).remove(0);
+        let Opened { server, publisher, _handed_over } = self.start(ready.scene(ready.largest_pressure()))?;
+        let is_lost = ready.play(server, publisher, clock, || self.is_over(&stop))?;
+        Ok(if is_lost { LOST } else { DONE })
+    }
+
+    /// Two recordings side by side, by one clock.
+    fn pair(&self, asked: [&Setup; 2]) -> Result<u8> {
+        let stop = stop_soon_on_signal()?;
+        let Some(first) = Ready::read(asked[0], &stop)? else { return Ok(DONE) };
+        let Some(second) = Ready::read(asked[1], &stop)? else { return Ok(DONE) };
+        // One colour is one pressure in both.
+        let largest = [&first, &second].map(Ready::largest_pressure);
+        let is_same = first.quantity() == second.quantity();
+        let largest = if is_same { [largest.into_iter().flatten().reduce(f64::max); 2] } else { largest };
+        let scenes = [first.scene(largest[0]), second.scene(largest[1])];
+        let [(server, publisher), (beside, published_beside)] = Server::start_pair(&self.listen, scenes)?;
+        let _handed_over = self.announce(&server);
+        let mut clocks = Clock::new(2, asked[0].playback_speed.unwrap_or(1.0), false).into_iter();
+        let (Some(clock), Some(clock_beside)) = (clocks.next(), clocks.next()) else { return Ok(LOST) };
+        // Where one fails, both end.
+        let failed = AtomicBool::new(false);
+        let play = |ready: Ready, server, publisher, clock| {
+            let is_over = || failed.load(Ordering::Relaxed) || self.is_over(&stop);
+            let played = ready.play(server, publisher, clock, is_over);
+            failed.store(true, Ordering::Relaxed);
+            played
         };
-        let shared = Shared {
-            peaks: Arc::new(Peaks::new(&body, &recording)),
-            body,
-            options,
-            recording: Arc::clone(&recording),
-            checkpoints,
-            differences: Arc::new(Differences::default()),
-            replies: server.replies(),
-        };
-        let timeline = timeline::start(shared.clone(), recorded, publisher.recording_events());
-        let explainer = Explainer::start(shared.clone());
-        let player = Player::new(engine, shared, publisher, explainer, timeline);
-        let speed = asked.playback_speed.unwrap_or(1.0);
-        let requests = server.requests().ok_or_else(|| Error::failed("the server has no requests"))?;
-        let is_ended = || stop.load(Ordering::Relaxed) || self.until.is_some_and(|until| Instant::now() >= until);
-        player.speed(speed).loops(input.is_bundled()).run(&requests, is_ended)?;
-        for loss in &recording.losses {
-            say(&format!("never processed: {loss}"));
-        }
-        Ok(if recording.losses.is_empty() { DONE } else { LOST })
+        let (first_lost, second_lost) = std::thread::scope(|threads| {
+            let other = threads.spawn(|| play(second, beside, published_beside, clock_beside));
+            let first_lost = play(first, server, publisher, clock);
+            (first_lost, other.join())
+        });
+        let second_lost = second_lost.map_err(|_| Error::failed("the second recording's thread has failed"))?;
+        Ok(if first_lost? | second_lost? { LOST } else { DONE })
+    }
+
+    fn is_over(&self, stop: &AtomicBool) -> bool {
+        stop.load(Ordering::Relaxed) || self.until.is_some_and(|until| Instant::now() >= until)
     }
 }

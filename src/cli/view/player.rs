@@ -9,6 +9,7 @@ use somatic::internal::page::{PageInput, Publisher, Request, ViewerId};
 use somatic::{Engine, Result};
 
 use super::super::stdio::say;
+use super::clock::{Clock, State};
 use super::explain::Explainer;
 use super::recording::CHUNK;
 use super::shared::Shared;
@@ -16,6 +17,8 @@ use super::timeline::Timeline;
 
 /// The longest wait for a request, so that Ctrl-C is seen.
 const MAX_WAIT: Duration = Duration::from_millis(50);
+/// Times since the beginning of a recording are rounded by less, s.
+const ROUNDING_S: f64 = 1e-6;
 /// Requests that are answered before the next frame, and before a look at whether to end.
 const REQUESTS_AT_ONCE: usize = 256;
 
@@ -30,14 +33,9 @@ pub(super) struct Player {
     done: usize,
     /// The frame that is to be shown, if it takes more than a call.
     target: Option<usize>,
-    playing: bool,
-    /// Whether it begins to play with the first viewer.
-    waits: bool,
-    /// Whether it begins again at its end.
-    loops: bool,
-    speed: f64,
-    /// A moment, and the recorded time that is due then, s.
-    due: (Instant, f64),
+    clock: Clock,
+    /// What the clock counted when it was last heeded: changes and jumps.
+    heeded: [u64; 2],
 }
 
 impl Player {
@@ -47,34 +45,9 @@ impl Player {
         publisher: Publisher,
         explainer: Explainer,
         timeline: Arc<Timeline>,
+        clock: Clock,
     ) -> Self {
-        let due = (Instant::now(), shared.recording.span_s()[0]);
-        Self {
-            engine,
-            shared,
-            publisher,
-            explainer,
-            timeline,
-            done: 0,
-            target: Some(0),
-            playing: false,
-            waits: true,
-            loops: false,
-            speed: 1.0,
-            due,
-        }
-    }
-
-    /// At `speed` times the recorded speed.
-    pub(super) fn speed(mut self, speed: f64) -> Self {
-        self.speed = speed;
-        self
-    }
-
-    /// Begins again at its end if `loops`.
-    pub(super) fn loops(mut self, loops: bool) -> Self {
-        self.loops = loops;
-        self
+        Self { engine, shared, publisher, explainer, timeline, done: 0, target: Some(0), clock, heeded: [0; 2] }
     }
 
     /// Plays and answers `requests` until `is_ended`.
@@ -94,6 +67,7 @@ impl Player {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
+            self.heed();
             match self.target {
                 Some(index) => self.approach(index)?,
                 None => self.play()?,
@@ -107,50 +81,88 @@ impl Player {
         if self.target.is_some() {
             return Duration::ZERO;
         }
-        let next = self.shared.recording.frames.get(self.done).filter(|_| self.playing);
+        let state = self.clock.state();
+        let next = self.shared.recording.frames.get(self.done).filter(|_| state.playing);
         next.map_or(MAX_WAIT, |frame| {
-            let (since, due_s) = self.due;
-            let left = Duration::try_from_secs_f64((frame.t_s - due_s) / self.speed).unwrap_or_default();
-            left.saturating_sub(since.elapsed()).min(MAX_WAIT)
+            let left_s = (frame.t_s - self.start_s() - state.now_s()) / state.speed;
+            Duration::try_from_secs_f64(left_s).unwrap_or_default().min(MAX_WAIT)
         })
+    }
+
+    fn start_s(&self) -> f64 {
+        self.shared.recording.span_s()[0]
     }
 
     fn answer(&mut self, viewer: ViewerId, request: Request) {
         match request {
             Request::Joined => {
                 self.shared.replies.text(viewer, self.timeline.message(0));
-                if !std::mem::take(&mut self.waits) {
+                if !self.clock.joined() {
                     self.shared.replies.text(viewer, self.status());
-                    return;
                 }
-                self.playing = true;
             }
-            Request::Explain { field } => return self.explainer.explain(viewer, field, self.shown()),
-            Request::History { .. } | Request::Peaks { .. } => return self.explainer.ask(viewer, request),
-            Request::Play => {
-                if self.is_at_end() {
-                    self.target = Some(0);
-                }
-                self.playing = true;
+            Request::Explain { field } => self.explainer.explain(viewer, field, self.shown()),
+            Request::History { .. } | Request::Peaks { .. } => self.explainer.ask(viewer, request),
+            // At the end of all it begins again.
+            Request::Play if self.is_at_end() && self.clock.state().is_at_end() => {
+                self.clock.play(0.0);
+                self.go_to(0);
             }
-            Request::Pause => self.playing = false,
-            Request::Seek { t_s } => self.target = Some(self.shared.recording.index_at(t_s)),
+            Request::Play => self.clock.play(self.at_s()),
+            Request::Pause => self.heeded[1] = self.clock.pause(self.at_s()),
+            Request::Seek { t_s } => self.go_to(self.shared.recording.index_at(t_s)),
             Request::Step { frames } => {
-                self.playing = false;
-                let last = self.shared.recording.frames.len() - 1;
                 let from = self.target.unwrap_or(self.shown());
-                self.target = Some(from.saturating_add_signed(frames as isize).min(last));
+                self.clock.pause(self.at_s());
+                self.go_to(from.saturating_add_signed(frames as isize).min(self.last()));
             }
             Request::Show { frame } => {
-                self.playing = false;
-                let last = self.shared.recording.frames.len() - 1;
-                self.target = Some(usize::try_from(frame).map_or(last, |frame| frame.min(last)));
+                self.clock.pause(self.at_s());
+                self.go_to(usize::try_from(frame).map_or(self.last(), |frame| frame.min(self.last())));
             }
-            Request::Speed { speed } => self.speed = speed,
-            _ => return,
+            Request::Speed { speed } => self.clock.speed(speed, self.at_s()),
+            _ => {}
         }
-        self.restart_clock();
+    }
+
+    /// Heeds what was asked of the clock, here or by another player's viewers, and tells viewers.
+    fn heed(&mut self) {
+        let state = self.clock.state();
+        let [changes, jumps] = self.heeded;
+        if state.changes == changes {
+            return;
+        }
+        if state.jumps != jumps {
+            let index = self.shared.recording.index_at(self.start_s() + state.now_s() + ROUNDING_S);
+            self.target = (self.target.is_some() || index != self.shown()).then_some(index);
+        }
+        self.heeded = [state.changes, state.jumps];
+        if self.target.is_none() {
+            self.clock.at_end(self.is_at_end(), state.jumps);
+        }
         self.shared.replies.all(self.status());
+    }
+
+    /// Shows frame `index` next, and has other players show what they have of its time.
+    fn go_to(&mut self, index: usize) {
+        self.target = Some(index);
+        self.heeded[1] = self.clock.seek(self.shared.recording.frames[index].t_s - self.start_s());
+    }
+
+    fn last(&self) -> usize {
+        self.shared.recording.frames.len() - 1
+    }
+
+    /// The time that is shown, s: that of the clock, but for frames that are late.
+    fn at_s(&self) -> f64 {
+        let frames = &self.shared.recording.frames;
+        let of = |index: usize| frames[index].t_s - self.start_s();
+        if let Some(target) = self.target {
+            return of(target);
+        }
+        let shown_s = of(self.shown());
+        let next_s = if self.is_at_end() { f64::INFINITY } else { of(self.done) };
+        self.clock.state().now_s().min(next_s).max(shown_s)
     }
 
     /// The frame that is shown.
@@ -162,14 +174,10 @@ impl Player {
         self.done == self.shared.recording.frames.len()
     }
 
-    /// Recorded time goes on from the frame that is shown.
-    fn restart_clock(&mut self) {
-        self.due = (Instant::now(), self.shared.recording.frames[self.target.unwrap_or(self.shown())].t_s);
-    }
-
     fn status(&self) -> String {
         let at_end = self.is_at_end() && self.target.is_none();
-        json!({"type": "status", "playing": self.playing, "speed": self.speed, "at_end": at_end}).to_string()
+        let State { playing, speed, .. } = self.clock.state();
+        json!({"type": "status", "playing": playing, "speed": speed, "at_end": at_end}).to_string()
     }
 
     /// Comes nearer to frame `index`, and shows it once it is there.
@@ -186,18 +194,19 @@ impl Player {
         self.done = index + 1;
         self.target = None;
         self.publish(1, started);
-        self.restart_clock();
+        self.clock.is_late(self.at_s());
+        self.clock.at_end(self.is_at_end(), self.heeded[1]);
         self.shared.replies.all(self.status());
         Ok(())
     }
 
     /// Shows what is due.
     fn play(&mut self) -> Result<()> {
-        if !self.playing {
+        let state = self.clock.state();
+        if !state.playing {
             return Ok(());
         }
-        let (since, due_s) = self.due;
-        let now_s = due_s + since.elapsed().as_secs_f64() * self.speed;
+        let now_s = self.start_s() + state.now_s();
         let rest = &self.shared.recording.frames[self.done..];
         let count = rest.iter().take(CHUNK).take_while(|frame| frame.t_s <= now_s).count();
         if count > 0 {
@@ -208,16 +217,9 @@ impl Player {
         }
         if count == CHUNK {
             // So fast that frames are late: slower, not ever later.
-            self.restart_clock();
+            self.clock.is_late(self.at_s());
         }
-        if self.is_at_end() {
-            if self.loops {
-                self.target = Some(0);
-            } else {
-                self.playing = false;
-            }
-            self.shared.replies.all(self.status());
-        }
+        self.clock.at_end(self.is_at_end(), self.heeded[1]);
         Ok(())
     }
 

@@ -18,6 +18,7 @@ import { dot, toWorld } from "./math.js";
 import { Measure } from "./measure.js";
 import { Model } from "./model.js";
 import { Marks } from "./percepts.js";
+import { Paired } from "./paired.js";
 import { Peaks } from "./peaks.js";
 import { Photo } from "./photo.js";
 import { Picker } from "./pick.js";
@@ -133,6 +134,7 @@ function lookAtAll() {
 function moved() {
   view.request();
   address.changed();
+  if (turned) paired.share();
 }
 
 /** @type {import("./math.js").Vec3} */
@@ -142,9 +144,14 @@ const NO_NORMAL = [0, 0, 0];
 let turned = false;
 for (const event of ["pointerdown", "wheel"])
   stage.addEventListener(event, () => (turned = true), { passive: true });
-window.addEventListener("keydown", (event) => {
-  if (/^(Arrow\w+|[0-9f+=-])$/.test(event.key)) turned = true;
-});
+// Before the key acts.
+window.addEventListener(
+  "keydown",
+  (event) => {
+    if (/^(Arrow\w+|[0-9f+=-])$/.test(event.key)) turned = true;
+  },
+  { capture: true },
+);
 
 /** The touch or field whose side was shown last. */
 let shownSide = "";
@@ -178,6 +185,15 @@ function showTouchedSide() {
 }
 
 let framed = "";
+const paired = new Paired(
+  camera,
+  () => framed,
+  () => {
+    turned = true;
+    view.request();
+    address.changed();
+  },
+);
 connection.onScene = () => {
   const { welcome, mesh } = model;
   if (!welcome || !mesh) return;

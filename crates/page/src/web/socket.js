@@ -67,7 +67,11 @@ export class Connection {
   }
 
   open() {
-    const socket = new WebSocket(`ws${location.protocol === "https:" ? "s" : ""}://${location.host}/socket`);
+    // Beside the page: of two pages each has its own.
+    const url = new URL("socket", location.href);
+    url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    url.hash = "";
+    const socket = new WebSocket(url);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     this.toDraw = [];
@@ -113,7 +117,9 @@ export class Connection {
   /** Greys the page where frames are due and none comes. */
   watch() {
     const { model } = this;
-    const due = model.ended === null && (model.welcome?.mode === "live" || model.status.playing);
+    // The shorter of two recordings waits at its end.
+    const plays = model.status.playing && !model.status.at_end;
+    const due = model.ended === null && (model.welcome?.mode === "live" || plays);
     const quiet = performance.now() - this.heard;
     if (model.connection.state === "open" && due && !document.hidden && quiet > SILENT_MS)
       model.setConnection("silent", "", false, new Date(Date.now() - quiet));
