@@ -336,8 +336,11 @@ mod tests {
         database
     }
 
+    /// A message's topic, log time in ns, and bytes.
+    type ReadMessage = (String, u64, Vec<u8>);
+
     /// What is read of `path`: topics, times and bytes; and what is lost.
-    fn read(path: &Path, only: &[&str]) -> Result<(Vec<(String, u64, Vec<u8>)>, Vec<String>)> {
+    fn read(path: &Path, only: &[&str]) -> Result<(Vec<ReadMessage>, Vec<String>)> {
         let mut storage = Storage::open(path)?;
         if !only.is_empty() {
             storage.only(&only.iter().map(|&name| name.to_owned()).collect::<Vec<_>>());
