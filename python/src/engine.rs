@@ -16,7 +16,7 @@ use somatic::{Agreement, Error, Frame, Percepts};
 
 use self::inner::Inner;
 use self::wish::Wish;
-use crate::agreement::told;
+use crate::agreement::agreement_dict;
 use crate::arrays::{Values, poses, time_s, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;

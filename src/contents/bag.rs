@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use crate::FrameTime;
 use crate::recording::{BagSurvey, SurveyedTopic};
 use crate::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
+use crate::signal::FrameTime;
 
 /// What runs read messages of the type `kind` as, if they do.
 pub fn read_as(kind: &str) -> Option<&'static str> {

@@ -5,9 +5,10 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::between_s;
+use crate::error::Result;
 use crate::recording::{Attached, Reader, Rhythm, Survey};
+use crate::signal::Frame;
 use crate::source::{Layout, Source};
-use crate::{Frame, Result};
 
 /// What a recording holds.
 pub struct Contents {

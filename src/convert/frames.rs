@@ -1,9 +1,10 @@
 //! Frames that are copied into a file.
 
+use crate::error::Result;
 use crate::output::OutputPath;
 use crate::recording::Recorder;
+use crate::signal::Frame;
 use crate::source::{CsvFile, Source};
-use crate::{Frame, Result};
 
 /// A file that frames are copied to.
 pub enum FrameFile {

@@ -71,7 +71,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("contents", vec!["error", "percept", "signal", "recording", "source", "robot"]),
         ("convert", vec!["error", "signal", "body", "bundled", "author", "output", "recording", "source"]),
         ("figure", vec!["error", "ink"]),
-        ("plot", vec!["error", "percept", "signal", "body", "field", "engine", "ink", "colours"]),
+        ("plot", vec!["error", "percept", "signal", "body", "field", "scene", "engine", "ink", "colours"]),
         (
             "run",
             vec!["error", "percept", "signal", "body", "engine", "source", "sink", "output", "scene_file", "setup"],

@@ -4,6 +4,8 @@
 //! A taxel that is absent or `null` is missing; `"nan"` and `"inf"` are faulty values. A taxel that the body does not
 //! have is named once, and its values are skipped and counted. Lines are parsed directly into the frame.
 
+mod key;
+
 use std::collections::HashMap;
 use std::fmt;
 use std::io::{BufRead, BufReader, Read as _};
@@ -11,6 +13,7 @@ use std::io::{BufRead, BufReader, Read as _};
 use glam::{DQuat, DVec3};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
+use self::key::{EXAMPLE, Key, KeyVisitor};
 use super::Source;
 use super::csv::is_csv_row;
 use super::skipped_bad::SkippedBad;
@@ -18,9 +21,6 @@ use super::unknown_taxels::UnknownTaxels;
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_LINE_BYTES;
 use crate::signal::{Frame, Pose, RawValue};
-
-/// A frame, for messages.
-const EXAMPLE: &str = "{\"t\":0.5,\"values\":{\"7\":12}}";
 
 /// Frames read from NDJSON.
 pub struct NdjsonSource {
@@ -237,47 +237,6 @@ impl<'de> Visitor<'de> for FrameVisitor<'_> {
             ));
         }
         Ok(())
-    }
-}
-
-#[derive(Clone, Copy)]
-enum Key {
-    Time,
-    Values,
-    Pose,
-    Joints,
-}
-
-impl fmt::Display for Key {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Time => "t",
-            Self::Values => "values",
-            Self::Pose => "pose",
-            Self::Joints => "joints",
-        })
-    }
-}
-
-struct KeyVisitor;
-
-impl Visitor<'_> for KeyVisitor {
-    type Value = Key;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("`t`, `values`, `pose` or `joints`")
-    }
-
-    fn visit_str<E: serde::de::Error>(self, key: &str) -> Result<Key, E> {
-        match key {
-            "t" => Ok(Key::Time),
-            "values" => Ok(Key::Values),
-            "pose" => Ok(Key::Pose),
-            "joints" => Ok(Key::Joints),
-            other => Err(E::custom(format!(
-                "a frame has no `{other}`; its keys are `t`, `values`, `pose` and `joints`, as in {EXAMPLE}: put the sensors under `values`, by taxel id"
-            ))),
-        }
     }
 }
 
