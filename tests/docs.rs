@@ -29,12 +29,20 @@ const RUN_ELSEWHERE: [&str; 15] = [
 ];
 
 /// Commands that take long, and the shorter form that is run for them.
-const SHORTENED: [(&str, &str); 10] = [
+const SHORTENED: [(&str, &str); 12] = [
     // A port of its own, as other tests serve pages, too.
     ("somatic view --for 2s", "somatic view --for 1s --listen 127.0.0.1:0"),
     (
         "somatic view examples/exports/insoles.csv --for 2s",
         "somatic view examples/exports/insoles.csv --for 1s --listen 127.0.0.1:0",
+    ),
+    (
+        "somatic view --outputs touches,total,centroid,orientation --for 2s",
+        "somatic view --outputs touches,total,centroid,orientation --for 1s --listen 127.0.0.1:0",
+    ),
+    (
+        "somatic view before.mcap --beside bodies/touch.csv --for 2s",
+        "somatic view before.mcap --beside bodies/touch.csv --for 1s --listen 127.0.0.1:0",
     ),
     ("somatic tradeoff", "somatic tradeoff --seconds 0.1 --frames 60"),
     (
