@@ -29,7 +29,7 @@ const RUN_ELSEWHERE: [&str; 15] = [
 ];
 
 /// Commands that take long, and the shorter form that is run for them.
-const SHORTENED: [(&str, &str); 12] = [
+const SHORTENED: [(&str, &str); 15] = [
     // A port of its own, as other tests serve pages, too.
     ("somatic view --for 2s", "somatic view --for 1s --listen 127.0.0.1:0"),
     (
@@ -65,6 +65,12 @@ const SHORTENED: [(&str, &str); 12] = [
         "somatic tradeoff examples/scenes/palm.toml --within '3 mm, 30 deg' --write",
         "somatic tradeoff examples/scenes/palm.toml --within '3 mm, 30 deg' --write --seconds 0.1 --frames 250",
     ),
+    ("somatic author humanoid --taxels 6000 -o dense.glb", "somatic author humanoid --taxels 500 -o dense.glb"),
+    (
+        "somatic author humanoid --taxels 960 --even off -o scattered.glb",
+        "somatic author humanoid --taxels 300 --even off -o scattered.glb",
+    ),
+    ("somatic author humanoid --taxels 960 -o even.glb", "somatic author humanoid --taxels 300 -o even.glb"),
     ("somatic paper --out paper", "somatic paper --quick --out paper"),
     (
         "somatic bench --sensors 7560 --fields 600 --members 24 --frames 9984 --backend cpu",
