@@ -1,6 +1,7 @@
 //! Every command that the documentation shows is run, as written, in a folder with what a reader would have there.
 #![cfg(feature = "cli")]
 
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Mutex;
@@ -200,7 +201,7 @@ fn every_command_that_is_shown_runs() {
     let named = || std::thread::Builder::new().name("every_command_that_is_shown_runs".to_owned());
     let run: usize = std::thread::scope(|scope| {
         let workers = [(); 2].map(|()| named().spawn_scoped(scope, worker).unwrap());
-        workers.into_iter().map(|worker| worker.join().unwrap()).sum()
+        workers.into_iter().map(|worker| worker.join().unwrap_or_else(|e| resume_unwind(e))).sum()
     });
     assert!(run >= 6, "only {run} commands were found in the documentation");
 }
