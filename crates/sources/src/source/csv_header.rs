@@ -177,7 +177,12 @@ fn way_out(first: &ByteRecord, below: &[ByteRecord], skipped: usize) -> String {
     let is_table = below.first().is_none_or(|next| next.len() == first.len() && is_frame(next, &[]));
     let sensors = first.len() - skipped;
     match is_table && sensors > 0 {
-        true => format!("{heads}; if they all are sensors, add --grid {}", grid_of(sensors)),
+        true => format!(
+            "say which columns are sensors, as --columns {}-{} does; or {heads}; if they all are sensors, add --grid {}",
+            skipped + 1,
+            first.len(),
+            grid_of(sensors)
+        ),
         false => format!("the header is `t,<taxel id>,<taxel id>,...`: {heads}"),
     }
 }

@@ -6,7 +6,7 @@ use super::column_names::{columns, is_beside_sensors};
 use super::csv_cells::{shortened, trimmed};
 use super::csv_header::Header;
 use super::text::{TextIds, TextOptions, TextTime};
-use super::time_column::{TimeColumn, unit_in_head};
+use super::time_column::{TimeColumn, unit_at_end, unit_in_head};
 use crate::error::{Error, Result};
 
 /// How many names of columns a message lists.
@@ -46,7 +46,7 @@ fn time_of(names: &[String], asked: &TextOptions, has_rate: bool) -> Result<Opti
         Some(TextTime::Column(named)) => {
             let at = names.iter().enumerate().position(|(at, name)| named.column.is(at, Some(name)));
             let at = at.ok_or_else(|| none("--time", &named.column.word(), names))?;
-            let unit = named.unit.or_else(|| unit_of(&names[at]).flatten());
+            let unit = named.unit.or_else(|| unit_of(&names[at]).flatten()).or_else(|| unit_at_end(&names[at]));
             Ok(Some((at, TimeColumn::new(unit))))
         }
         None if has_rate => Ok(None),

@@ -59,6 +59,9 @@ const UNITS: [(&str, TimeUnit, bool); 22] = [
     ("utc", TimeUnit::Calendar, false),
 ];
 
+/// What is between a name and its unit.
+const BEFORE_UNITS: [char; 7] = ['_', ' ', '-', '.', '/', '[', '('];
+
 /// From here to there a time is one since 1970, from the year 2000 to 2100, in whichever unit.
 const SINCE_1970_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 /// Whole times that rise by so much from one frame to the next are hardly seconds.
@@ -97,9 +100,8 @@ pub(super) fn unit_in_head(word: &str) -> Result<Option<Option<TimeUnit>>> {
     if NAMES.contains(&word.as_str()) {
         return Ok(Some(None));
     }
-    let unit = |name: &str| UNITS.iter().find(|(known, ..)| *known == name.trim()).map(|(_, unit, _)| *unit);
     if UNITS.iter().any(|(known, _, alone)| *alone && *known == word) {
-        return Ok(Some(unit(&word)));
+        return Ok(Some(unit_named(&word)));
     }
     let is_name = |name: &str| NAMES.contains(&name.trim());
     for [open, close] in [['[', ']'], ['(', ')']] {
@@ -108,11 +110,21 @@ pub(super) fn unit_in_head(word: &str) -> Result<Option<Option<TimeUnit>>> {
             && let Some(inside) = rest.trim_end().strip_suffix(close)
         {
             let wrong = || failed!("`{word}` has no unit that times are read in: s, ms, us, ns or iso; convert them");
-            return unit(inside).ok_or_else(wrong).map(|unit| Some(Some(unit)));
+            return unit_named(inside).ok_or_else(wrong).map(|unit| Some(Some(unit)));
         }
     }
-    let ends = word.rsplit_once(['_', ' ', '-', '.', '/']);
-    Ok(ends.filter(|(name, _)| is_name(name)).and_then(|(_, name)| unit(name)).map(Some))
+    let ends = word.rsplit_once(BEFORE_UNITS);
+    Ok(ends.filter(|(name, _)| is_name(name)).and_then(|(_, name)| unit_named(name)).map(Some))
+}
+
+/// The unit that ends `word`, the name of a column of times whatever it is called, such as `stamp_ms`.
+pub(super) fn unit_at_end(word: &str) -> Option<TimeUnit> {
+    let (_, last) = word.trim_end_matches([']', ')']).rsplit_once(BEFORE_UNITS)?;
+    unit_named(&last.to_lowercase())
+}
+
+fn unit_named(name: &str) -> Option<TimeUnit> {
+    UNITS.iter().find(|(known, ..)| *known == name.trim()).map(|(_, unit, _)| *unit)
 }
 
 /// A column of times while it is read.
@@ -247,6 +259,14 @@ mod tests {
         assert_eq!(unit("Time[secs]"), Some(Some(TimeUnit::Seconds)));
         assert_eq!(unit("t_us"), Some(Some(TimeUnit::Microseconds)));
         assert_eq!(unit("t [iso]"), Some(Some(TimeUnit::Calendar)));
+        for (word, unit) in [
+            ("stamp_ms", Some(TimeUnit::Milliseconds)),
+            ("tick (us)", Some(TimeUnit::Microseconds)),
+            ("ms", None),
+            ("x_y", None),
+        ] {
+            assert_eq!(unit_at_end(word), unit, "{word}");
+        }
         for other in ["4", "s", "temp_ms", "time_x", "a", "", "palm"] {
             assert_eq!(unit(other), None, "{other}");
         }
