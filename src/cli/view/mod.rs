@@ -1,8 +1,8 @@
 //! `somatic view`: a body, a recording or a scene in a browser.
 
+mod answers;
 mod checkpoints;
 mod clock;
-mod explain;
 mod peaks;
 mod player;
 mod ready;

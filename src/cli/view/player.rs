@@ -9,8 +9,8 @@ use somatic::internal::page::{PageInput, Publisher, Request, ViewerId};
 use somatic::{Engine, Result};
 
 use super::super::stdio::say;
+use super::answers::Explainer;
 use super::clock::{Clock, State};
-use super::explain::Explainer;
 use super::recording::CHUNK;
 use super::shared::Shared;
 use super::timeline::Timeline;
