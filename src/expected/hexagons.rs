@@ -74,6 +74,7 @@ fn sheet(spacing_m: f64) -> Body {
         fields: Vec::new(),
         edges: None,
         findings: Vec::new(),
+        kept: Default::default(),
     }
 }
 

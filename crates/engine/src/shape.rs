@@ -152,6 +152,7 @@ impl Shape {
             taxels,
             edges: None,
             findings: Vec::new(),
+            kept: Default::default(),
         }
     }
 

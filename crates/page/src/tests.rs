@@ -82,6 +82,7 @@ fn body() -> Body {
         ],
         edges: None,
         findings: Vec::new(),
+        kept: Default::default(),
     }
 }
 

@@ -76,7 +76,16 @@ fn with_centroids(authored: &Authored) -> usize {
     // Whether a field has a chart does not depend on the surface, in which a search takes time.
     let Body { name, links, taxels, fields, .. } = &authored.body;
     let (name, links, taxels, fields) = (name.clone(), links.clone(), taxels.clone(), fields.clone());
-    let bare = Body { name, links, taxels, fields, surfaces: Vec::new(), edges: None, findings: Vec::new() };
+    let bare = Body {
+        name,
+        links,
+        taxels,
+        fields,
+        surfaces: Vec::new(),
+        edges: None,
+        findings: Vec::new(),
+        kept: Default::default(),
+    };
     FieldSet::new(&bare).map_or(0, |set| set.fields.iter().filter(|field| field.chart.is_ok()).count())
 }
 

@@ -173,7 +173,16 @@ impl Grouper<'_> {
         let Body { name, links, taxels, .. } = self.body;
         let (name, links, taxels) = (name.clone(), links.clone(), taxels.clone());
         let fields = specs.iter().zip(&self.made).map(|(spec, made)| planar(spec.clone(), made.u)).collect();
-        Body { name, links, taxels, surfaces: Vec::new(), fields, edges: None, findings: Vec::new() }
+        Body {
+            name,
+            links,
+            taxels,
+            surfaces: Vec::new(),
+            fields,
+            edges: None,
+            findings: Vec::new(),
+            kept: Default::default(),
+        }
     }
 
     /// `whole`, the field `made` with all its members as own members, with the chart that `made` requests; `plane` is its

@@ -133,6 +133,7 @@ mod tests {
             fields: Vec::new(),
             edges: None,
             findings: Vec::new(),
+            kept: Default::default(),
         }
     }
 

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::body::{Body, Nearest};
+use crate::body::{BitsHasher, Body, KeptOfShape, Nearest};
 use crate::error::{Result, failed};
-use crate::field::{Field, Lift};
+use crate::field::{Chart, Field, Lift};
 use crate::signal::{Calibration, ContactThresholds, Quantity, Receptor};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::position::Surface;
@@ -69,7 +69,23 @@ pub(super) fn unit_of(radius_m: f64) -> f32 {
     exponent.exp2() as f32
 }
 
-pub(super) fn surface(nearest: &Nearest<'_>, field: &Field) -> Option<Surface> {
-    let (chart, lift) = (field.chart.as_ref().ok()?, Lift::on(nearest, field)?);
-    Some(Surface::new(chart, &lift, field.origin_in_anchor))
+pub(super) fn surface(nearest: &Nearest<'_>, kept: &KeptOfShape<'_>, field: &Field) -> Option<Surface> {
+    let chart = field.chart.as_ref().ok()?;
+    let surface =
+        kept.get(key(field, chart), || Some(Surface::new(chart, &Lift::on(nearest, field)?, field.origin_in_anchor)));
+    surface.as_ref().clone()
+}
+
+/// A hash of what the surface over `field` depends on, beside the body's shape.
+fn key(field: &Field, chart: &Chart) -> u64 {
+    let mut hash = BitsHasher::default();
+    hash.number(field.anchor.unwrap_or(usize::MAX));
+    hash.vector(field.origin_in_anchor);
+    hash.number(chart.kind as u64);
+    [chart.u_in_anchor, chart.v_in_anchor, chart.normal_in_anchor].into_iter().for_each(|axis| hash.vector(axis));
+    for member in &field.members {
+        hash.number(member.taxel);
+        hash.vector(member.place);
+    }
+    hash.finish()
 }

@@ -19,9 +19,8 @@ impl Skin {
         let nodes: Vec<usize> = (0..body.taxels.len()).filter(|&taxel| is_node(taxel)).collect();
         let mut node_of = vec![u32::MAX; body.taxels.len()];
         (0..).zip(&nodes).for_each(|(node, &taxel)| node_of[taxel] = node);
-        let seated = Seated::new(body);
-        let (cells, normals) = (CellSurface::new(body, &seated), mean_normals_of(body, &seated));
-        drop(seated);
+        let divided = body.kept_of_shape().get(0, || Divided::new(body));
+        let Divided { cells, normals } = &*divided;
         let spacing_m = spacings_m(body, &nodes);
         let taxel = |(&index, spacing_m): (&usize, f64)| {
             let taxel = &body.taxels[index];
@@ -39,7 +38,7 @@ impl Skin {
             }
         };
         let edges = graph.edges().map(|(a, b)| (node_of[a as usize], node_of[b as usize]));
-        let surface = cells.triangles.into_iter().map(|(taxel, corners)| (node_of[taxel as usize], corners));
+        let surface = cells.triangles.iter().map(|&(taxel, corners)| (node_of[taxel as usize], corners));
         Self::from_parts(SkinParts {
             taxels: nodes.iter().zip(spacing_m).map(taxel).collect(),
             edges: edges.collect(),
@@ -47,6 +46,20 @@ impl Skin {
             surface: surface.collect(),
             cell_of: nodes.iter().map(|&taxel| node_of[cells.cell_of[taxel] as usize]).collect(),
         })
+    }
+}
+
+/// The surface of a body as its taxels divide it.
+struct Divided {
+    cells: CellSurface,
+    /// Per taxel.
+    normals: Vec<DVec3>,
+}
+
+impl Divided {
+    fn new(body: &Body) -> Self {
+        let seated = Seated::new(body);
+        Self { cells: CellSurface::new(body, &seated), normals: mean_normals_of(body, &seated) }
     }
 }
 

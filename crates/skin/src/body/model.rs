@@ -4,6 +4,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::axes::{Up, WORLD_FROM_BODY};
 use super::joint::LinkJoint;
+use super::kept::Kept;
 use super::layout::FieldSpec;
 use super::stored_edges::StoredEdges;
 
@@ -190,6 +191,9 @@ pub struct Body {
     pub edges: Option<StoredEdges>,
     /// Problems of the file that do not prevent its use.
     pub findings: Vec<String>,
+    /// What was worked out of its shape once; [`Default`] for a new body.
+    #[doc(hidden)]
+    pub kept: Kept,
 }
 
 impl Body {

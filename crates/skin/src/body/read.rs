@@ -86,6 +86,7 @@ pub(super) fn from_document(name: &str, document: &Document, nodes: &Nodes<'_>) 
         fields: Vec::new(),
         edges: None,
         findings: Vec::new(),
+        kept: Default::default(),
     };
     for &node in &nodes.in_order {
         read_meshes(document, nodes, node, &mut body, &mut sources)?;

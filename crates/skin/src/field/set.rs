@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::chart::{Chart, NoChart, frame};
 use super::distortion::Distortion;
-use crate::body::{Body, ChartKind, FieldSpec, Hit, Nearest};
+use crate::body::{BitsHasher, Body, ChartKind, FieldSpec, Hit, KeptOfShape, Nearest};
 use crate::error::{Result, failed};
 
 /// cos 75°: maximum angle of a member's normal from the mean.
@@ -85,7 +85,7 @@ impl FieldSet {
     pub(super) fn from_specs(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
         let parents = parents(specs);
         let taxels = unions(specs);
-        let nearest = Nearest::new(body);
+        let (nearest, kept) = (Nearest::new(body), body.kept_of_shape());
         let mut fields = Vec::with_capacity(specs.len());
         for (index, spec) in specs.iter().enumerate() {
             let members: Vec<(usize, f64, Option<[f64; 2]>)> = taxels[index]
@@ -102,7 +102,7 @@ impl FieldSet {
                 )
                 .at(&body.name));
             }
-            fields.push(complete(body, &nearest, spec, parents[index], &members));
+            fields.push(complete(body, (&nearest, &kept), spec, parents[index], &members));
         }
         Ok(Self { fields })
     }
@@ -111,7 +111,7 @@ impl FieldSet {
 /// The field of `spec`, with its anchor, origin, chart and its members' places.
 fn complete(
     body: &Body,
-    nearest: &Nearest<'_>,
+    shape: (&Nearest<'_>, &KeptOfShape<'_>),
     spec: &FieldSpec,
     parent: Option<usize>,
     taxels: &[(usize, f64, Option<[f64; 2]>)],
@@ -144,10 +144,10 @@ fn complete(
         (ChartKind::Geodesic, ..) if unplaced > 0 => Err(NoChart::Unplaced(unplaced)),
         (ChartKind::Geodesic, Some(anchor), _) => {
             let origin = wanted_origin.unwrap_or(mean_position);
-            Ok((origin, frame(normal_at(nearest, anchor, origin, &in_anchor), wanted_u)))
+            Ok((origin, frame(normal_at(shape, anchor, origin, &in_anchor), wanted_u)))
         }
         (ChartKind::Plane, Some(anchor), Some(normal)) if least_cosine >= MIN_NORMAL_COSINE => {
-            let on_surface = || nearest.in_link(anchor, mean_position).unwrap_or(mean_position);
+            let on_surface = || shape.0.in_link(anchor, mean_position).unwrap_or(mean_position);
             Ok((wanted_origin.unwrap_or_else(on_surface), frame(normal, wanted_u)))
         }
         _ => Err(NoChart::Wraps(least_cosine.clamp(-1.0, 1.0).acos())),
@@ -175,7 +175,24 @@ fn complete(
 }
 
 /// The surface's normal at `origin`, or without a surface that of the nearest member.
-fn normal_at(nearest: &Nearest<'_>, anchor: usize, origin: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
+fn normal_at(
+    (nearest, kept): (&Nearest<'_>, &KeptOfShape<'_>),
+    anchor: usize,
+    origin: DVec3,
+    members: &[(DVec3, DVec3)],
+) -> DVec3 {
+    let mut key = BitsHasher::default();
+    key.number(anchor);
+    key.vector(origin);
+    members.iter().for_each(|&(position, normal)| [position, normal].into_iter().for_each(|v| key.vector(v)));
+    let find = || NormalAt(normal_of_surface_at(nearest, anchor, origin, members));
+    kept.get(key.finish(), find).0
+}
+
+/// So that it is kept apart from other vectors.
+struct NormalAt(DVec3);
+
+fn normal_of_surface_at(nearest: &Nearest<'_>, anchor: usize, origin: DVec3, members: &[(DVec3, DVec3)]) -> DVec3 {
     let radius = members.iter().map(|(position, _)| position.distance(origin)).fold(0.0, f64::max);
     let surface = nearest.around(anchor, origin, radius * 0.1 + 1e-6);
     let around = |hit: Hit| surface.normal_around(hit.position, radius * 1e-6 + 1e-9);

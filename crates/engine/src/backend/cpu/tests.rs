@@ -167,6 +167,7 @@ fn sheet(taxels: u32) -> Body {
         taxels: (0..taxels).map(taxel).collect(),
         edges: None,
         findings: Vec::new(),
+        kept: Default::default(),
     }
 }
 

@@ -12,7 +12,7 @@ use super::super::onset::softened;
 use super::super::stages::Stages;
 use super::super::{Coordinates, Scene, choose_fields};
 use super::{Plan, PlanField};
-use crate::body::{Body, Nearest};
+use crate::body::{Body, KeptOfShape, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Field, FieldSet, WORLD};
 use crate::percept::Outputs;
@@ -40,7 +40,15 @@ impl Plan {
         }
         plan.note_what_is_felt();
         let parents = chosen.iter().filter_map(|&index| fields.fields[index].parent).collect();
-        let from = Sources { body, scene, calibration, nearest: Nearest::new(body), parents, first_slots };
+        let from = Sources {
+            body,
+            scene,
+            calibration,
+            nearest: Nearest::new(body),
+            kept: body.kept_of_shape(),
+            parents,
+            first_slots,
+        };
         let mut made =
             FieldsMade { fields: Vec::with_capacity(chosen.len() * plan.letters.len()), members: Vec::new() };
         for index in chosen {
@@ -155,6 +163,7 @@ struct Sources<'a> {
     scene: &'a Scene,
     calibration: &'a Calibration,
     nearest: Nearest<'a>,
+    kept: KeptOfShape<'a>,
     /// The fields that have others of the plan in them.
     parents: BTreeSet<usize>,
     /// Each letter's first slot.
@@ -194,7 +203,7 @@ impl FieldsMade {
 
 /// A field of the plan but for its place among the members and its thresholds.
 fn made_in_first_letter(plan: &Plan, from: &Sources<'_>, index: usize, field: &Field) -> Result<PlanField> {
-    let Sources { body, scene, calibration, nearest, parents, .. } = from;
+    let Sources { body, scene, calibration, nearest, kept, parents, .. } = from;
     let (count, unit_m) = (field.members.len(), unit_of(field.radius_m()));
     let places: Vec<DVec3> = field.members.iter().map(|member| member.place / f64::from(unit_m)).collect();
     let still = layout::Still::new(plan.sums(count), count, field.radius_m() / f64::from(unit_m));
@@ -221,7 +230,7 @@ fn made_in_first_letter(plan: &Plan, from: &Sources<'_>, index: usize, field: &F
         origin_in_anchor: field.origin_in_anchor,
         chart: field.chart.as_ref().ok().cloned(),
         no_chart: field.chart.as_ref().err().cloned(),
-        surface: plan.stages.position.then(|| surface(nearest, field)).flatten(),
+        surface: plan.stages.position.then(|| surface(nearest, kept, field)).flatten(),
         spacing: field.spacing_m() / f64::from(unit_m),
         places,
     })

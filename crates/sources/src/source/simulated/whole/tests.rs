@@ -44,6 +44,7 @@ fn grid(columns: u32, rows: u32, at: impl Fn(f64, f64) -> DVec3) -> Body {
         fields: Vec::new(),
         findings: Vec::new(),
         edges: None,
+        kept: Default::default(),
     }
 }
 

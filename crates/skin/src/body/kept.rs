@@ -1,0 +1,191 @@
+//! What was worked out of a body's shape once, for all who ask for it again: engines of one body share its cells and surfaces, which
+//! take most of the time that an engine takes to make.
+
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::fmt;
+use std::hash::{BuildHasher as _, Hasher as _};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::{DAffine3, DVec3};
+
+use super::model::{Body, Home};
+
+/// Of larger bodies nothing is kept: what is worked out of them takes more memory than they do.
+const MOST_TAXELS: usize = 20_000;
+const MOST_VERTICES: usize = 500_000;
+
+type Values = HashMap<(TypeId, u64), Arc<dyn Any + Send + Sync>>;
+
+/// What was worked out of a body, with the fingerprint of the shape that it was worked out of. Clones of a body share it.
+#[derive(Clone, Default)]
+pub struct Kept(Arc<Mutex<(u64, Values)>>);
+
+impl fmt::Debug for Kept {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Kept")
+    }
+}
+
+/// The values that are kept of a body as it is now.
+#[derive(Debug)]
+pub struct KeptOfShape<'a> {
+    /// `None` for a body that is too large.
+    kept: Option<(&'a Kept, u64)>,
+}
+
+impl Body {
+    /// What is kept of the body's shape as it is now: its links, surfaces and taxels, but not its fields. A body that was changed begins
+    /// anew.
+    #[must_use]
+    pub fn kept_of_shape(&self) -> KeptOfShape<'_> {
+        let vertices: usize = self.surfaces.iter().map(|surface| surface.positions.len()).sum();
+        let small = self.taxels.len() <= MOST_TAXELS && vertices <= MOST_VERTICES;
+        KeptOfShape { kept: small.then(|| (&self.kept, fingerprint(self))) }
+    }
+}
+
+impl KeptOfShape<'_> {
+    /// The value under `key`, or what `make` makes, which is kept. `make` must depend on the body's shape and on what `key` is a hash of,
+    /// and on nothing else.
+    pub fn get<T: Any + Send + Sync>(&self, key: u64, make: impl FnOnce() -> T) -> Arc<T> {
+        let Some((kept, fingerprint)) = self.kept else { return Arc::new(make()) };
+        let key = (TypeId::of::<T>(), key);
+        // What fails elsewhere while it holds the lock leaves whole values behind.
+        let lock = || kept.0.lock().unwrap_or_else(PoisonError::into_inner);
+        {
+            let (of, values) = &*lock();
+            if *of == fingerprint
+                && let Some(Ok(value)) = values.get(&key).cloned().map(Arc::downcast)
+            {
+                return value;
+            }
+        }
+        let value = Arc::new(make());
+        let mut now = lock();
+        if now.0 != fingerprint {
+            *now = (fingerprint, Values::new());
+        }
+        now.1.insert(key, value.clone());
+        value
+    }
+}
+
+/// A hash of the bits of numbers, for keys of what is kept.
+pub struct BitsHasher(foldhash::quality::FoldHasher<'static>);
+
+impl fmt::Debug for BitsHasher {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("BitsHasher").field(&self.finish()).finish()
+    }
+}
+
+impl Default for BitsHasher {
+    fn default() -> Self {
+        Self(foldhash::quality::FixedState::default().build_hasher())
+    }
+}
+
+impl BitsHasher {
+    /// Adds a whole number.
+    pub fn number(&mut self, number: impl TryInto<u64>) {
+        self.0.write_u64(number.try_into().unwrap_or(u64::MAX));
+    }
+
+    /// Adds the bits of floating-point numbers.
+    pub fn numbers(&mut self, numbers: impl IntoIterator<Item = f64>) {
+        numbers.into_iter().for_each(|number| self.0.write_u64(number.to_bits()));
+    }
+
+    /// Adds a vector.
+    pub fn vector(&mut self, vector: DVec3) {
+        self.numbers(vector.to_array());
+    }
+
+    fn affine(&mut self, affine: &DAffine3) {
+        self.numbers(affine.to_cols_array());
+    }
+
+    /// The hash of all that was added.
+    #[must_use]
+    pub fn finish(&self) -> u64 {
+        self.0.finish()
+    }
+}
+
+/// A hash of the links, surfaces and taxels of `body`.
+fn fingerprint(body: &Body) -> u64 {
+    let mut hash = BitsHasher::default();
+    hash.number(body.links.len());
+    for link in &body.links {
+        hash.number(link.parent.unwrap_or(usize::MAX));
+        hash.affine(&link.body_from_link);
+    }
+    hash.number(body.taxels.len());
+    for taxel in &body.taxels {
+        hash.number(taxel.id);
+        hash.number(taxel.link);
+        hash.number(taxel.modality.code());
+        hash.vector(taxel.position_in_link);
+        hash.vector(taxel.normal_in_link);
+        hash.numbers([taxel.area]);
+    }
+    hash.number(body.surfaces.len());
+    for surface in &body.surfaces {
+        hash.number(surface.positions.len());
+        surface.positions.iter().for_each(|&position| hash.vector(position));
+        hash.number(surface.triangles.len());
+        surface.triangles.iter().flatten().for_each(|&vertex| hash.number(vertex));
+        match &surface.home {
+            Home::Rigid { link, link_from_mesh } => {
+                hash.number(*link);
+                hash.affine(link_from_mesh);
+            }
+            Home::Skinned { joints, heaviest, at_rest } => {
+                hash.number(u64::MAX);
+                hash.number(joints.len());
+                for (link, link_from_mesh) in joints {
+                    hash.number(*link);
+                    hash.affine(link_from_mesh);
+                }
+                heaviest.iter().for_each(|&joint| hash.number(joint));
+                at_rest.iter().for_each(|&place| hash.vector(place));
+            }
+        }
+    }
+    hash.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+
+    #[test]
+    fn a_value_is_made_once_for_a_shape_and_again_for_another() {
+        let mut body = Body::from_bytes("hand", bundled::HAND).unwrap();
+        let mut made = 0;
+        let mut get = |body: &Body, key: u64| {
+            *body.kept_of_shape().get(key, || {
+                made += 1;
+                made
+            })
+        };
+        assert_eq!([get(&body, 7), get(&body, 7), get(&body, 8), get(&body.clone(), 7)], [1, 1, 2, 1]);
+        body.fields.clear();
+        assert_eq!(get(&body, 7), 1);
+        // The last bit of anything that a shape has.
+        let changes: [fn(&mut Body); 6] = [
+            |body| body.taxels[3].position_in_link.x = body.taxels[3].position_in_link.x.next_up(),
+            |body| body.taxels[3].area = body.taxels[3].area.next_up(),
+            |body| body.links[1].body_from_link.translation.y = body.links[1].body_from_link.translation.y.next_up(),
+            |body| body.surfaces[0].positions[5].z = body.surfaces[0].positions[5].z.next_up(),
+            |body| body.surfaces[0].triangles[2].swap(0, 1),
+            |body| drop(body.taxels.pop()),
+        ];
+        for (wanted, change) in (3..).zip(changes) {
+            change(&mut body);
+            assert_eq!([get(&body, 7), get(&body, 7)], [wanted; 2]);
+        }
+    }
+}
