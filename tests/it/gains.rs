@@ -178,7 +178,7 @@ fn gains_are_found_from_a_finger_that_is_longer_than_wide() {
 #[test]
 fn what_a_soft_onset_takes_off_is_no_gain() {
     let body = grid();
-    let mut source = SimulatedSource::on_body("finger", &wandering("", 1, 120, 1), body.clone()).unwrap();
+    let mut source = SimulatedSource::on_body("finger", &wandering("", 1, 50, 1), body.clone()).unwrap();
     let hard = estimated(&body, &mut source, "hard");
     source.seek(0);
     let soft = estimated(&body, &mut source, "soft");
