@@ -281,7 +281,11 @@ view.onDraw = () => {
   const acknowledge = connection.takeToDraw();
   marks.draw();
   scaleBar.draw();
-  return acknowledge;
+  return () => {
+    acknowledge();
+    // Before the pointer first needs it, and after the first picture.
+    if (view.framesDrawn && picker.mesh !== model.mesh) setTimeout(() => picker.update());
+  };
 };
 
 new ResizeObserver(() => {
