@@ -181,9 +181,8 @@ mod tests {
     use crate::signal::Pose;
 
     fn frame(poses: &[(&str, f64)]) -> Frame {
-        let pose = |&(link, x): &(&str, f64)| {
-            (link.to_owned(), Pose { translation: DVec3::X * x, rotation: DQuat::IDENTITY })
-        };
+        let pose =
+            |&(link, x): &(&str, f64)| (link.to_owned(), Pose { translation: DVec3::X * x, rotation: DQuat::IDENTITY });
         Frame { pose: poses.iter().map(pose).collect(), ..Frame::default() }
     }
 
