@@ -24,6 +24,7 @@ macro_rules! files {
 /// One line a file.
 const FILES: &[PageFile] = files![
     "address.js",
+    "aim.js",
     "boards.js",
     "body.js",
     "box_tree.js",
