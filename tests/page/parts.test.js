@@ -389,6 +389,26 @@ test("a field keeps its colour, and fields with other names begin anew", () => {
   assert.deepEqual([model.loadColumn, model.loadUnit, model.plottedColumn], ["peak", "P", "peak"]);
 });
 
+test("how hard a field is pressed is its force where there is a unit, and areas if that is a pressure", () => {
+  const model = new Model();
+  const columns = ["total", "force"].map((name) => ({ name, unit: "", components: 1 }));
+  const column = (quantity, areas) => {
+    model.begin({ run: "1", columns, fields: [], links: [], quantity });
+    const none = new Float32Array(0);
+    const mesh = {
+      taxelId: new Uint32Array(areas.length),
+      restPose: none,
+      taxelArea: Float32Array.from(areas),
+    };
+    model.setMesh(mesh);
+    return [model.loadColumn, model.loadUnit];
+  };
+  assert.deepEqual(column("count", [1e-5]), ["total", "P"]);
+  assert.deepEqual(column("Pa", [0, 0]), ["total", "P"]);
+  assert.deepEqual(column("Pa", [0, 1e-5]), ["force", "N"]);
+  assert.deepEqual(column("N", [0, 0]), ["force", "N"]);
+});
+
 test("an orientation line ends at the two farthest points of its field", () => {
   // Pressed by 4 at the right, by 2 at the upper left: their points are at the taxel and half of the way.
   const uv = [

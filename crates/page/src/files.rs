@@ -67,6 +67,7 @@ const FILES: &[PageFile] = files![
     "plot_file.js",
     "plots.js",
     "reasons.js",
+    "reported.js",
     "rest.js",
     "scale_bar.js",
     "socket.js",
