@@ -46,20 +46,7 @@ impl ArrayBody {
             return Err(usage(py, "positions has no rows; a body has a taxel at least"));
         }
         as_many("normals", normals.len())?;
-        for (row, (position, normal)) in positions.iter().zip(&normals).enumerate() {
-            if !position.is_finite() || !normal.is_finite() {
-                return Err(usage(
-                    py,
-                    format!("the position or the normal of row {row} is not finite; leave the row out"),
-                ));
-            }
-            if normal.length() < 1e-9 {
-                return Err(usage(
-                    py,
-                    format!("the normal of row {row} is zero; give the direction that is outwards there"),
-                ));
-            }
-        }
+        check_rows(py, &positions, &normals)?;
         let ids = ids.unwrap_or_else(|| (0..count as u32).collect());
         as_many("ids", ids.len())?;
         let mut seen = BTreeSet::new();
@@ -67,20 +54,7 @@ impl ArrayBody {
             let what = if *id > MAX_TAXEL_ID { format!("is over {MAX_TAXEL_ID}") } else { "is there twice".to_owned() };
             return Err(usage(py, format!("ids: {id} {what}")));
         }
-        let areas = match areas.map(|areas| doubles(areas, "areas")).transpose()? {
-            None => vec![0.0; count],
-            Some((areas, shape)) if shape.is_empty() => vec![areas[0]; count],
-            Some((areas, shape)) if shape == [count] => areas,
-            Some((_, shape)) => {
-                return Err(usage(py, format!("areas should have shape [] or [{count}]; this has {}", shown(&shape))));
-            }
-        };
-        if let Some(row) = areas.iter().position(|area| !area.is_finite() || *area < 0.0) {
-            return Err(usage(
-                py,
-                format!("the area of row {row} is {}; give m², or 0 where it is unknown", areas[row]),
-            ));
-        }
+        let areas = areas_of(py, areas, count)?;
         let names = match link {
             None => vec![name.to_owned(); count],
             Some(LinkNames::One(link)) => vec![link; count],
@@ -104,21 +78,7 @@ impl ArrayBody {
                 None => links.push((link, vec![taxel])),
             }
         }
-        let mut meshes = BTreeMap::new();
-        if let Some(surface) = surface {
-            if let Ok(of_links) = surface.cast::<PyDict>() {
-                for (link, surface) in of_links.iter() {
-                    let link: String = link.extract()?;
-                    if !links.iter().any(|(known, _)| *known == link) {
-                        let near = suggestion(&link, links.iter().map(|(name, _)| name.as_str()));
-                        return Err(unknown_name(py, format!("surface: no taxel is on a link `{link}`; {near}")));
-                    }
-                    meshes.insert(link, mesh(&surface)?);
-                }
-            } else {
-                meshes.insert(links[0].0.clone(), mesh(surface)?);
-            }
-        }
+        let meshes = surface.map_or(Ok(BTreeMap::new()), |surface| meshes_of(surface, &links))?;
         Ok(Self { links, meshes })
     }
 
@@ -136,6 +96,57 @@ impl ArrayBody {
         let file = Original::from_bytes(name, &glb.to_bytes()?, None)?;
         author(file, &Recipe::none(), |_| {})?.file.to_glb()
     }
+}
+
+/// Refuses positions and normals that are not finite, and normals without a direction.
+fn check_rows(py: Python<'_>, positions: &[DVec3], normals: &[DVec3]) -> PyResult<()> {
+    for (row, (position, normal)) in positions.iter().zip(normals).enumerate() {
+        if !position.is_finite() || !normal.is_finite() {
+            return Err(usage(py, format!("the position or the normal of row {row} is not finite; leave the row out")));
+        }
+        if normal.length() < 1e-9 {
+            return Err(usage(
+                py,
+                format!("the normal of row {row} is zero; give the direction that is outwards there"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The areas of `count` taxels, m²: one for all, one for each, or unknown ones.
+fn areas_of(py: Python<'_>, areas: Option<&Bound<'_, PyAny>>, count: usize) -> PyResult<Vec<f64>> {
+    let areas = match areas.map(|areas| doubles(areas, "areas")).transpose()? {
+        None => vec![0.0; count],
+        Some((areas, shape)) if shape.is_empty() => vec![areas[0]; count],
+        Some((areas, shape)) if shape == [count] => areas,
+        Some((_, shape)) => {
+            return Err(usage(py, format!("areas should have shape [] or [{count}]; this has {}", shown(&shape))));
+        }
+    };
+    match areas.iter().position(|area| !area.is_finite() || *area < 0.0) {
+        Some(row) => {
+            Err(usage(py, format!("the area of row {row} is {}; give m², or 0 where it is unknown", areas[row])))
+        }
+        None => Ok(areas),
+    }
+}
+
+/// The surfaces in `surface` by link: one of the first link, or a dict of several.
+fn meshes_of(surface: &Bound<'_, PyAny>, links: &[(String, Vec<Taxel>)]) -> PyResult<BTreeMap<String, MeshData>> {
+    let Ok(of_links) = surface.cast::<PyDict>() else {
+        return Ok(BTreeMap::from([(links[0].0.clone(), mesh(surface)?)]));
+    };
+    let mut meshes = BTreeMap::new();
+    for (link, surface) in of_links.iter() {
+        let link: String = link.extract()?;
+        if !links.iter().any(|(known, _)| *known == link) {
+            let near = suggestion(&link, links.iter().map(|(name, _)| name.as_str()));
+            return Err(unknown_name(surface.py(), format!("surface: no taxel is on a link `{link}`; {near}")));
+        }
+        meshes.insert(link, mesh(&surface)?);
+    }
+    Ok(meshes)
 }
 
 /// The triangles in `any`, vertices and faces, with normals that are means of those of faces by their areas.

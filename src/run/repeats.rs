@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_flood_is_a_few_lines_and_what_is_rare_is_always_told() {
+    fn a_flood_is_a_few_lines_and_what_is_rare_is_always_reported() {
         let mut repeats = Repeats::default();
         let shown: Vec<String> = (0..1298).filter_map(|n| repeats.tell(f64::from(n) / 216.0, "again")).collect();
         assert_eq!(shown, ["0.00 s: again"]);

@@ -495,7 +495,7 @@ fn attack(run: &Run, stop: &Arc<AtomicBool>) -> Vec<JoinHandle<()>> {
 }
 
 #[test]
-fn a_run_and_a_view_end_when_told_whatever_viewers_do() {
+fn a_run_and_a_view_end_on_request_whatever_viewers_do() {
     let view = ["view", "--listen", "127.0.0.1:0", "--backend", "cpu", "--quiet"];
     for (mut run, is_played) in [(Run::start(&[]), false), (Run::spawn(&view), true)] {
         let stop = Arc::new(AtomicBool::new(false));

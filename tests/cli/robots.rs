@@ -49,7 +49,7 @@ fn has_flag(frame: &Value, flag: &str) -> bool {
 }
 
 #[test]
-fn a_joint_that_the_urdf_does_not_have_is_left_out_and_told_once() {
+fn a_joint_that_the_urdf_lacks_is_left_out_and_reported_once() {
     let (_folder, body) = arm();
     let line = |t: f64, more: &str| {
         format!("{{\"t\":{t},\"values\":{{\"11\":5}},\"joints\":{{\"shoulder\":0.3,\"elbow\":-0.4{more}}}}}\n")

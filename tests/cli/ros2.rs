@@ -37,7 +37,7 @@ fn header(frame_id: &str) -> Header {
     Header { stamp: Time::from_ns(1_700_000_000_123_456_789), frame_id: frame_id.to_owned() }
 }
 
-fn told<M: Message>(message: &M) -> Value {
+fn as_json<M: Message>(message: &M) -> Value {
     let bytes: String = message.to_cdr().iter().map(|byte| format!("{byte:02x}")).collect();
     json!({"type": M::TYPE, "hash": M::HASH, "definition": M::definition(), "bytes": bytes})
 }
@@ -47,7 +47,7 @@ fn messages() -> Vec<Value> {
     let mut all = Vec::new();
     for text in ["", "a", "ab", "abc", "abcd", "abcde", "touché", "a longer text of 27 letters"] {
         let text = || text.to_owned();
-        all.push(told(&PointCloud2 {
+        all.push(as_json(&PointCloud2 {
             header: header(&text()),
             height: 1,
             width: 3,
@@ -66,12 +66,12 @@ fn messages() -> Vec<Value> {
             frame_locked: true,
             ..Marker::default()
         };
-        all.push(told(&MarkerArray {
+        all.push(as_json(&MarkerArray {
             markers: vec![marker.clone(), Marker { ns: "b".to_owned(), action: 2, ..marker }],
         }));
         let mut wrench = Wrench::default();
         (wrench.force.x, wrench.torque.z) = (-1.5, 1e-300);
-        all.push(told(&WrenchStamped { header: header(&text()), wrench }));
+        all.push(as_json(&WrenchStamped { header: header(&text()), wrench }));
         let status = DiagnosticStatus {
             level: Byte(1),
             name: text(),
@@ -79,13 +79,13 @@ fn messages() -> Vec<Value> {
             hardware_id: text(),
             values: vec![KeyValue { key: text(), value: "3".to_owned() }, KeyValue::default()],
         };
-        all.push(told(&DiagnosticArray { header: header(&text()), status: vec![status.clone(), status] }));
+        all.push(as_json(&DiagnosticArray { header: header(&text()), status: vec![status.clone(), status] }));
         let mut transform =
             TransformStamped { header: header("world"), child_frame_id: text(), ..TransformStamped::default() };
         (transform.transform.translation.y, transform.transform.rotation.w) = (0.25, 1.0);
-        all.push(told(&TfMessage { transforms: vec![transform.clone(), transform] }));
+        all.push(as_json(&TfMessage { transforms: vec![transform.clone(), transform] }));
         let names = vec![text(), "wrist".to_owned(), text()];
-        all.push(told(&JointState {
+        all.push(as_json(&JointState {
             header: header(""),
             name: names,
             position: vec![0.5, -2.0],
@@ -324,9 +324,9 @@ fn clouds_of_a_bag_come_back_with_the_taxels_that_are_missing() {
             [&["run", "--body", body, "--backend", "reference", "--source", source, "--sink", "-"][..], more].concat();
         frames(&done(&all)).iter().map(|frame| frame["fields"].clone()).collect::<Vec<_>>()
     };
-    let told = run(text_of(&touch), &["--sink", &sink]);
-    assert!(told.len() == 3 && told[0].to_string().contains("incomplete"), "{told:?}");
-    assert_eq!(run(&sink, &[]), told);
+    let lines = run(text_of(&touch), &["--sink", &sink]);
+    assert!(lines.len() == 3 && lines[0].to_string().contains("incomplete"), "{lines:?}");
+    assert_eq!(run(&sink, &[]), lines);
 }
 
 /// world_from_link of `fore_arm` in a message of `/tf`.
@@ -379,10 +379,10 @@ fn links_in_a_bag_are_where_joints_put_them_with_z_up() {
         let (_, fore_arm) = transforms.iter().find(|(t_s, _)| (t_s - number(&world["t"])).abs() < 1e-6).unwrap();
         for (of_world, of_link) in world["fields"].as_array().unwrap().iter().zip(link["fields"].as_array().unwrap()) {
             assert_eq!((&of_world["link"], &of_link["link"]), (&"world".into(), &"fore_arm".into()));
-            let [told, place] = [of_world, of_link]
+            let [found, place] = [of_world, of_link]
                 .map(|field| DVec3::from_array([0, 1, 2].map(|axis| number(&field["position"][axis]))));
             let expected = fore_arm.transform_point3(place);
-            assert!(told.distance(expected) < 1e-9, "{told} is not {expected}");
+            assert!(found.distance(expected) < 1e-9, "{found} is not {expected}");
             compared += 1;
         }
     }
@@ -409,8 +409,8 @@ fn a_bag_replaces_nothing_and_damage_is_seen() {
     let damaged = text.replacen("RIHS01_e369d0f0", "RIHS01_e369d0f1", 1);
     assert_ne!(damaged, text);
     std::fs::write(&metadata, damaged).unwrap();
-    let told = read(&["bag", text_of(&bag)]).unwrap();
-    assert!(told.as_ref().is_ok_and(|told| told["topics"]["/tf"]["hash"] == false) || told.is_err(), "{told:?}");
+    let answer = read(&["bag", text_of(&bag)]).unwrap();
+    assert!(answer.as_ref().is_ok_and(|read| read["topics"]["/tf"]["hash"] == false) || answer.is_err(), "{answer:?}");
     std::fs::write(&metadata, text).unwrap();
     // Cut in the middle, it is no whole bag.
     let recording = Path::new(&bag).join("bag_0.mcap");

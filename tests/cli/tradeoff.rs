@@ -53,7 +53,7 @@ fn a_simulation_is_held_against_its_truth_and_drawn() {
 }
 
 #[test]
-fn a_pick_is_written_into_the_scene_and_used_and_told() {
+fn a_pick_is_written_into_the_scene_used_and_reported() {
     let folder = tempfile::tempdir().unwrap();
     let text =
         "# What I want.\noutputs = [\"centroid\", \"orientation\"] # no more\n\n[accuracy]\ncentroid = \"5 mm\"\n";

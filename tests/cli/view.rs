@@ -97,7 +97,7 @@ fn a_recording_is_entered_anywhere_with_the_percepts_of_an_uninterrupted_run() {
 }
 
 #[test]
-fn a_percept_is_explained_and_its_history_told() {
+fn a_percept_is_explained_and_its_history_sent() {
     let run = frames(&done(&["run", "--quiet", "--backend", "cpu", "--sink", "-"]));
     let mut view = Run::spawn(&VIEW);
     let mut viewer = view.viewer();

@@ -37,7 +37,7 @@ fn target(
 }
 
 /// Whether a parser takes it; an error must be a line that says something.
-fn told<T>(result: Result<T>) -> Verdict {
+fn verdict<T>(result: Result<T>) -> Verdict {
     match result {
         Ok(_) => Ok(true),
         Err(e) => {
@@ -73,7 +73,7 @@ pub(super) fn csv() -> Target {
         let read = CsvSource::from_reader("a.csv", Cursor::new(case.bytes.to_vec()), None, None);
         let (frames, losses) = match read.and_then(|mut source| frames(&mut source)) {
             Ok(read) => read,
-            Err(e) => return told::<()>(Err(e)),
+            Err(e) => return verdict::<()>(Err(e)),
         };
         let expected = rows(&case.text()).saturating_sub(1);
         if losses.is_empty() && frames.len() < expected {
@@ -91,7 +91,7 @@ pub(super) fn ndjson() -> Target {
             Ok((frames, losses)) if losses.is_empty() && frames.len() < rows(&case.text()).min(MAX_FRAMES) => {
                 Err(format!("{} frames of {} lines, and nothing is said to be lost", frames.len(), rows(&case.text())))
             }
-            read => told(read),
+            read => verdict(read),
         }
     })
 }
@@ -100,9 +100,9 @@ pub(super) fn text() -> Target {
     target("text", "a.txt", seeds::text(), |case| {
         let mut source = match TextSource::from_bytes(case.bytes, &VendorOptions::default()) {
             Ok(source) => source,
-            Err(e) => return told::<()>(Err(e)),
+            Err(e) => return verdict::<()>(Err(e)),
         };
-        told(source.body())?;
+        verdict(source.body())?;
         let understood = source.understood();
         let (frames, losses) = frames(&mut source).map_err(|e| e.to_string())?;
         let skipped: usize = losses.iter().filter_map(|loss| loss.split(' ').nth(1)?.parse::<usize>().ok()).sum();
@@ -121,13 +121,13 @@ pub(super) fn csv_skin() -> Target {
     target("csv_skin", "a.csv", [seeds::CSV_SKIN], |case| {
         let read = read_taxel_table(case.bytes, false);
         let flat = read_taxel_table(case.bytes, true);
-        told(flat)?;
+        verdict(flat)?;
         match read {
             // A carriage return alone ends a row too.
             Ok(taxels) if taxels.len() + 1 > rows(&case.text().replace('\r', "\n")) => {
                 Err(format!("{} taxels of fewer rows", taxels.len()))
             }
-            read => told(read),
+            read => verdict(read),
         }
     })
 }
@@ -138,7 +138,7 @@ fn vendor(name: &'static str, file: &'static str, seeds: Vec<Vec<u8>>, options: 
             let _ = (source.body()?, source.calibration());
             frames(&mut source)
         });
-        told(read)
+        verdict(read)
     })
 }
 
@@ -209,7 +209,7 @@ pub(super) fn mcap() -> Target {
         Ok((frames, losses)) if losses.is_empty() && frames != expected => {
             Err(format!("{} frames of {}, or other values, and nothing is said", frames.len(), expected.len()))
         }
-        read => told(read),
+        read => verdict(read),
     })
 }
 
@@ -224,7 +224,7 @@ pub(super) fn bag_metadata() -> Target {
             // A name that no file can have is left to the parser.
             let _ = std::fs::write(&file, &mcap);
         }
-        told(BagSurvey::read(folder, |_| {}))
+        verdict(BagSurvey::read(folder, |_| {}))
     })
 }
 
@@ -239,7 +239,7 @@ pub(super) fn bag() -> Target {
         Ok(survey) if survey.losses.is_empty() && count(&survey) < expected => {
             Err(format!("{} messages of {expected}, and nothing is said to be lost", count(&survey)))
         }
-        read => told(read),
+        read => verdict(read),
     })
 }
 
@@ -290,7 +290,7 @@ fn mesh(name: &'static str, file: &'static str, seeds: Vec<Vec<u8>>) -> Target {
         let opened = somatic::author::mesh::open(case.path, &MeshOptions::default());
         match opened.and_then(|file| file.read()) {
             Ok((body, _)) => used(&body),
-            Err(e) => told::<()>(Err(e)),
+            Err(e) => verdict::<()>(Err(e)),
         }
     })
 }
@@ -302,10 +302,10 @@ pub(super) fn urdf() -> Target {
         }
         let opened = somatic::author::mesh::open(case.path, &MeshOptions::default());
         let skin = author_urdf_skin(case.path, &MeshOptions::default());
-        told(skin)?;
+        verdict(skin)?;
         match opened.and_then(|file| file.read()) {
             Ok((body, _)) => used(&body),
-            Err(e) => told::<()>(Err(e)),
+            Err(e) => verdict::<()>(Err(e)),
         }
     })
 }
@@ -318,13 +318,13 @@ pub(super) fn urdf_joints() -> Target {
                 let positions = vec![0.1; robot.joint_names().len()];
                 Ok(!robot.link_poses(&positions).is_empty())
             }
-            Err(e) => told::<()>(Err(e)),
+            Err(e) => verdict::<()>(Err(e)),
         }
     })
 }
 
 pub(super) fn mjcf() -> Target {
-    target("mjcf", "a.xml", [seeds::MJCF], |case| told(author_mjcf_skin(case.path, &MeshOptions::default())))
+    target("mjcf", "a.xml", [seeds::MJCF], |case| verdict(author_mjcf_skin(case.path, &MeshOptions::default())))
 }
 
 pub(super) fn collada() -> Target {
@@ -346,10 +346,10 @@ pub(super) fn ply() -> Target {
 fn body(name: &'static str, file: &'static str, seeds: Vec<Vec<u8>>) -> Target {
     target(name, file, seeds, |case| {
         // Authoring reads it in its own way.
-        told(Original::from_bytes("a.glb", case.bytes, None).and_then(|file| file.read().map(|_| ())))?;
+        verdict(Original::from_bytes("a.glb", case.bytes, None).and_then(|file| file.read().map(|_| ())))?;
         match Body::from_bytes("a.glb", case.bytes) {
             Ok(body) => used(&body),
-            Err(e) => told::<()>(Err(e)),
+            Err(e) => verdict::<()>(Err(e)),
         }
     })
 }
@@ -379,7 +379,7 @@ pub(super) fn body_extras() -> Target {
         node["extras"][key] = case.text().into();
         match Body::from_bytes("a.gltf", whole.to_string().as_bytes()) {
             Ok(body) => used(&body),
-            Err(e) => told::<()>(Err(e)),
+            Err(e) => verdict::<()>(Err(e)),
         }
     })
 }
@@ -395,7 +395,7 @@ pub(super) fn icub() -> Target {
                 Err(e) => Err(format!("what it reads makes no body: {e}")),
             }
         }
-        Err(e) => told::<()>(Err(e)),
+        Err(e) => verdict::<()>(Err(e)),
     })
 }
 
@@ -404,7 +404,9 @@ pub(super) fn recipe() -> Target {
         file("examples/recipes/hand.toml"),
         b"[[place]]\ntaxels = 50\n[[fields]]\nname = \"a\"\ntaxels = [3, \"10..=20\"]\n".to_vec(),
     ];
-    target("recipe", "a.toml", seeds, |case| told(Recipe::parse("a.toml", &case.text(), case.path.parent().unwrap())))
+    target("recipe", "a.toml", seeds, |case| {
+        verdict(Recipe::parse("a.toml", &case.text(), case.path.parent().unwrap()))
+    })
 }
 
 pub(super) fn scene() -> Target {
@@ -420,19 +422,19 @@ pub(super) fn calibration() -> Target {
     let seeds = [seeds::CALIBRATION.as_bytes().to_vec(), file("examples/robots/arm-calibration.toml")];
     target("calibration", "a.toml", seeds, |case| {
         let ids: Vec<u32> = (0..200).collect();
-        told(Calibration::parse(&case.text(), &ids))
+        verdict(Calibration::parse(&case.text(), &ids))
     })
 }
 
 pub(super) fn wiring() -> Target {
     let seeds = [file("examples/wirings/hand.toml"), file("examples/wirings/hand-boards.toml")];
-    target("wiring", "a.toml", seeds, |case| told(Wiring::from_text(&case.text())))
+    target("wiring", "a.toml", seeds, |case| verdict(Wiring::from_text(&case.text())))
 }
 
 pub(super) fn simulation() -> Target {
     target("simulation", "a.toml", [file("examples/simulations/press.toml")], |case| {
         let body = Body::from_bytes("hand", bundled::HAND).map_err(|e| e.to_string())?;
-        told(SimulatedSource::on_body("a.toml", &case.text(), body))
+        verdict(SimulatedSource::on_body("a.toml", &case.text(), body))
     })
 }
 
@@ -495,12 +497,12 @@ pub(super) fn source_names() -> Target {
         "-",
         "csv:-",
     ];
-    names("source_names", all, |text| told(text.parse::<SourceSpec>()))
+    names("source_names", all, |text| verdict(text.parse::<SourceSpec>()))
 }
 
 pub(super) fn sink_names() -> Target {
     let all: &[&str] = &["ndjson:a.ndjson", "csv:a.csv", "mcap:a.mcap", "page:127.0.0.1:7879", "ros2-mcap:bag", "-"];
-    names("sink_names", all, |text| told(text.parse::<SinkSpec>()))
+    names("sink_names", all, |text| verdict(text.parse::<SinkSpec>()))
 }
 
 fn sheet(text: &str, arguments: impl Fn(&str) -> Vec<String>) -> Verdict {
@@ -551,6 +553,6 @@ pub(super) fn joint_states() -> Target {
                 let _ = states.at(joint, 0.55, joint % 2 == 0);
             }
         }
-        told(states)
+        verdict(states)
     })
 }

@@ -3,7 +3,7 @@
 
     python escape.py SOMATIC TAXELS FILE... [--keep]
 
-Authors each FILE (a mesh, a URDF, or the name of a bundled body) with so many taxels, and prints a JSON object by file. From each taxel
+Authors each FILE (a mesh, a URDF, or the name of a bundled body) with TAXELS taxels, and prints a JSON object by file. From each taxel
 rays start 0.1 mm outside in 256 directions, which are turned against those of the program, on the body at rest: skinned by the weights
 of all joints. Taxels from which none leaves the body are looked at again in poses of its joints, drawn at random.
 
@@ -275,7 +275,7 @@ def checked(path, count):
     for link in sorted(set(own.tolist()) | set(links.tolist())):
         share = count * (is_open & (own == link)).sum() / is_open.sum()
         has = int((links == link).sum())
-        # The share itself is of so many points.
+        # The share itself is that of a sample of points.
         doubt = 2 * count * np.sqrt(max((is_open & (own == link)).sum(), 1)) / is_open.sum()
         limit = (0.3 * share if share >= 2 else 1.0) + doubt
         if abs(has - share) > limit:

@@ -156,7 +156,7 @@ fn a_rod_at_any_angle_has_it() {
 }
 
 #[test]
-fn pressures_of_every_size_are_measured_or_told() {
+fn pressures_of_every_size_are_measured_or_flagged() {
     let body = ring();
     for backend in backends() {
         let mut engine = engine(&body, backend, Outputs::USUAL_AND_MOTION - Outputs::POSITION - Outputs::NORMAL);

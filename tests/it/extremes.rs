@@ -200,7 +200,7 @@ fn coincident_taxels_have_no_line() {
 }
 
 #[test]
-fn what_is_not_finite_is_left_out_and_told() {
+fn what_is_not_finite_is_left_out_and_flagged() {
     let body = field(&SQUARE);
     for bad in [f64::NAN, -f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, 1.2e18, -1.2e18] {
         for p in percepts(&body, &[2.0, bad, 0.0, 2.0]) {
@@ -258,7 +258,7 @@ fn a_faint_neighbour_of_a_huge_value_does_no_harm() {
 }
 
 #[test]
-fn a_missing_value_is_left_out_and_told() {
+fn a_missing_value_is_left_out_and_flagged() {
     let body = field(&SQUARE);
     let mut some = frame(0.0, &[2.0, 9.0, 0.0, 2.0]);
     some.values[1] = RawValue::MISSING;

@@ -161,7 +161,7 @@ fn column(errors: &[[f64; 4]], column: usize) -> Vec<f64> {
 fn a_rods_angle_is_ten_times_as_true_as_its_axis() {
     let errors = rods(0.05, "", None);
     let [axis, fit, centroid, place] = [0, 1, 2, 3].map(|of| column(&errors, of));
-    let told = format!(
+    let summary = format!(
         "{} rods: axis {:.2}°, fit {:.2}° (median {:.2}, p95 {:.2}); across {:.3} mm, fit {:.3} mm",
         errors.len(),
         rms(&axis),
@@ -171,11 +171,11 @@ fn a_rods_angle_is_ten_times_as_true_as_its_axis() {
         rms(&centroid),
         rms(&place)
     );
-    println!("{told}");
-    assert!(errors.len() > 750, "{told}");
-    assert!(rms(&axis) > 3.5 && rms(&fit) < 0.45 && rms(&fit) < 0.1 * rms(&axis), "{told}");
-    assert!(quantile(&fit, 0.5) <= 0.4 && quantile(&fit, 0.95) <= 2.0, "{told}");
-    assert!(rms(&place) <= 0.2 && rms(&place) < 0.4 * rms(&centroid), "{told}");
+    println!("{summary}");
+    assert!(errors.len() > 750, "{summary}");
+    assert!(rms(&axis) > 3.5 && rms(&fit) < 0.45 && rms(&fit) < 0.1 * rms(&axis), "{summary}");
+    assert!(quantile(&fit, 0.5) <= 0.4 && quantile(&fit, 0.95) <= 2.0, "{summary}");
+    assert!(rms(&place) <= 0.2 && rms(&place) < 0.4 * rms(&centroid), "{summary}");
     // Negative control: under another layer the same readings have another answer, which is not as true.
     let wrong = rods(0.05, "", Some("\n[layer]\nsigma_m = 0.008\n"));
     assert!(wrong.is_empty() || rms(&column(&wrong, 1)) > 2.0 * rms(&fit), "{}", rms(&column(&wrong, 1)));
@@ -188,14 +188,14 @@ const OTHER: &str = "kernel = \"boussinesq\"\ncontact = \"hertz\"\n";
 fn a_rods_angle_is_truer_than_its_axis_under_a_layer_that_the_fit_does_not_know() {
     let errors = rods(0.05, OTHER, None);
     let [axis, fit, centroid, place] = [0, 1, 2, 3].map(|of| rms(&column(&errors, of)));
-    let told =
+    let summary =
         format!("{} rods: axis {axis:.2}°, fit {fit:.2}°; across {centroid:.3} mm, fit {place:.3} mm", errors.len());
-    println!("{told}");
-    assert!(errors.len() > 750 && fit <= 1.4 && fit < 0.4 * axis && place < 0.8 * centroid, "{told}");
+    println!("{summary}");
+    assert!(errors.len() > 750 && fit <= 1.4 && fit < 0.4 * axis && place < 0.8 * centroid, "{summary}");
 }
 
 #[test]
-fn a_rod_that_ends_on_the_field_is_doubted_or_told_no_worse_than_by_its_axis() {
+fn a_rod_that_ends_on_the_field_is_in_doubt_or_fitted_no_worse_than_by_its_axis() {
     // By whether there is a doubt: the errors of the fit and of the axis.
     let mut errors = [const { [Vec::new(), Vec::new()] }; 2];
     for (off, radius_m) in [(-0.005, 0.0127), (0.0, 0.0127), (0.006, 0.01)] {
@@ -209,13 +209,13 @@ fn a_rod_that_ends_on_the_field_is_doubted_or_told_no_worse_than_by_its_axis() {
             axes.push(degrees_between(axis, angle));
         }
     }
-    let told = errors
+    let summary = errors
         .each_ref()
         .map(|[fits, axes]| format!("{} with axis {:.2}°, fit {:.2}°", fits.len(), rms(axes), rms(fits)));
-    println!("rods of 30 mm: {}; with a doubt {}", told[0], told[1]);
+    println!("rods of 30 mm: {}; with a doubt {}", summary[0], summary[1]);
     // Nine sensors say little of an end between them: most of those that are taken for lines are doubted.
     let [[fits, axes], doubted] = &errors;
-    assert!(fits.len() > 100 && doubted[0].len() > fits.len() && rms(fits) < 1.1 * rms(axes), "{told:?}");
+    assert!(fits.len() > 100 && doubted[0].len() > fits.len() && rms(fits) < 1.1 * rms(axes), "{summary:?}");
 }
 
 /// A square grid of sensors without gaps, `half` of them to either side of the middle.
@@ -292,7 +292,7 @@ impl Points {
         [mean, rms(&self.forces.iter().map(|force| force - mean).collect::<Vec<_>>())]
     }
 
-    fn told(&self, pitch: f64, sigma_m: f64) -> String {
+    fn summary(&self, pitch: f64, sigma_m: f64) -> String {
         let [mean, spread] = self.force().map(|part| part * 100.0);
         format!(
             "pitch {:.1} mm, σ {:.1} mm: {} fits; centroid {:.3} mm, fit {:.3} mm; force {mean:+.1} ± {spread:.1} %; {:.2} of σ",
@@ -312,13 +312,13 @@ const GRIDS: [(f64, f64); 4] = [(5e-3, 1.7e-3), (5e-3, 2.3e-3), (6.7e-3, 1.7e-3)
 fn a_points_place_is_truer_than_the_centroid_and_its_force_is_whole() {
     for (pitch, sigma_m) in GRIDS {
         let points = Points::on(pitch, sigma_m, "");
-        let told = points.told(pitch, sigma_m);
-        println!("{told}");
-        assert!(points.places.len() > 150 && rms(&points.places) <= 0.65 * rms(&points.centroids), "{told}");
+        let summary = points.summary(pitch, sigma_m);
+        println!("{summary}");
+        assert!(points.places.len() > 150 && rms(&points.places) <= 0.65 * rms(&points.centroids), "{summary}");
         let [mean, spread] = points.force();
-        assert!(mean.abs() < 0.02 && spread < 0.04, "{told}");
+        assert!(mean.abs() < 0.02 && spread < 0.04, "{summary}");
         // With gains that are exact, errors are no larger than what gains of ± 5 % would make of them.
-        assert!(rms(&points.sigmas) < 1.1, "{told}");
+        assert!(rms(&points.sigmas) < 1.1, "{summary}");
     }
 }
 
@@ -326,10 +326,10 @@ fn a_points_place_is_truer_than_the_centroid_and_its_force_is_whole() {
 fn a_point_is_truer_than_the_centroid_under_a_layer_that_the_fit_does_not_know() {
     for (pitch, sigma_m) in GRIDS {
         let points = Points::on(pitch, sigma_m, OTHER);
-        let told = points.told(pitch, sigma_m);
-        println!("other model: {told}");
-        assert!(points.places.len() > 120 && rms(&points.places) <= 0.9 * rms(&points.centroids), "{told}");
-        assert!(points.force()[1] < 0.06, "{told}");
+        let summary = points.summary(pitch, sigma_m);
+        println!("other model: {summary}");
+        assert!(points.places.len() > 120 && rms(&points.places) <= 0.9 * rms(&points.centroids), "{summary}");
+        assert!(points.force()[1] < 0.06, "{summary}");
     }
 }
 
@@ -397,7 +397,7 @@ fn a_soft_onset_takes_nothing_off_a_contact() {
 }
 
 #[test]
-fn what_cannot_be_told_is_absent_with_its_reason() {
+fn what_is_unknown_is_absent_with_its_reason() {
     let reasons = |all: &[Pressed], flag: TouchFlags| all.iter().filter(|one| one.flags().contains(flag)).count();
     let body = grid(5e-3, 6);
     let pressed = |body: &Body, text: &str, assumed: Option<&str>| fitted(body, text, "grid", assumed);
@@ -428,7 +428,7 @@ fn what_cannot_be_told_is_absent_with_its_reason() {
         [TouchFlags::OFF_SKIN, TouchFlags::FEW_TAXELS, TouchFlags::POOR_FIT].map(|flag| reasons(&beyond, flag));
     let is_told = |one: &&Pressed| one.fit().is_some() && !one.flags().contains(TouchFlags::FEW_TAXELS);
     let given = beyond.iter().filter(is_told).count();
-    println!("beyond the edge: {off} off_skin, {few} few_taxels, {poor} poor_fit, {given} told");
+    println!("beyond the edge: {off} off_skin, {few} few_taxels, {poor} poor_fit, {given} given");
     assert!(off > 20 && given == 0, "{off} {given}");
 
     // Nothing presses like a chequerboard, if it is one touch.
@@ -447,9 +447,9 @@ fn what_cannot_be_told_is_absent_with_its_reason() {
     // Negative control: the middle has none of these.
     let all = pressed(&body, &middle, None);
     let none = TouchFlags::NO_LAYER | TouchFlags::FEW_TAXELS | TouchFlags::OFF_SKIN | TouchFlags::POOR_FIT;
-    let told = all.iter().filter(|one| !one.flags().intersects(none)).count();
+    let without_doubt = all.iter().filter(|one| !one.flags().intersects(none)).count();
     let points = all.iter().filter(|one| one.fit().is_some_and(|fit| fit.kind == ContactKind::Point)).count();
-    assert!(told > 95 && points > 90, "{told} {points}");
+    assert!(without_doubt > 95 && points > 90, "{without_doubt} {points}");
 }
 
 #[test]

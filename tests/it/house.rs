@@ -428,7 +428,7 @@ fn all_that_is_printed_is_escaped_in_one_place() {
         for line in text.lines().map(|line| line.split("//").next().unwrap_or("")) {
             for word in raw.into_iter().filter(|word| line.contains(word)) {
                 let door = doors.iter().any(|door| path == Path::new(door));
-                assert!(door, "{} says `{word}`; people are told through plain.rs or cli/stdio.rs", path.display());
+                assert!(door, "{} says `{word}`; messages go through plain.rs or cli/stdio.rs", path.display());
                 assert_ne!(word, "println!", "{}: a closed terminal would be a panic", path.display());
                 seen.push(word);
             }

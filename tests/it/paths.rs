@@ -1,4 +1,4 @@
-//! Which files of the crate use items of which others, as the compiler would find it.
+//! Which files of the crate use items of which other files, as the compiler would find it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -85,7 +85,7 @@ fn without_its_calibration_the_mat_is_taken_at_its_word() {
 }
 
 #[test]
-fn a_hot_taxel_is_left_out_and_told() {
+fn a_hot_taxel_is_left_out_and_reported() {
     let Some(folder) = data("recordings/mat") else { return };
     let body = Body::from_bytes("mat", somatic::bundled::MAT).unwrap();
     let (ids, frames) = read(&folder.join("posture_1.csv"));

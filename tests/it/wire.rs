@@ -429,8 +429,8 @@ pub(crate) fn frames_of_a_board() -> impl Strategy<Value = Vec<Packet>> {
     })
 }
 
-/// An answer that tells that `sequence` frames were sent.
-fn told(sequence: u32) -> Packet {
+/// An answer that says that `sequence` frames were sent.
+fn answer_after(sequence: u32) -> Packet {
     let head = Head { board: 5, boot: 9, sequence, time_us: 17_535_u32.wrapping_mul(sequence) };
     Packet::Answer { head, answer: Answer { request: 1, command: 0x14, status: Status::Done, value: 0 } }
 }
@@ -446,7 +446,7 @@ proptest! {
     ) {
         let (bytes, whole) = harmed(&frames, &harms);
         let sent = frames.len() as u32;
-        let line = [told(0).line(), bytes, told(sent).line()].concat();
+        let line = [answer_after(0).line(), bytes, answer_after(sent).line()].concat();
         let (mut decoder, mut got) = (Decoder::new(), Vec::new());
         let (mut rest, mut cuts) = (&line[..], cuts.iter().cycle());
         while !rest.is_empty() {
@@ -474,7 +474,7 @@ proptest! {
 
 /// The decoder under random harm for `SOMATIC_FUZZ_SECONDS` (60 if unset), each round from another seed that it tells.
 #[test]
-#[ignore = "runs for as long as it is told to"]
+#[ignore = "runs for as long as SOMATIC_FUZZ_SECONDS says"]
 fn the_decoder_survives_a_long_time() {
     use proptest::strategy::ValueTree as _;
     use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -482,7 +482,7 @@ fn the_decoder_survives_a_long_time() {
     let end = std::time::Instant::now() + std::time::Duration::from_secs(seconds);
     let mut decoder = Decoder::new();
     let (mut rounds, mut sent, mut bytes_sent) = (0_u64, 0_u64, 0_u64);
-    decoder.push(&told(0).line(), |_| ());
+    decoder.push(&answer_after(0).line(), |_| ());
     while std::time::Instant::now() < end {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&rounds.to_le_bytes());
@@ -498,7 +498,8 @@ fn the_decoder_survives_a_long_time() {
         let (bytes, whole) = harmed(&frames, &harms);
         bytes_sent += bytes.len() as u64;
         let mut came = Vec::new();
-        decoder.push(&[bytes, told(sent as u32).line()].concat(), |event| came.push(Packet::from_event(&event)));
+        decoder
+            .push(&[bytes, answer_after(sent as u32).line()].concat(), |event| came.push(Packet::from_event(&event)));
         came.retain(|packet| matches!(packet, Packet::Frame { .. } | Packet::Partial { .. }));
         assert!(came.iter().all(|packet| frames.contains(packet)), "round {rounds}: something came that was not sent");
         assert!(frames.iter().zip(whole).all(|(frame, whole)| !whole || came.contains(frame)), "round {rounds}");

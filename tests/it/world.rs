@@ -176,7 +176,7 @@ fn a_field_over_links_that_move_is_where_its_members_are_now() {
 }
 
 #[test]
-fn a_field_over_links_of_which_one_that_is_pressed_has_no_pose_has_no_position() {
+fn a_field_over_links_has_no_position_if_a_pressed_link_has_no_pose() {
     let moving = Moving::new();
     let mut frame = moving.frames[0].clone();
     let arm = |name: &str| name.starts_with("left_");

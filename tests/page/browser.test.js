@@ -179,7 +179,7 @@ test("a lost WebGL context comes back", async () => {
   await server.stop();
 });
 
-test("a server that goes is told, and one that comes back is shown", async () => {
+test("a server that goes is reported, and one that comes back is shown", async () => {
   const server = await view();
   const { page } = await open(server.url);
   const token = new URL(server.url).hash;

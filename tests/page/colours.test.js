@@ -109,7 +109,7 @@ const apart = (a, b, matrix) => {
   return Math.hypot(...x.map((part, k) => part - y[k]));
 };
 
-/** Colours that are used together: so many fields are plotted at first. */
+/** Colours that are used together: as many as fields that are plotted at first. */
 const TOGETHER = 5;
 /** Least distance of two of them; that of two greys whose lightness differs by a tenth. */
 const LEAST = 0.1;

@@ -23,6 +23,7 @@ import { orientationLine, touchInWorld } from "../../crates/page/src/web/places.
 import { byPixel, runsOf } from "../../crates/page/src/web/plot.js";
 import { spacings } from "../../crates/page/src/web/rest.js";
 import { roundLength } from "../../crates/page/src/web/scale_bar.js";
+import { sideLoadText } from "../../crates/page/src/web/self_contacts.js";
 import { tokenIn } from "../../crates/page/src/web/tokens.js";
 import { BOARD_STATES } from "../../crates/page/src/web/wire.js";
 import { colourIndex, fillColours } from "../../crates/page/src/web/taxels.js";
@@ -229,6 +230,17 @@ test("a touch keeps its colour until it ends, and names its load and flags", () 
   assert.deepEqual(model.touchFlags(model.touch(5)), ["one_taxel", "young"]);
   assert.equal(model.touchLoadText(model.touch(5)), "1.50 kPa");
   assert.equal(model.touchLoadText(touch(6, { force: 2.5 })), "2.50 N");
+  // A side of a self-contact says the same as its touch.
+  const sides = [
+    { link: 0, touch: 5, total: 9 },
+    { link: 1, touch: 77, total: 1e4 },
+  ];
+  assert.deepEqual(
+    sides.map((side) => sideLoadText(model, side)),
+    ["1.50 kPa", "10 kPa"],
+  );
+  model.touch(5).force = 2.5;
+  assert.equal(sideLoadText(model, sides[0]), "2.50 N");
   // A frame without the section has the touches of the one before.
   model.apply({ touches: null });
   assert.equal(model.touches.length, 1);
@@ -375,6 +387,26 @@ test("a field keeps its colour, and fields with other names begin anew", () => {
   model.begin(welcome(["a", "b"]));
   assert.equal(model.fieldColour(1), 0);
   assert.deepEqual([model.loadColumn, model.loadUnit, model.plottedColumn], ["peak", "P", "peak"]);
+});
+
+test("how hard a field is pressed is its force where there is a unit, and areas if that is a pressure", () => {
+  const model = new Model();
+  const columns = ["total", "force"].map((name) => ({ name, unit: "", components: 1 }));
+  const column = (quantity, areas) => {
+    model.begin({ run: "1", columns, fields: [], links: [], quantity });
+    const none = new Float32Array(0);
+    const mesh = {
+      taxelId: new Uint32Array(areas.length),
+      restPose: none,
+      taxelArea: Float32Array.from(areas),
+    };
+    model.setMesh(mesh);
+    return [model.loadColumn, model.loadUnit];
+  };
+  assert.deepEqual(column("count", [1e-5]), ["total", "P"]);
+  assert.deepEqual(column("Pa", [0, 0]), ["total", "P"]);
+  assert.deepEqual(column("Pa", [0, 1e-5]), ["force", "N"]);
+  assert.deepEqual(column("N", [0, 0]), ["force", "N"]);
 });
 
 test("an orientation line ends at the two farthest points of its field", () => {

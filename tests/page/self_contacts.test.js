@@ -18,10 +18,12 @@ test("a gripper that joints close is marked and listed where it touches itself",
 source = ${JSON.stringify(example("gripper-touch.csv"))}
 joints = ${JSON.stringify(example("gripper.urdf"))}
 joint_states = ${JSON.stringify(example("gripper-joints.csv"))}
+calibration = "pascal.toml"
 up = "z"
 outputs = ["total", "position", "touches", "self_contacts"]
 `;
   writeFileSync(join(folder, "gripper.scene.toml"), scene);
+  writeFileSync(join(folder, "pascal.toml"), '[all]\nunit = "Pa"\n');
   const server = await view("gripper.scene.toml");
   const { page, problems } = await open(server.url);
   const seen = () =>
@@ -46,9 +48,10 @@ outputs = ["total", "position", "touches", "self_contacts"]
   assert.match(apart.panel, /No two links touch at one place/);
 
   await seek(page, 0.54);
+  await page.waitForFunction(() => document.querySelector("#self-contact-count").textContent === "1");
   const closed = await seen();
   assert.equal(closed.list.length, 1);
-  assert.match(closed.panel, /left[^]*right[^]*1\.0 mm apart · 180°/);
+  assert.match(closed.panel, /left[^]* m?N[^]*right[^]* m?N[^]*1\.0 mm apart · 180°/);
   // In the world, as every other sink has it.
   await page.waitForFunction(() => /, 67\.50/.test(document.querySelector("#percept-values").innerText));
   const moved = closed.rows.filter((value, i) => Math.abs(value - apart.rows[i]) > 1e-3).length;

@@ -1,6 +1,7 @@
 // Situations that users come into, in a real Chromium: runs without totals, links in a new tab, phones, bodies at rest.
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
+import { once } from "node:events";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
@@ -13,6 +14,7 @@ import {
   overlay,
   picture,
   seek,
+  serve,
   SOMATIC,
   taxelIds,
   view,
@@ -371,6 +373,49 @@ test("a long path is cut off at its beginning", async () => {
   const { page } = await open(server.url);
   const said = await page.locator("#source-name").innerText();
   assert.ok(said.length <= 40 && said.startsWith("…") && said.endsWith("recording.csv"), said);
+  await page.close();
+  await server.stop();
+});
+
+test("boards are listed with their states and rates, also when they have gone", async (t) => {
+  const boards = spawn(
+    SOMATIC,
+    ["board", "--boards", "2", "--loop", "--json", "--link", join(folder, "line")],
+    {
+      stdio: ["ignore", "pipe", "inherit"],
+    },
+  );
+  t.after(() => boards.kill("SIGKILL"));
+  const [said] = await once(boards.stdout, "data");
+  const { playing } = JSON.parse(String(said).split("\n")[0]);
+  const sources = playing.flatMap(({ link }) => ["--source", `serial:${link}`]);
+  const sink = ["--sink", "page:127.0.0.1:0"];
+  const server = await serve("run", "--quiet", "--backend", "cpu", "--body", "hand", ...sources, ...sink);
+  const { page, problems } = await open(server.url);
+  const panel = page.locator("#boards-panel");
+  await panel.locator("summary").click({ timeout: 30000 });
+  await page.waitForFunction(
+    () => window.somatic.model.boards.filter(({ rate_hz }) => rate_hz > 1).length === 2,
+    null,
+    { timeout: 30000 },
+  );
+  assert.equal(await page.locator("#board-count").innerText(), "2 speaking");
+  const rows = await page.locator(".board").allInnerTexts();
+  assert.equal(rows.length, 2);
+  for (const row of rows) assert.match(row, /speaking[^]*[1-9][\d.]* Hz · [1-9]\d* frames · none lost/);
+  await picture(page, "boards.png");
+  const ended = once(boards, "exit");
+  boards.kill("SIGKILL");
+  await ended;
+  await page.waitForFunction(
+    () => document.querySelector("#board-count").textContent === "0 of 2 speaking",
+    null,
+    {
+      timeout: 30000,
+    },
+  );
+  assert.equal(await page.locator(".board.bad").count(), 2);
+  assert.deepEqual(problems, []);
   await page.close();
   await server.stop();
 });

@@ -266,6 +266,9 @@ test("a distance is in millimetres, and a point of the surface is under the poin
     position: new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, -1, 1, 0, -1, 0, 1, -1]),
     link: new Uint32Array(6),
     corners: new Uint32Array([3, 4, 5, 0, 1, 2]),
+    taxelPosition: new Float32Array(0),
+    taxelRadius: new Float32Array(0),
+    taxelLink: new Uint32Array(0),
   };
   model.poseVersion = 1;
   const camera = { eye: [0.25, 0.25, 3], ray: () => [0, 0, -1] };

@@ -1,4 +1,4 @@
-"""Many recordings: by a pool of processes, and on a Ray cluster of two nodes of which a worker is killed."""
+"""Many recordings: by a pool of processes, and on a Ray cluster of two nodes, one of whose workers is killed."""
 
 from __future__ import annotations
 

@@ -172,7 +172,7 @@ assert same and os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     subprocess.run([sys.executable, "-W", "ignore", "-c", code, folder], check=True, timeout=120)
 
 
-def test_progress_is_told_and_its_error_raised(hand: st.Body) -> None:
+def test_progress_is_reported_and_its_error_raised(hand: st.Body) -> None:
     t, values = pressed(hand, 3000)
     engine = st.Engine(hand, backend="cpu")
     told: list[int] = []

@@ -48,7 +48,7 @@ def test_stretches_without_frames_are_left_out(tmp_path: pathlib.Path) -> None:
     assert read == [[0, 0.5], [1], [7.25, 7.5], [8]]
 
 
-def test_what_is_lost_is_told_once(tmp_path: pathlib.Path) -> None:
+def test_a_lost_frame_is_reported_once(tmp_path: pathlib.Path) -> None:
     path = tmp_path / "short.csv"
     path.write_text("t,0,1\n0,1,2\n1,1,2\n2,3,4\n3,3")
     whole = st.read(path)

@@ -207,7 +207,7 @@ def test_units(hand: st.Body) -> None:
     assert st.Engine(hand, backend="cpu").step(0, [1] * 40).unit("total") == "count"
 
 
-def test_whoever_gives_an_old_name_is_told_the_new_one(touch: st.Recording) -> None:
+def test_an_old_name_gives_an_error_with_the_new_one(touch: st.Recording) -> None:
     for scene, new in [
         ({"outputs": ["axis"]}, "`axis` is `principal_axis` now"),
         ({"outputs": ["footprint_angle"]}, "`footprint_angle` is `touches.fit_direction` now"),

@@ -184,7 +184,7 @@ def strokes(scene, arguments):
 
 
 def pairs(scene, arguments):
-    """Two balls side by side; where the saddle between their peaks is low, they should be told apart. One ball and one rod should not."""
+    """Two balls side by side; where the saddle between their peaks is low, they should be two touches. One ball and one rod should not."""
     rng = np.random.default_rng(arguments.seed + 4)
     made = []
     for index in range(arguments.pairs):

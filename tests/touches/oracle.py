@@ -8,7 +8,7 @@ touches,touches.taxels,touches.orientation` gave for FRAMES.csv. CALIBRATION.tom
 mask; gains are powers of two and baselines whole numbers, so that P is exact.
 
 Prints a JSON object: `frames`, `touches` (compared), `wrong` (the number of touches and frames with something wrong), `examples` of
-these, and `excluded`: by kind of choice the number of touches of which something hangs on a choice that is too close to call.
+these, and `excluded`: by kind of choice, the number of touches that depend on a choice too close to call.
 
 `random` makes bodies and recordings in FOLDER, runs SOMATIC on them, and compares: some thousands of touches, or with --long over
 100,000. It prints a line for each recording, then the sum, with `missed`: what was changed in a touch and not found to be wrong.
@@ -107,10 +107,10 @@ class Comparison:
         claims = self.identities(frame, found)
         touches = {frozenset(self.skin.node_of[i] for i in touch["taxels"]): touch for touch in told["touches"]}
         ids, new = {}, []
-        # Touches of the frame before that share pressure with a region which was told otherwise, by a choice too close to call: how they
-        # go on hangs on it.
-        told_otherwise = [region for region in found if region.doubts and frozenset(region.members) not in touches]
-        claimed = {self.id_of.get(node) for region in told_otherwise for node in region.members} - {None}
+        # Touches of the frame before that share pressure with a region that the program divided otherwise, by a choice too close to
+        # call: how they go on depends on it.
+        divided_otherwise = [region for region in found if region.doubts and frozenset(region.members) not in touches]
+        claimed = {self.id_of.get(node) for region in divided_otherwise for node in region.members} - {None}
         for region, (kept, merged, doubts) in zip(found, claims):
             region.doubts |= doubts
             touch = touches.pop(frozenset(region.members), None)
@@ -140,9 +140,9 @@ class Comparison:
         for touch in touches.values():
             if not doubtful:
                 self.error("no such region", told=touch["taxels"])
-        # What was divided otherwise, by a choice that is too close to call, goes on as it was told.
-        self.told_otherwise = {touch["id"] for touch in touches.values()}
-        self.unknown_trails |= self.told_otherwise
+        # What was divided otherwise, by a choice that is too close to call, goes on as the program reported it.
+        self.divided_otherwise = {touch["id"] for touch in touches.values()}
+        self.unknown_trails |= self.divided_otherwise
         told_ids = {touch["id"] for touch in told["touches"]}
         gone = before - told_ids if not restarts else set(before)
         if sorted(gone) != told["released"]:
@@ -201,7 +201,7 @@ class Comparison:
         last = {touch["id"] for touch in told["touches"]}
         self.pairs = {pair for pair in self.pairs if pair <= last}
         self.pairs |= {frozenset((a, b)) for a, b, _ in both if a is not None and b is not None}
-        self.doubtful = {i for a, b, doubts in both if doubts for i in (a, b)} - {None} | self.told_otherwise
+        self.doubtful = {i for a, b, doubts in both if doubts for i in (a, b)} - {None} | self.divided_otherwise
         self.onset = {touch["id"]: self.onset.get(touch["id"], t) for touch in told["touches"]}
 
     # Quantities of one touch.
@@ -317,7 +317,7 @@ class Comparison:
                     wrong["position"] = (position.tolist(), best.tolist(), mean.tolist())
 
     def choice(self, touch, choices, there, wrong):
-        """Some choice of base and of farthest points gives what was told."""
+        """Some choice of base and of farthest points gives what the program reported."""
         told_axis, told_line = there("principal_axis"), there("orientation")
         fits, why = [], []
         for one in choices:

@@ -13,7 +13,7 @@ from skin import Skin, nearest_on
 CHUNK = 25
 # Readings are whole numbers of this many parts of a press's largest value.
 PARTS = 800
-# Readings of untouched sensors with noise up to so many standard deviations are 0.
+# Readings of untouched sensors are 0 while their noise is below this number of standard deviations.
 SIGMAS = 6
 STIFFNESS = 400e3
 

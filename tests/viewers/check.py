@@ -41,7 +41,7 @@ def checked(schema):
         for number, field in fields.items():
             assert theirs[name].get(number) == field, (name, number, field, theirs[name].get(number))
         for number in theirs[name].keys() - fields.keys():
-            print(f"  {name}.{theirs[name][number][0]} is published, and not told of here")
+            print(f"  {name}.{theirs[name][number][0]} is published, and not checked here")
     print(f"{schema.name}: {len(ours)} messages as Foxglove publishes them")
 
 

@@ -24,8 +24,10 @@ macro_rules! files {
 /// One line a file.
 const FILES: &[PageFile] = files![
     "address.js",
+    "aim.js",
     "boards.js",
     "body.js",
+    "box_tree.js",
     "camera.js",
     "chart.js",
     "choices.js",
@@ -65,6 +67,7 @@ const FILES: &[PageFile] = files![
     "plot_file.js",
     "plots.js",
     "reasons.js",
+    "reported.js",
     "rest.js",
     "scale_bar.js",
     "socket.js",
@@ -72,6 +75,7 @@ const FILES: &[PageFile] = files![
     "stage.css",
     "status.js",
     "style.css",
+    "surface.js",
     "taxel_ids.js",
     "taxels.js",
     "theme.js",

@@ -494,7 +494,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_without_topic_time_or_bytes_are_told() {
+    fn messages_without_topic_time_or_bytes_are_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.db3");
         let database = write(&path, 3, small());

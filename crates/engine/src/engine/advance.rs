@@ -66,13 +66,14 @@ impl Engine {
     /// Checks `input`, and brings its values and times into the form that backends read.
     fn gather(&mut self, input: Input<'_>) -> Result<()> {
         let Input { frames, values } = input;
+        self.links.forget();
         for (index, frame) in frames.iter().enumerate() {
             let at = |e: Error| e.at(format!("frame {}", self.frames_done + index as u64));
             let (got, want) = (values.row(index).len(), self.intake.width());
             if got != want {
                 return Err(at(Error::failed(format!("it has {got} values for {want} channels; give one for each"))));
             }
-            if let Some((name, _)) = frame.pose.iter().find(|(name, _)| !self.links.index_of.contains_key(name)) {
+            if let Err(name) = self.links.resolve(frame) {
                 let near = nearest(name, self.links.index_of.keys().map(String::as_str));
                 let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
                 return Err(at(Error::failed(format!("link `{name}` has a pose and is not in the body{hint}"))));

@@ -168,7 +168,7 @@ impl OnSkin {
             }
             self.poses.clear();
             if !found.touches.is_empty() && links.may_pose(frame) {
-                links.poses_into(frame, &mut self.poses);
+                links.poses_into(index, frame, &mut self.poses);
                 put_in_world(&self.poses, &mut found);
             }
             if let Some(self_contacts) = &mut self.self_contacts {

@@ -42,7 +42,8 @@ pub(super) fn all_frames(of: Frames<'_>, percepts: &mut Percepts) {
 
 fn run_of_frames(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>) {
     let (plan, links, frames) = (of.plan, of.links, &of.frames[range.clone()]);
-    with_widest!(Level::new(), simd => with_vectors_of(simd, plan, links, frames, cells));
+    let first = of.number_of(range.start);
+    with_widest!(Level::new(), simd => with_vectors_of(simd, plan, links, (first, frames), cells));
     if !plan.spread_slots.is_empty() {
         link_by_link(of, range, cells);
     }
@@ -71,9 +72,15 @@ fn link_by_link(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>)
     }
 }
 
-/// The same; the compiler uses the vectors of whoever calls it.
+/// The same, for `frames`, of which the first has the number `first` in the call; the compiler uses the vectors of whoever calls it.
 #[inline(always)]
-fn with_vectors_of<S>(_: S, plan: &Plan, links: &Links, frames: &[Frame], cells: &mut PlaceCells<'_>) {
+fn with_vectors_of<S>(
+    _: S,
+    plan: &Plan,
+    links: &Links,
+    (first, frames): (usize, &[Frame]),
+    cells: &mut PlaceCells<'_>,
+) {
     let fields = plan.fields.len();
     let mut found = Found::new();
     // Some frames of a field in turn, so that its surface is at hand.
@@ -87,12 +94,12 @@ fn with_vectors_of<S>(_: S, plan: &Plan, links: &Links, frames: &[Frame], cells:
                 }
                 found.add(field, frame, cell, cells.centroid(cell));
                 if found.is_full() {
-                    found.put(links, frames, cells);
+                    found.put(links, (first, frames), cells);
                 }
             }
         }
     }
-    found.put(links, frames, cells);
+    found.put(links, (first, frames), cells);
 }
 
 /// Cells that were read off their surfaces, whose normals are brought to unit length together: a root and a quotient
@@ -123,12 +130,12 @@ impl<'a> Found<'a> {
     }
 
     #[inline(always)]
-    fn put(&mut self, links: &Links, frames: &[Frame], cells: &mut PlaceCells<'_>) {
+    fn put(&mut self, links: &Links, (first, frames): (usize, &[Frame]), cells: &mut PlaceCells<'_>) {
         let inverse = self.normals.map(inverse_length);
         for i in 0..self.count {
             let (Some(field), frame, cell) = self.at[i] else { continue };
             let (position, normal) = (self.points[i], unit(self.normals[i], inverse[i], field.surface.as_ref()));
-            match links.world_from_anchor(field, &frames[frame]) {
+            match links.world_from_anchor(field, first + frame, &frames[frame]) {
                 Some(world) => {
                     let (position, normal) = in_world(&world, position, normal);
                     cells.put(cell, position, normal, true);

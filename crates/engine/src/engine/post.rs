@@ -74,7 +74,7 @@ pub(super) fn flag_stale_poses(plan: &Plan, links: &Links, frames: &[Frame], per
         let cells = &mut percepts.flags[index * plan.fields.len()..];
         for (flags, field) in cells.iter_mut().zip(plan.fields.iter()) {
             let is_placed = match field.parts.is_empty() {
-                true => links.world_from_anchor(field, frame).is_some(),
+                true => links.world_from_anchor(field, index, frame).is_some(),
                 false => !flags.contains(Flags::NO_POSE),
             };
             if !flags.contains(Flags::NO_CONTACT) && !is_placed {
@@ -231,7 +231,7 @@ impl Post<'_> {
         }
         let position_in_anchor = || place::on_skin(field, centroid(percepts, cell)).0;
         let position_in_world = if field.parts.is_empty() {
-            let world = self.links.world_from_anchor(field, &of.frames[0]);
+            let world = self.links.world_from_anchor(field, of.number_of(0), &of.frames[0]);
             world.map(|world| world.transform_point3(position_in_anchor()))
         } else if self.links.are_posed(&of.frames[0]) {
             of.position(field, 0, now).ok()

@@ -40,11 +40,16 @@ pub(super) struct Now {
 }
 
 impl Frames<'_> {
+    /// The number of frame `frame` in the call.
+    pub(super) fn number_of(&self, frame: usize) -> usize {
+        self.raw.first + self.offset + frame
+    }
+
     /// By link, where it is in frame `frame`.
     pub(super) fn poses<'n>(&self, frame: usize, now: &'n mut Now) -> &'n [Option<DAffine3>] {
         if now.posed != Some(frame) {
             now.posed = Some(frame);
-            self.links.poses_into(&self.frames[frame], &mut now.poses);
+            self.links.poses_into(self.number_of(frame), &self.frames[frame], &mut now.poses);
         }
         &now.poses
     }

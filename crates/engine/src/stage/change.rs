@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_told_is_left_out_with_its_reason() {
+    fn what_is_unknown_is_left_out_with_its_reason() {
         let taxel = TaxelCalibration { raw_range: [0.0, 500.0], ..TaxelCalibration::default() };
         let [one, over] = [1.0, 600.0].map(|raw| heard(RawValue::new(raw), &taxel));
         let missing = heard(RawValue::MISSING, &taxel);

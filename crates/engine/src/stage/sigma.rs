@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_told_is_absent_with_its_reason() {
+    fn what_is_unknown_is_absent_with_its_reason() {
         let none = |taxels: &[Felt]| {
             let sigmas = reference(taxels, true);
             assert_eq!((sigmas.total, sigmas.centroid, sigmas.principal_axis), (None, None, None));

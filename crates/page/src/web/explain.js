@@ -83,7 +83,7 @@ export class PerceptPanel {
       const row = this.rows.get(column.name);
       if (!row) continue;
       row.row.hidden = column.name === "total" && force !== null && Number.isFinite(force[0]);
-      const value = model.told(field, column.name);
+      const value = model.forPeople(field, column.name);
       const text = value
         ? vectorWithUnit(value, column.unit, model.quantity)
         : `${ABSENT} ${touched ? model.reason(field, column.name).replaceAll("_", " ") : ""}`;

@@ -1,8 +1,9 @@
 /** Starts the page and joins its parts. */
 
 import { Address } from "./address.js";
+import { Aim } from "./aim.js";
 import { Boards } from "./boards.js";
-import { Camera, chooseDirection } from "./camera.js";
+import { Camera } from "./camera.js";
 import { ChartPanel } from "./chart.js";
 import { Choices } from "./choices.js";
 import { SelfContactsPanel } from "./self_contacts.js";
@@ -14,7 +15,6 @@ import { Keys } from "./keys.js";
 import { GESTURES, keyList } from "./keylist.js";
 import { Legend } from "./legend.js";
 import { Log } from "./log.js";
-import { dot, toWorld } from "./math.js";
 import { Measure } from "./measure.js";
 import { Model } from "./model.js";
 import { Marks } from "./percepts.js";
@@ -23,7 +23,6 @@ import { Peaks } from "./peaks.js";
 import { Photo } from "./photo.js";
 import { Picker } from "./pick.js";
 import { TaxelIds } from "./taxel_ids.js";
-import { taxelInWorld } from "./places.js";
 import { PlotFile } from "./plot_file.js";
 import { Plots } from "./plots.js";
 import { Connection, takeToken } from "./socket.js";
@@ -66,14 +65,14 @@ const plots = new Plots(model, connection, span);
 const peaks = new Peaks(model, span, connection);
 const timeline = new Timeline(model, connection, span);
 const percept = new PerceptPanel(model, choices, connection, plots);
-const fields = new Fields(model, choices, lookAt);
+const fields = new Fields(model, choices, (field) => aim.atField(field));
 const chart = new ChartPanel(
   byId("chart", HTMLCanvasElement),
   byId("chart-note", HTMLElement),
   model,
   choices,
 );
-const touches = new TouchPanel(model, choices, (touch) => lookAtTaxels([...touch.taxels]));
+const touches = new TouchPanel(model, choices, (touch) => aim.atTaxels([...touch.taxels]));
 const selfContacts = new SelfContactsPanel(model, choices);
 new Boards(model);
 new RestPanel(model);
@@ -85,103 +84,12 @@ new Log(
 new Status(model, view, connection.hold);
 plots.onSeek = (t) => timeline.seek(t);
 
-/** @param {number} field */
-function lookAt(field) {
-  lookAtTaxels(model.welcome?.fields[field]?.members ?? []);
-}
-
-/** @param {number[]} members taxels */
-function lookAtTaxels(members) {
-  if (!members.length) return;
-  const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? [0, 0, 0]);
-  const mean = [0, 1, 2].map((k) => normals.reduce((sum, normal) => sum + normal[k], 0) / normals.length);
-  // Taxels that look one way are seen from that side; those that go around the body from where we are.
-  if (Math.hypot(...mean) > 0.6) {
-    camera.yaw = Math.atan2(mean[1], mean[0]) + 0.25;
-    camera.pitch = Math.max(-1.3, Math.min(1.3, Math.asin(mean[2] / Math.hypot(...mean)) + 0.2));
-    camera.update();
-  }
-  camera.frame(
-    members.map((taxel) => taxelInWorld(model, taxel)?.point ?? camera.target),
-    0.24,
-  );
-  moved();
-}
-
-/** Takes in the whole body. */
-function lookAtAll() {
-  const { mesh, rows } = model;
-  if (!mesh) return;
-  const vertices = mesh.link.length;
-  const step = Math.max(1, Math.floor(vertices / 3000));
-  /** @type {import("./math.js").Vec3[]} */
-  const points = [];
-  for (let i = 0; i < vertices; i += step) points.push(toWorld(rows, mesh.link[i], mesh.position, 1, 3 * i));
-  if (!points.length)
-    for (let i = 0; i < mesh.taxelId.length; i++) points.push(taxelInWorld(model, i)?.point ?? [0, 0, 0]);
-  const [low, high] = [0, 1, 2].reduce(
-    ([lo, hi], k) => [
-      [...lo, points.reduce((m, p) => Math.min(m, p[k]), Infinity)],
-      [...hi, points.reduce((m, p) => Math.max(m, p[k]), -Infinity)],
-    ],
-    /** @type {[number[], number[]]} */ ([[], []]),
-  );
-  camera.radius = Math.max(1e-3, Math.hypot(...high.map((h, k) => h - low[k])) / 2);
-  camera.frame(points, 0.08);
-  moved();
-}
+const aim = new Aim(stage, model, camera, choices, moved);
 
 function moved() {
   view.request();
   address.changed();
-  if (turned) paired.share();
-}
-
-/** @type {import("./math.js").Vec3} */
-const NO_NORMAL = [0, 0, 0];
-
-/** Whether somebody has turned the body: from then on it stays as it is. */
-let turned = false;
-for (const event of ["pointerdown", "wheel"])
-  stage.addEventListener(event, () => (turned = true), { passive: true });
-// Before the key acts.
-window.addEventListener(
-  "keydown",
-  (event) => {
-    if (/^(Arrow\w+|[0-9f+=-])$/.test(event.key)) turned = true;
-  },
-  { capture: true },
-);
-
-/** The touch or field whose side was shown last. */
-let shownSide = "";
-
-/** The taxels of the oldest touch, or where touches are not looked for those of the field that is followed. */
-function touchedTaxels() {
-  if (model.welcome?.touches) {
-    const [touch] = model.touches;
-    return { name: `touch ${touch?.id}`, members: [...(touch?.taxels ?? [])] };
-  }
-  const { field } = choices;
-  const members = field !== null && model.inContact.has(field) ? model.welcome?.fields[field]?.members : [];
-  return { name: `field ${field}`, members: members ?? [] };
-}
-
-/** Turns the body so that the side that is touched is seen, until somebody turns it. */
-function showTouchedSide() {
-  if (turned) return;
-  const { name, members } = touchedTaxels();
-  if (!members.length || name === shownSide) return;
-  shownSide = name;
-  const normals = members.map((taxel) => taxelInWorld(model, taxel)?.normal ?? NO_NORMAL);
-  const facing = normals.reduce((sum, normal) => sum + dot(normal, camera.back), 0) / normals.length;
-  if (facing > 0.2) return;
-  chooseDirection(
-    camera,
-    normals,
-    members.map((taxel) => (model.mesh?.taxelRadius[taxel] ?? 0) ** 2),
-  );
-  lookAtAll();
+  if (aim.turned) paired.share();
 }
 
 let framed = "";
@@ -189,7 +97,7 @@ const paired = new Paired(
   camera,
   () => framed,
   () => {
-    turned = true;
+    aim.turned = true;
     view.request();
     address.changed();
   },
@@ -204,13 +112,7 @@ connection.onScene = () => {
   plots.begin();
   if (framed !== body) {
     framed = body;
-    const normals = Array.from(mesh.taxelId, (_, i) => taxelInWorld(model, i)?.normal ?? [0, 0, 1]);
-    chooseDirection(
-      camera,
-      /** @type {import("./math.js").Vec3[]} */ (normals),
-      Array.from(mesh.taxelRadius, (r) => r * r),
-    );
-    lookAtAll();
+    aim.begin();
     address.show(location.hash);
   } else if (welcome.time && resume) {
     connection.send(resume.playing ? say.play() : say.pause());
@@ -250,7 +152,7 @@ model.on("frame", () => {
   if (choices.touch !== null && !model.touch(choices.touch)) choices.chooseTouch(null);
   choices.follow(model);
   plots.follow(choices.smallestTouched(model));
-  showTouchedSide();
+  aim.showTouchedSide();
   view.request();
   updatePanels();
   updatePlots();
@@ -281,7 +183,11 @@ view.onDraw = () => {
   const acknowledge = connection.takeToDraw();
   marks.draw();
   scaleBar.draw();
-  return acknowledge;
+  return () => {
+    acknowledge();
+    // Before the pointer first needs it, and after the first picture.
+    if (view.framesDrawn && picker.mesh !== model.mesh) setTimeout(() => picker.update());
+  };
 };
 
 new ResizeObserver(() => {
@@ -303,9 +209,9 @@ const address = new Address({
   plots,
   span,
   timeline,
-  isTurned: () => turned,
+  isTurned: () => aim.turned,
   onCamera: () => {
-    turned = true;
+    aim.turned = true;
     view.request();
   },
 });
@@ -320,17 +226,12 @@ new Inspector(byId("marks", HTMLCanvasElement), {
   measure,
   onMove: moved,
   onPercept: (field) => percept.ask(field),
-  lookAt,
+  lookAt: (field) => aim.atField(field),
 });
 
-/** @param {import("./camera.js").Preset} name */
-function look(name) {
-  camera.preset(name);
-  lookAtAll();
-}
 joinToolbar(choices, (name) => {
-  if (name === "all") lookAtAll();
-  else look(/** @type {import("./camera.js").Preset} */ (name));
+  if (name === "all") aim.atAll();
+  else aim.from(/** @type {import("./camera.js").Preset} */ (name));
 });
 
 const hint = byId("hint", HTMLElement);
@@ -363,9 +264,9 @@ const keys = new Keys(
     peaks,
     plots,
     video,
-    look,
-    lookAt,
-    lookAtAll,
+    look: (name) => aim.from(name),
+    lookAt: (field) => aim.atField(field),
+    lookAtAll: () => aim.atAll(),
     release: () => {
       if (video.isOn) return video.toggle();
       if (measure.isOn) return measure.end();

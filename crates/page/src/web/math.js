@@ -64,6 +64,25 @@ export function toWorld(rows, link, p, w, at = 0) {
 }
 
 /**
+ * A point (w = 1) or direction (w = 0) of the world in the frame of a link: the inverse of `toWorld`.
+ * @param {Float32Array} rows
+ * @param {number} link
+ * @param {ArrayLike<number>} p
+ * @param {number} w
+ * @returns {Vec3}
+ */
+export function toLink(rows, link, p, w) {
+  const o = 12 * link;
+  if (o + 12 > rows.length) return [p[0], p[1], p[2]];
+  const [x, y, z] = [p[0] - w * rows[o + 3], p[1] - w * rows[o + 7], p[2] - w * rows[o + 11]];
+  return [
+    rows[o] * x + rows[o + 4] * y + rows[o + 8] * z,
+    rows[o + 1] * x + rows[o + 5] * y + rows[o + 9] * z,
+    rows[o + 2] * x + rows[o + 6] * y + rows[o + 10] * z,
+  ];
+}
+
+/**
  * Clip from view.
  * @param {number} tanHalfY tangent of half the vertical angle of view
  * @param {number} aspect

@@ -1,11 +1,11 @@
 /** What the page knows: the scene, the newest frame, events. It changes only by messages from the server. */
 
-import { Observed, PALETTE } from "./dom.js";
+import { PALETTE } from "./dom.js";
 import { smallestFields } from "./field_tree.js";
 import { withUnit } from "./format.js";
 import { poseToRows } from "./math.js";
-import { REASONS } from "./reasons.js";
-import { HEALTH, IN_WORLD_BIT } from "./wire.js";
+import { Reported } from "./reported.js";
+import { HEALTH } from "./wire.js";
 
 /** @typedef {import("./wire.js").Welcome} Welcome */
 /** @typedef {import("./wire.js").Frame} Frame */
@@ -14,15 +14,11 @@ const NOT_SENT = HEALTH.indexOf("not sent");
 /** Events that the page keeps. */
 const EVENTS_MAX = 1000;
 
-export class Model extends Observed {
+export class Model extends Reported {
   constructor() {
     super();
-    /** @type {Welcome | null} */
-    this.welcome = null;
     /** @type {import("./wire.js").Mesh | null} */
     this.mesh = null;
-    /** @type {Map<string, number>} */
-    this.columnIndex = new Map();
     /** Matrices of the links, 3×4. */
     this.rows = new Float32Array(0);
     /** Counts changes of poses. */
@@ -31,10 +27,6 @@ export class Model extends Observed {
     this.pressure = new Float32Array(0);
     /** @type {Uint8Array} */
     this.health = new Uint8Array(0);
-    /** @type {import("./wire.js").Percepts | null} */
-    this.percepts = null;
-    /** Where a field in contact stands in `percepts`. @type {Map<number, number>} */
-    this.inContact = new Map();
     /** Touches of the whole body, the oldest first. @type {import("./wire.js").Touch[]} */
     this.touches = [];
     /** Colours of touches, by their ids: one keeps its own from onset to release. @type {Map<number, number>} */
@@ -112,20 +104,13 @@ export class Model extends Observed {
     return field < 0 ? null : PALETTE[this.fieldColour(field) % PALETTE.length];
   }
 
-  get quantity() {
-    return this.welcome?.quantity ?? "count";
-  }
-
   /** @param {Welcome} welcome */
   begin(welcome) {
     const sameRun = this.welcome?.run === welcome.run;
     if (namesOf(this.welcome) !== namesOf(welcome)) this.fieldColours = new Map();
     this.smallestFields = null;
-    this.welcome = welcome;
-    this.columnIndex = new Map(welcome.columns.map((column, i) => [column.name, i]));
+    this.describe(welcome);
     this.scale = welcome.scale;
-    this.percepts = null;
-    this.inContact = new Map();
     this.setTouches([]);
     this.selfContacts = noSelfContacts();
     this.frame = null;
@@ -146,6 +131,7 @@ export class Model extends Observed {
   /** @param {import("./wire.js").Mesh} mesh */
   setMesh(mesh) {
     this.mesh = mesh;
+    this.hasAreas = mesh.taxelArea.some((area) => area > 0);
     const taxels = mesh.taxelId.length;
     this.pressure = new Float32Array(taxels).fill(NaN);
     this.health = new Uint8Array(taxels).fill(HEALTH.indexOf("missing"));
@@ -170,8 +156,7 @@ export class Model extends Observed {
     }
     if (frame.pose) this.pose(frame.pose);
     if (frame.percepts) {
-      this.percepts = frame.percepts;
-      this.inContact = new Map(Array.from(frame.percepts.field, (field, k) => [field, k]));
+      this.report(frame.percepts);
     }
     if (frame.touches) this.setTouches(frame.touches);
     if (frame.selfContacts) {
@@ -335,93 +320,6 @@ export class Model extends Observed {
     const goesOn = state !== "open" && this.connection.state === "lost";
     this.connection = { state, reason, asksToken, since: goesOn ? this.connection.since : since };
     this.tell("connection");
-  }
-
-  /**
-   * What a field reports in a column; null where it is absent.
-   * @param {number} field
-   * @param {string} column
-   */
-  value(field, column) {
-    const k = this.inContact.get(field);
-    const index = this.columnIndex.get(column);
-    if (k === undefined || index === undefined || !this.percepts || !this.welcome) return null;
-    const values = this.percepts.columns.get(index);
-    if (!values || !((this.percepts.present[k] >>> index) & 1)) return null;
-    const components = this.welcome.columns[index].components;
-    return values.subarray(k * components, (k + 1) * components);
-  }
-
-  /**
-   * The same as people are told it: places in the world from the world's own origin, not from the picture's.
-   * @param {number} field
-   * @param {string} column
-   */
-  told(field, column) {
-    const value = this.value(field, column);
-    const present = this.percepts?.present[this.inContact.get(field) ?? 0] ?? 0;
-    if (!value || column !== "position" || !((present >>> IN_WORLD_BIT) & 1)) return value;
-    return value.map((x, i) => x + (this.welcome?.origin[i] ?? 0));
-  }
-
-  /**
-   * The column that says how hard a field is pressed: its force where that is computed, else the sum of its pressures, else the
-   * highest of them; null where the run computes none of these.
-   */
-  get loadColumn() {
-    // Counts have no unit, so a force is never known.
-    if (this.columnIndex.has("force") && this.quantity !== "count") return "force";
-    return ["total", "peak", "force"].find((name) => this.columnIndex.has(name)) ?? null;
-  }
-
-  /** Its unit. */
-  get loadUnit() {
-    return this.loadColumn === "force" ? "N" : "P";
-  }
-
-  /** The column that is plotted first: how hard fields are pressed, or where that is not computed the run's first output. */
-  get plottedColumn() {
-    return this.loadColumn ?? this.welcome?.columns[0]?.name ?? null;
-  }
-
-  /**
-   * How hard a field is pressed; 0 where that is absent.
-   * @param {number} field
-   */
-  load(field) {
-    return (this.loadColumn && this.value(field, this.loadColumn)?.[0]) || 0;
-  }
-
-  /**
-   * It as text; a dash where it is absent, and only that it is touched where a run computes none.
-   * @param {number} field
-   */
-  loadText(field) {
-    if (!this.loadColumn) return "touched";
-    const value = this.value(field, this.loadColumn);
-    return value ? withUnit(value[0], this.loadUnit, this.quantity) : "–";
-  }
-
-  /**
-   * Names of a field's flags.
-   * @param {number} field
-   */
-  flagsOf(field) {
-    const k = this.inContact.get(field);
-    if (k === undefined || !this.percepts || !this.welcome) return ["no_contact"];
-    const flags = this.percepts.flags[k];
-    return this.welcome.flags.filter((name, bit) => name !== null && (flags >>> bit) & 1).map(String);
-  }
-
-  /**
-   * The flag that says why a column is absent.
-   * @param {number} field
-   * @param {string} column
-   */
-  reason(field, column) {
-    const flags = this.flagsOf(field);
-    const likely = REASONS[column]?.find((name) => flags.includes(name));
-    return likely ?? flags.join(", ");
   }
 }
 

@@ -1,14 +1,18 @@
-/** What is under the pointer, by rays on the processor. */
+/** What is under the pointer, by rays on the processor through trees of boxes. */
 
+import { LinkTrees } from "./box_tree.js";
 import { add, cross, dot, scale, subtract, toWorld } from "./math.js";
 import { taxelInWorld } from "./places.js";
+import { Surface } from "./surface.js";
 import { CONE } from "./taxels.js";
+import { NO_LINK } from "./wire.js";
 
 /** @typedef {import("./math.js").Vec3} Vec3 */
 
-/** Where a line met a triangle last: its way along the line, and along the triangle's sides. One for all, as millions are tried. */
-const HIT = { s: 0, u: 0, v: 0 };
-
+/** A taxel is found so far from its middle, pixels, where its disc is smaller. */
+const REACH_PX = 4;
+/** The radius up to which a disc with its rim covers others, of the disc's own. */
+const RIM = 1.05;
 export class Picker {
   /**
    * @param {import("./model.js").Model} model
@@ -18,21 +22,27 @@ export class Picker {
     this.model = model;
     this.camera = camera;
     this.version = -1;
-    /** Vertices in the world. */
-    this.vertices = new Float32Array(0);
-    /** @type {unknown} */
+    /** @type {import("./wire.js").Mesh | null} */
     this.mesh = null;
+    this.surface = new Surface({
+      position: new Float32Array(0),
+      link: new Uint32Array(0),
+      corners: new Uint32Array(0),
+    });
+    this.taxels = new LinkTrees(new Float32Array(0), []);
   }
 
-  /** Vertices in the world, by the newest poses. */
+  /** Takes the newest body and poses. */
   update() {
     const { mesh, rows, poseVersion } = this.model;
     if (!mesh || (this.mesh === mesh && this.version === poseVersion)) return;
-    this.mesh = mesh;
+    if (this.mesh !== mesh) {
+      this.mesh = mesh;
+      this.surface = new Surface(mesh);
+      this.taxels = new LinkTrees(discBoxes(mesh), mesh.taxelLink);
+    }
     this.version = poseVersion;
-    this.vertices = new Float32Array(mesh.position.length);
-    for (let i = 0; i < mesh.link.length; i++)
-      this.vertices.set(toWorld(rows, mesh.link[i], mesh.position, 1, 3 * i), 3 * i);
+    this.surface.pose(rows);
   }
 
   /**
@@ -45,36 +55,12 @@ export class Picker {
     const { eye } = this.camera;
     const way = subtract(point, eye);
     const end = 1 - slack / Math.hypot(...way);
-    const corners = this.model.mesh?.corners ?? new Uint32Array(0);
-    for (let t = 0; t < corners.length; t += 3)
-      if (this.meets(eye, way, corners, t) && HIT.s > 0 && HIT.s < end) return true;
-    return false;
-  }
-
-  /**
-   * Whether a line goes through a triangle; where, is in `HIT` then.
-   * @param {Vec3} from
-   * @param {Vec3} way
-   * @param {Uint32Array} corners
-   * @param {number} t where the triangle is in these
-   */
-  meets(from, way, corners, t) {
-    const at = this.vertices;
-    const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
-    const [ax, ay, az] = [at[a], at[a + 1], at[a + 2]];
-    const [ux, uy, uz] = [at[b] - ax, at[b + 1] - ay, at[b + 2] - az];
-    const [vx, vy, vz] = [at[c] - ax, at[c + 1] - ay, at[c + 2] - az];
-    const [px, py, pz] = [way[1] * vz - way[2] * vy, way[2] * vx - way[0] * vz, way[0] * vy - way[1] * vx];
-    const det = ux * px + uy * py + uz * pz;
-    if (Math.abs(det) < 1e-24) return false;
-    const [sx, sy, sz] = [from[0] - ax, from[1] - ay, from[2] - az];
-    HIT.u = (sx * px + sy * py + sz * pz) / det;
-    if (HIT.u < 0 || HIT.u > 1) return false;
-    const [qx, qy, qz] = [sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux];
-    HIT.v = (way[0] * qx + way[1] * qy + way[2] * qz) / det;
-    if (HIT.v < 0 || HIT.u + HIT.v > 1) return false;
-    HIT.s = (vx * qx + vy * qy + vz * qz) / det;
-    return true;
+    let isHidden = false;
+    this.surface.along(this.model.rows, eye, way, end, ({ s }) => {
+      isHidden ||= s > 0 && s < end;
+      return isHidden ? -1 : end;
+    });
+    return isHidden;
   }
 
   /**
@@ -87,15 +73,14 @@ export class Picker {
     this.update();
     const { eye } = this.camera;
     const ray = this.camera.ray(x, y);
-    const corners = this.model.mesh?.corners ?? new Uint32Array(0);
-    let nearest = Infinity;
     /** @type {{corners: number[], weights: Vec3} | null} */
     let found = null;
-    for (let t = 0; t < corners.length; t += 3) {
-      if (!this.meets(eye, ray, corners, t) || !(HIT.s > 0 && HIT.s < nearest)) continue;
-      nearest = HIT.s;
-      found = { corners: [...corners.subarray(t, t + 3)], weights: [1 - HIT.u - HIT.v, HIT.u, HIT.v] };
-    }
+    this.surface.along(this.model.rows, eye, ray, Infinity, ({ triangle, s, u, v }, nearest) => {
+      if (!(s > 0 && s < nearest)) return nearest;
+      const corners = this.model.mesh?.corners.subarray(3 * triangle, 3 * triangle + 3) ?? [];
+      found = { corners: [...corners], weights: [1 - u - v, u, v] };
+      return s;
+    });
     return found;
   }
 
@@ -105,9 +90,9 @@ export class Picker {
    * @param {Vec3} weights
    */
   pointAt(corners, weights) {
-    this.update();
-    const at = corners.map(
-      (corner) => /** @type {Vec3} */ ([...this.vertices.subarray(3 * corner, 3 * corner + 3)]),
+    const { mesh, rows } = this.model;
+    const at = corners.map((corner) =>
+      toWorld(rows, mesh?.link[corner] ?? NO_LINK, mesh?.position ?? [], 1, 3 * corner),
     );
     return at.reduce((sum, point, k) => add(sum, scale(point, weights[k])), /** @type {Vec3} */ ([0, 0, 0]));
   }
@@ -137,24 +122,26 @@ export class Picker {
    * @param {number} radius
    */
   isCovered(taxel, point, radius) {
+    this.update();
     const { model, camera } = this;
-    const count = model.mesh?.taxelId.length ?? 0;
     const way = subtract(point, camera.eye);
     const depth = -dot(way, camera.back);
-    for (let other = 0; other < count; other++) {
+    let isCovered = false;
+    this.taxels.along(model.rows, camera.eye, way, 1, (other, until) => {
       const place = other === taxel ? null : taxelInWorld(model, other);
-      if (!place) continue;
+      if (!place) return until;
       const reach = 4 * (place.radius + radius);
       const between = subtract(place.point, point);
-      if (dot(between, between) > reach * reach) continue;
+      if (dot(between, between) > reach * reach) return until;
       // Where the line of sight meets the other disc's plane.
       const s = dot(place.normal, subtract(place.point, camera.eye)) / dot(place.normal, way);
       const off = subtract(add(camera.eye, scale(way, s)), place.point);
       const distance = Math.hypot(...off);
-      if (dot(place.normal, way) < 0 && distance < place.radius * 1.05 && s * depth + CONE * distance < depth)
-        return true;
-    }
-    return false;
+      isCovered =
+        dot(place.normal, way) < 0 && distance < place.radius * RIM && s * depth + CONE * distance < depth;
+      return isCovered ? -1 : until;
+    });
+    return isCovered;
   }
 
   /**
@@ -164,28 +151,45 @@ export class Picker {
    * @param {boolean} through also those that the body hides
    */
   taxelAt(x, y, through) {
+    this.update();
     const { model, camera } = this;
-    const count = model.mesh?.taxelId.length ?? 0;
     const ray = camera.ray(x, y);
     /** @type {{taxel: number, depth: number}[]} */
     const found = [];
-    for (let taxel = 0; taxel < count; taxel++) {
+    const look = (/** @type {number} */ taxel, /** @type {number} */ until) => {
       const place = taxelInWorld(model, taxel);
-      if (!place) continue;
+      if (!place) return until;
       const toEye = subtract(camera.eye, place.point);
       const facing = dot(place.normal, toEye);
-      if (!through && facing <= 0 && model.mesh?.corners.length) continue;
+      if (!through && facing <= 0 && model.mesh?.corners.length) return until;
       // Distance of the disc's middle from the ray, in the ray's plane across.
       const off = cross(toEye, ray);
       const depth = -dot(toEye, ray);
-      const reach = Math.max(place.radius, 4 / camera.pixelsPerMetre(Math.max(depth, 1e-9)));
+      const reach = Math.max(place.radius, REACH_PX / camera.pixelsPerMetre(Math.max(depth, 1e-9)));
       if (depth > 0 && dot(off, off) < reach * reach) found.push({ taxel, depth });
-    }
-    found.sort((a, b) => a.depth - b.depth);
+      return until;
+    };
+    this.taxels.along(model.rows, camera.eye, ray, Infinity, look, REACH_PX / camera.pixelsPerMetre(1));
+    found.sort((a, b) => a.depth - b.depth || a.taxel - b.taxel);
     for (const { taxel } of found) {
       const place = taxelInWorld(model, taxel);
       if (place && (through || !this.hides(place.point, 0.7 * place.radius))) return taxel;
     }
     return null;
   }
+}
+
+/**
+ * Boxes around the discs of taxels with their rims, in the frames of links.
+ * @param {import("./wire.js").Mesh} mesh
+ */
+function discBoxes({ taxelPosition, taxelRadius }) {
+  const boxes = new Float32Array(6 * taxelRadius.length);
+  taxelRadius.forEach((radius, taxel) => {
+    for (let k = 0; k < 3; k++) {
+      boxes[6 * taxel + k] = taxelPosition[3 * taxel + k] - RIM * radius;
+      boxes[6 * taxel + 3 + k] = taxelPosition[3 * taxel + k] + RIM * radius;
+    }
+  });
+  return boxes;
 }

@@ -39,11 +39,12 @@ export class SelfContactsPanel {
     const { model, choices } = this;
     const row = make("div", "contact");
     row.append(make("i"));
-    for (const { link, touch, total } of contact.sides) {
+    for (const side of contact.sides) {
+      const { link, touch } = side;
       const isListed = model.welcome?.touches;
       const name = make(isListed ? "button" : "span", "contact-side", model.welcome?.links[link]?.name ?? "");
       if (isListed) name.addEventListener("click", () => choices.chooseTouch(touch));
-      row.append(name, make("span", "contact-total", withUnit(total, "P", model.quantity)));
+      row.append(name, make("span", "contact-load", sideLoadText(model, side)));
     }
     const angle = Math.round((contact.angle * 180) / Math.PI);
     row.append(
@@ -51,4 +52,14 @@ export class SelfContactsPanel {
     );
     return row;
   }
+}
+
+/**
+ * How hard a side presses as text: the force of its touch where that is known, else the sum of pressures.
+ * @param {import("./model.js").Model} model
+ * @param {import("./wire.js").SelfContactSide} side
+ */
+export function sideLoadText(model, side) {
+  const touch = model.touch(side.touch);
+  return touch ? model.touchLoadText(touch) : withUnit(side.total, "P", model.quantity);
 }

@@ -160,7 +160,7 @@ impl Harm {
 }
 
 #[test]
-fn a_bit_that_flips_is_mended_or_told() {
+fn a_flipped_bit_is_repaired_or_reported() {
     let mut harm = Harm::new();
     let whole = harm.whole.clone();
     assert_eq!(harm.check("nothing", &whole), (12, Vec::new()));

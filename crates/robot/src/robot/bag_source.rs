@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_bag_is_read_as_it_was_or_told() {
+    fn a_damaged_bag_is_read_unchanged_or_reported() {
         fuzz(1, 400, 60);
     }
 }

@@ -164,15 +164,21 @@ impl ViewWriter {
     /// they were last.
     fn pose(&mut self, frame: &Frame) {
         let mut posed = vec![false; self.links.len()];
-        for (index, link) in self.links.iter().enumerate() {
-            let own = frame.pose.iter().find(|(name, _)| self.index_of.get(name) == Some(&index));
+        let mut owns = vec![None; self.links.len()];
+        // The first of two of one link holds.
+        for (name, pose) in frame.pose.iter().rev() {
+            if let Some(&link) = self.index_of.get(name) {
+                owns[link] = Some(*pose);
+            }
+        }
+        for ((index, link), own) in self.links.iter().enumerate().zip(owns) {
             if own.is_none() && frame.has_stale_pose {
                 continue;
             }
             let above = link.parent.filter(|&parent| posed[parent]);
             self.world[index] = above.map_or(link.world_from_link, |parent| self.world[parent] * link.parent_from_link);
             posed[index] = above.is_some();
-            if let Some((_, pose)) = own {
+            if let Some(pose) = own {
                 self.world[index] = pose.transform();
                 posed[index] = true;
             }

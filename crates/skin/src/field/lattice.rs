@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_told_apart_and_a_slope_has_none() {
+    fn lines_are_separated_and_a_slope_has_none() {
         assert_eq!(lines(&[0.0, 1.0, 0.01, 2.0, 0.99], 0.1), Some(vec![0, 1, 0, 2, 1]));
         assert_eq!(lines(&(0..9).map(f64::from).collect::<Vec<_>>(), 1.0), None);
         assert_eq!(lines(&[], 1.0), None);

@@ -115,7 +115,7 @@ fn extremes_give_finite_values_or_flags() {
 }
 
 #[test]
-fn gaps_are_bridged_and_told() {
+fn gaps_are_bridged_and_flagged() {
     let mut touches = touches(grid_parts(9, 1, 0.01));
     let pressures = [0.0, 1.0, 2.0, 0.0, 2.0, 0.5, 0.0, 0.0, 1.0];
     let mut frame = TouchFrame::default();

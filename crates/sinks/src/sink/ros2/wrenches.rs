@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_of_which_a_value_is_missing_has_none_and_a_masked_taxel_is_left_out() {
+    fn a_link_with_a_missing_value_has_none_and_a_masked_taxel_is_left_out() {
         let (body, ids) = hand();
         let masked = format!("[all]\nunit = \"N\"\n[taxel.{}]\nmask = true\n", ids[0]);
         let engine = engine(&body, &ids, &masked, with_touches());

@@ -57,7 +57,7 @@ mod tests {
     use crate::signal::Response;
 
     #[test]
-    fn old_names_of_a_recording_are_read_and_told() {
+    fn old_names_of_a_recording_are_read_and_reported() {
         let old =
             "[all]\nsensor = \"fsr\"\ntap = 12\n[taxel.3]\ntap = 7\n[skin]\nsigma_m = 0.002\n[upkeep]\ndead_s = 2\n";
         assert!(

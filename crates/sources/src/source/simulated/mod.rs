@@ -7,6 +7,7 @@ mod contact;
 mod disturbed;
 mod file;
 mod layer;
+mod link_touch;
 mod noise;
 mod patch;
 mod path;
@@ -26,19 +27,18 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::DVec3;
 use toml::Spanned;
 
 pub use record::{write_recording, write_recording_with_progress};
 pub use truth::Truth;
 pub use whole::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 
-use self::contact::{Footprint, Layer};
+use self::contact::Layer;
 use self::disturbed::{Disturbed, Wires};
 use self::file::File;
+use self::link_touch::{LinkTouch, places_in};
 use self::sensor::{Reading, Sensor};
-use self::setup::{Setup, Touch};
-use self::truth::line_angle;
+use self::setup::Setup;
 use self::whole::{BodySkin, Covers};
 use self::whole_truth::{Moment, TouchOfBody};
 use super::Source;
@@ -73,13 +73,6 @@ pub struct SimulatedSource {
 }
 
 somatic_skin::debug_by_name!(SimulatedSource);
-
-/// A touch, and the taxels' (position, normal) in its link's frame.
-struct LinkTouch {
-    touch: Touch,
-    link: String,
-    taxels: Arc<[(DVec3, DVec3)]>,
-}
 
 /// A touch of one link, or of the whole body.
 enum Pressing {
@@ -202,15 +195,7 @@ impl SimulatedSource {
                 (Err(_), WrongTouch::LeaveOut) => continue,
                 (touch, _) => touch?,
             };
-            let in_link = || -> Arc<[(DVec3, DVec3)]> {
-                let place = |&(taxel, _): &(usize, f64)| {
-                    let taxel: &Taxel = &body.taxels[taxel];
-                    let link_from_taxel = body.rest_transform(touch.link, taxel.link);
-                    let normal = link_from_taxel.transform_vector3(taxel.normal_in_link);
-                    (link_from_taxel.transform_point3(taxel.position_in_link), normal)
-                };
-                taxels.iter().map(place).collect()
-            };
+            let in_link = || places_in(&body, touch.link, &taxels);
             let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
             let link = body.links[touch.link].name.clone();
             touches.push(Pressing::Link(LinkTouch { link, touch, taxels: places }));
@@ -303,55 +288,17 @@ impl SimulatedSource {
 
     /// Adds a touch's forces and its truth.
     fn press(&mut self, index: usize, frame: u64) -> Result<()> {
-        let t_s = self.time(frame);
         let before_s = frame.checked_sub(1).map(|frame| self.time(frame));
-        let LinkTouch { touch, link, taxels } = match &mut self.touches[index] {
-            Pressing::Link(touch) => touch,
+        let moment = Moment { touch: index, frame, t_s: self.time(frame), before_s };
+        match &mut self.touches[index] {
+            Pressing::Link(touch) => {
+                self.truth.extend(touch.press(&self.layer, &self.taxels, &moment, &mut self.forces_newton)?);
+            }
             Pressing::Body(touch) => {
                 let Some(skin) = &self.body_skin else { return Ok(()) };
-                let moment = Moment { touch: index, frame, t_s, before_s };
                 self.truth.extend(touch.press(&self.body, skin, &moment, &mut self.forces_newton)?);
-                return Ok(());
-            }
-        };
-        let Some(force_newton) = touch.force(t_s) else { return Ok(()) };
-        let Some(place) = touch.path.place(t_s) else { return Err(Error::failed(touch.leaves_surface(t_s))) };
-        let angle = touch.angle.as_ref().map(|angle| angle.held(t_s));
-        let along = touch.path.direction(&place, angle.unwrap_or(0.0));
-        let across = along.cross(place.normal_in_link);
-        let footprint = Footprint::new(&touch.indenter, &self.layer, force_newton);
-        for ((force, (position, normal)), (_, side_m)) in
-            self.forces_newton.iter_mut().zip(taxels.iter()).zip(&self.taxels)
-        {
-            let offset = *position - place.position_in_link;
-            if normal.dot(place.normal_in_link) > 0.0 && offset.dot(place.normal_in_link).abs() <= footprint.depth_m() {
-                *force += force_newton * footprint.share_on(offset.dot(across), offset.dot(along), *side_m);
             }
         }
-        let before = before_s.filter(|&t_s| touch.force(t_s).is_some());
-        let before = before.and_then(|before_s| Some((touch.path.place(before_s)?, t_s - before_s)));
-        let velocity_in_link = before.map(|(before, dt_s)| (place.position_in_link - before.position_in_link) / dt_s);
-        let velocity_uv = before.and_then(|(before, dt_s)| {
-            let (now, before) = (place.uv?, before.uv?);
-            Some([(now[0] - before[0]) / dt_s, (now[1] - before[1]) / dt_s])
-        });
-        self.truth.push(Truth {
-            touch: index,
-            name: touch.name.clone(),
-            link: link.clone(),
-            field: touch.field.clone(),
-            position_in_link: place.position_in_link,
-            normal_in_link: place.normal_in_link,
-            uv: place.uv,
-            angle: angle.map(line_angle),
-            velocity_in_link,
-            velocity_uv,
-            speed: velocity_in_link.map(DVec3::length),
-            force_newton,
-            direction_in_link: angle.map(|_| along),
-            principal_axis_in_link: None,
-            depth_m: None,
-        });
         Ok(())
     }
 }
