@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import json
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from conftest import pressed
+from conftest import ROOT, pressed
 
 import somatic_touch as st
 from somatic_touch import lerobot
@@ -278,6 +279,14 @@ def test_without_pyarrow_it_says_what_to_install() -> None:
     code = "import sys; sys.modules['pyarrow'] = None; from somatic_touch import lerobot; lerobot.read('dataset')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "which pyarrow reads; run `pip install pyarrow`" in done.stderr
+
+
+def test_the_page_shows_code_that_runs(tmp_path: pathlib.Path, monkeypatch) -> None:
+    write(tmp_path / "pick", "v3.0")
+    monkeypatch.chdir(tmp_path)
+    [block] = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "how-to" / "lerobot.md").read_text(), re.DOTALL)
+    exec(compile(block, "lerobot.md", "exec"), {})
+    assert (tmp_path / "pick-with-percepts" / "meta" / "info.json").is_file()
 
 
 def test_the_example_of_its_documentation_runs() -> None:
