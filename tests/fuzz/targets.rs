@@ -502,6 +502,7 @@ pub(super) fn source_names() -> Target {
         "serial:/dev/ttyUSB0@115200",
         "mcap:a.mcap",
         "ros2-mcap:bag:/a,/b@sensor_msgs/msg/PointCloud2",
+        "lerobot:a:touch#1",
         "sim:a.toml",
         "-",
         "csv:-",

@@ -1,7 +1,7 @@
 //! Text that may be compressed with gzip, by its first bytes.
 
 use std::fs::File;
-use std::io::{self, BufReader, Cursor, Read};
+use std::io::{self, BufRead as _, BufReader, Cursor, Read};
 use std::path::Path;
 
 use flate2::bufread::MultiGzDecoder;
@@ -26,15 +26,20 @@ pub(super) fn open(path: &Path) -> io::Result<Text> {
 ///
 /// # Errors
 /// It cannot be read.
-pub(super) fn unpacked(mut reader: impl Read + Send + 'static, most: u64) -> io::Result<(Box<dyn Read + Send>, bool)> {
-    let mut head = Vec::with_capacity(2);
-    reader.by_ref().take(2).read_to_end(&mut head)?;
-    let is_packed = head == [0x1F, 0x8B];
+pub(super) fn unpacked(reader: impl Read + Send + 'static, most: u64) -> io::Result<(Box<dyn Read + Send>, bool)> {
+    let mut reader = BufReader::with_capacity(1 << 16, reader);
+    let mut head = Vec::new();
+    // A pipe may give one byte at first.
+    if reader.fill_buf()?.len() == 1 {
+        reader.by_ref().take(2).read_to_end(&mut head)?;
+    }
+    let first = if head.is_empty() { reader.buffer() } else { &head };
+    let is_packed = first.starts_with(&[0x1F, 0x8B]);
     let whole = Cursor::new(head).chain(reader);
     if !is_packed {
         return Ok((Box::new(whole), false));
     }
-    let inner = MultiGzDecoder::new(BufReader::with_capacity(1 << 16, whole));
+    let inner = MultiGzDecoder::new(whole);
     Ok((Box::new(Unpacked { inner, left: most, most }), true))
 }
 
@@ -99,6 +104,11 @@ mod tests {
         assert_eq!(read(packed(text), 8).unwrap(), text);
         // Two files after each other are one, as gzip has it.
         assert_eq!(read([packed(text), packed(text)].concat(), 16).unwrap(), [text, text].concat());
+        // Also where the first byte comes alone.
+        let (first, rest) = (Cursor::new(packed(text)[..1].to_vec()), Cursor::new(packed(text)[1..].to_vec()));
+        let mut all = Vec::new();
+        unpacked(first.chain(rest), 8).unwrap().0.read_to_end(&mut all).unwrap();
+        assert_eq!(all, text);
         for short in [b"".as_slice(), b"t"] {
             assert_eq!(read(short.to_vec(), 1).unwrap(), short);
         }
@@ -147,7 +157,8 @@ mod tests {
         let read = frames(&mut VendorSource::open(&gz, &options).unwrap());
         assert_eq!(read.len(), 2);
         assert_eq!(read, frames(&mut VendorSource::open(plain, &options).unwrap()));
-        for text in ["t,wrist\n0,1\n1,2\n", "{\"t\":0,\"joints\":{\"wrist\":1}}\n{\"t\":1,\"joints\":{\"wrist\":2}}\n"]
+        for text in
+            ["t,wrist\n0,1\n1,2\n", "\n\n\n{\"t\":0,\"joints\":{\"wrist\":1}}\n{\"t\":1,\"joints\":{\"wrist\":2}}\n"]
         {
             let [plain, gz] = write("c.csv", text);
             let (plain, packed) = (JointStates::open(plain).unwrap(), JointStates::open(gz).unwrap());
