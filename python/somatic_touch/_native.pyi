@@ -515,6 +515,8 @@ def read(
     pitch: str | None = None,
     unit: str | None = None,
     layout: _Path | None = None,
+    dataset: str | None = None,
+    time: str | None = None,
 ) -> Recording: ...
 def open(
     source: _Path,

@@ -83,6 +83,9 @@ pub(crate) fn open(
             let source = if cut == Cut::WHOLE { open()? } else { Box::new(Replay::new(open, cut)?) };
             return Ok((source, None, None));
         }
+        SourceSpec::LeRobot(_) => {
+            return Err(Error::usage("it is a LeRobot dataset; read it with somatic_touch.lerobot.read").at(spec));
+        }
         SourceSpec::Csv(_) => (None, None),
         _ => return Err(Error::usage("only files are read here; give live frames to `Engine.step`")),
     };

@@ -13,7 +13,7 @@ use crate::arrays::{array, poses, times, values};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, usage, warn};
-use crate::opening::{Keys, Opening};
+use crate::opening::{Keys, Opening, body_of, text_of};
 use crate::stream::in_python;
 use crate::threads::free;
 
@@ -333,7 +333,8 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 ///
 /// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' is the bundled touch. `body` is the robot, for
 /// recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
-/// after its start. The other keywords are those of docs/reference/exports.md.
+/// after its start. Of an HDF5 file `dataset` is the path of the values, such as 'tactile/left', and `time` that of their times; h5py
+/// reads it. The other keywords are those of docs/reference/exports.md.
 ///
 /// >>> import somatic_touch as st
 /// >>> st.read("no-such.csv")
@@ -341,7 +342,7 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 ///     ...
 /// somatic_touch.InputError: no-such.csv: no such file or directory
 #[pyfunction]
-#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None))]
+#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, dataset = None, time = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn read(
     py: Python<'_>,
@@ -355,9 +356,27 @@ pub(crate) fn read(
     pitch: Option<&str>,
     unit: Option<&str>,
     layout: Option<PathBuf>,
-) -> PyResult<PyRecording> {
+    dataset: Option<&str>,
+    time: Option<&str>,
+) -> PyResult<Py<PyRecording>> {
+    let text = text_of(source)?;
+    let ending = Path::new(&text).extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    if matches!(ending.as_deref(), Some("h5" | "hdf5")) {
+        if format.or(grid).or(pitch).or(unit).is_some() || layout.is_some() {
+            return Err(usage(
+                py,
+                format!("{text}: format, grid, pitch, unit and layout are for exports; leave them out"),
+            ));
+        }
+        let body = body.map(|body| body_of(py, body)).transpose()?;
+        let read = in_python(py, "_hdf5", "read", (text, dataset, time, rate_hz, body, from_s, to_s))?;
+        return Ok(read.cast_into::<PyRecording>()?.unbind());
+    }
+    if dataset.or(time).is_some() {
+        return Err(usage(py, format!("{text}: dataset and time are for HDF5 (.h5, .hdf5); leave them out")));
+    }
     let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout };
     let mut opened = Opening::new(py, source, keys)?;
     let frames = gather(py, &mut *opened.source, &opened.file)?;
-    opened.recording(py, frames)
+    Py::new(py, opened.recording(py, frames)?)
 }

@@ -46,7 +46,7 @@ Examples:
   somatic run robot.scene.toml                           all of it from a file
   robot-driver | somatic run --body robot.glb --source - | controller
   robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
-  zcat touch.csv.gz | somatic run --body robot.glb --source csv:-
+  somatic run --body robot.glb --source touch.csv.gz
   somatic run --source mcap:touch.mcap --from 60s --to 90s   its second minute's first half
   somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify

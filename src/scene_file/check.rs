@@ -20,8 +20,8 @@ impl SceneFile {
             ));
         }
         let has_no_bad = |source: &SourceSpec| {
-            use SourceSpec::{Mcap, Ros2, Serial, Sim, Zenoh};
-            matches!(source, Mcap(_) | Sim(_) | Serial { .. } | Ros2 { .. } | Zenoh(_))
+            use SourceSpec::{LeRobot, Mcap, Ros2, Serial, Sim, Zenoh};
+            matches!(source, Mcap(_) | LeRobot(_) | Sim(_) | Serial { .. } | Ros2 { .. } | Zenoh(_))
         };
         if self.skip_bad && self.joint_states.is_none() && self.sources.iter().any(has_no_bad) {
             return Err(Error::usage("`skip_bad` is for CSV, NDJSON, exports and ROS 2 bags; leave it out here"));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{SceneFile, StatesSpec};
 use crate::bundled;
 use crate::sink::SinkSpec;
-use crate::source::{BagName, SourceSpec};
+use crate::source::{BagName, LeRobotName, SourceSpec};
 
 impl SceneFile {
     /// It with paths that are relative to where we are, where it is in `folder`.
@@ -39,6 +39,7 @@ fn source_within(folder: &Path, source: SourceSpec) -> SourceSpec {
         SourceSpec::Csv(file) => SourceSpec::Csv(folder.join(file)),
         SourceSpec::Mcap(file) => SourceSpec::Mcap(folder.join(file)),
         SourceSpec::Ros2Mcap(bag) => SourceSpec::Ros2Mcap(bag_within(folder, bag)),
+        SourceSpec::LeRobot(name) => SourceSpec::LeRobot(LeRobotName { path: folder.join(&name.path), ..name }),
         SourceSpec::Vendor(file) => SourceSpec::Vendor(folder.join(file)),
         SourceSpec::Sim(file) => SourceSpec::Sim(folder.join(file)),
         live => live,

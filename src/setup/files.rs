@@ -51,6 +51,7 @@ impl FilesRead {
         sources.iter().fold(self, |files, source| match source {
             SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => files.files([path]),
             SourceSpec::Ros2Mcap(bag) => files.bag(bag),
+            SourceSpec::LeRobot(dataset) => files.files(dataset.tables()).files([dataset.info()]),
             SourceSpec::Sim(path) => files.files(SimulatedSource::files(path)),
             spec if spec.is_stdin() => files.files(["/dev/stdin"]),
             _ => files,

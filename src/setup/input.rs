@@ -59,6 +59,7 @@ impl Input {
         let Some(spec) = setup.first_source()? else { unreachable!("a source is named") };
         let name = match &spec {
             SourceSpec::Ros2Mcap(bag) => bag.to_string(),
+            SourceSpec::LeRobot(dataset) => dataset.to_string(),
             file if file.file().is_some() => file.file().map_or(String::new(), |path| path.display().to_string()),
             SourceSpec::Stdin | SourceSpec::CsvStdin => "stdin".to_owned(),
             SourceSpec::Text(place) => place.to_string(),
@@ -141,8 +142,11 @@ impl Input {
         let path = spec.file()?;
         let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let file = std::fs::metadata(path).ok();
-        // A bag has several topics.
-        let topic = if let SourceSpec::Ros2Mcap(bag) = spec { bag.to_string() } else { String::new() };
+        // A bag has several topics, a dataset several episodes.
+        let topic = match spec {
+            SourceSpec::Ros2Mcap(_) | SourceSpec::LeRobot(_) => spec.to_string(),
+            _ => String::new(),
+        };
         Some(format!(
             "{place:?}{topic} {:?} {:?}",
             file.as_ref().map(std::fs::Metadata::len),

@@ -19,6 +19,7 @@ mod escape;
 mod expected;
 mod exports;
 mod fields;
+mod formats;
 mod inspect;
 mod limbs;
 #[cfg(all(unix, feature = "zenoh"))]

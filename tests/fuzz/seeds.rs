@@ -233,6 +233,38 @@ pub(super) fn bag() -> (Vec<u8>, Vec<u8>) {
     (metadata, std::fs::read(mcap).unwrap())
 }
 
+/// The messages of [`bag`] as rosbag2 of Humble writes them in SQLite.
+pub(super) fn bag_db3() -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.db3");
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let tables = "BEGIN;
+        CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
+        CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);
+        CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+            serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
+        CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB NOT NULL);
+        CREATE INDEX timestamp_idx ON messages (timestamp ASC);
+        INSERT INTO schema VALUES (3, 'humble');";
+    database.execute_batch(tables).unwrap();
+    let mut topics: Vec<String> = Vec::new();
+    for message in mcap::MessageStream::new(&bag().1).unwrap() {
+        let message = message.unwrap();
+        let (topic, kind) = (&message.channel.topic, &message.channel.schema.as_ref().unwrap().name);
+        let at = topics.iter().position(|known| known == topic).unwrap_or_else(|| {
+            topics.push(topic.clone());
+            let add = "INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr', '')";
+            database.execute(add, (topics.len() as i64, topic, kind)).unwrap();
+            topics.len() - 1
+        });
+        let add = "INSERT INTO messages(topic_id, timestamp, data) VALUES (?1, ?2, ?3)";
+        database.execute(add, (at as i64 + 1, message.log_time as i64, message.data.as_ref())).unwrap();
+    }
+    database.execute_batch("COMMIT").unwrap();
+    drop(database);
+    std::fs::read(path).unwrap()
+}
+
 pub(super) const NDJSON: &str = "{\"t\":0,\"values\":{\"1\":3,\"2\":4.5}}\n{\"t\":0.1,\"values\":{\"1\":null,\"9\":1e3},\"joints\":{\"a\":0.5}}\n\
     {\"t\":0.2,\"values\":{},\"pose\":{\"hand\":[0,0,1,0,0,0,1]}}\n{\"t\":0.3,\"values\":{\"1\":1}}\n";
 

@@ -7,8 +7,9 @@ use somatic::author::mesh::{MeshOptions, author_mjcf_skin, author_urdf_skin};
 use somatic::internal::author::icub::IcubFile;
 use somatic::internal::body::{Original, read_taxel_table};
 use somatic::internal::recording::BagSurvey;
+use somatic::internal::robot::BagSource;
 use somatic::internal::robot::messages::{Float32MultiArray, JointState, Message, PointCloud2, TfMessage};
-use somatic::internal::source::JointStates;
+use somatic::internal::source::{BagName, JointStates};
 use somatic::internal::wire::{Decoder, Event};
 use somatic::recording::Reader;
 use somatic::robot::Kinematics;
@@ -240,6 +241,16 @@ pub(super) fn bag() -> Target {
             Err(format!("{} messages of {expected}, and nothing is said to be lost", count(&survey)))
         }
         read => verdict(read),
+    })
+}
+
+/// SQLite has no checksums: what a damaged page says may be other messages, but nothing worse.
+pub(super) fn bag_db3() -> Target {
+    let body = Body::from_bytes("hand", bundled::HAND).unwrap();
+    target("bag_db3", "a.db3", [seeds::bag_db3()], move |case| {
+        let read = BagSource::open(&BagName::new(case.path), &body).and_then(|mut source| frames(&mut source));
+        told(read)?;
+        told(BagSurvey::read(case.path, |_| {}))
     })
 }
 
@@ -493,6 +504,7 @@ pub(super) fn source_names() -> Target {
         "serial:/dev/ttyUSB0@115200",
         "mcap:a.mcap",
         "ros2-mcap:bag:/a,/b@sensor_msgs/msg/PointCloud2",
+        "lerobot:a:touch#1",
         "sim:a.toml",
         "-",
         "csv:-",

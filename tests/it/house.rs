@@ -264,6 +264,8 @@ fn each_heavy_dependency_has_one_door() {
         ("encoding_rs", "source/vendor"),
         ("encoding_rs_io", "source/vendor"),
         ("memchr", "source/vendor"),
+        ("flate2", "source/gzip.rs"),
+        ("parquet", "sink/table/parquet_sink.rs|source/lerobot.rs"),
         ("clap", "cli"),
         ("comfy_table", "cli"),
         (

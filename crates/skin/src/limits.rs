@@ -54,7 +54,7 @@ limits! {
     MAX_TABLE_BYTES: u64 = 256 << 20;
     /// Size of a recording of joint states as a table or NDJSON, which is kept in memory
     MAX_STATES_BYTES: u64 = 1 << 30;
-    /// Size of what a recorder writes beside a bag, `metadata.yaml`
+    /// Size of what a recorder writes beside a bag or a dataset, `metadata.yaml` or `info.json`
     MAX_METADATA_BYTES: u64 = 16 << 20;
     /// Size of a chunk of an MCAP when it is unpacked, of its summary, or of a message of a bag in SQLite
     MAX_CHUNK_BYTES: u64 = 256 << 20;
@@ -64,6 +64,8 @@ limits! {
     MAX_DEVICE_BYTES: u64 = 1 << 20;
     /// Length of a line of a recording as a table, NDJSON or an export
     MAX_LINE_BYTES: u64 = 64 << 20;
+    /// Size of a recording in `.gz` when it is unpacked
+    MAX_UNPACKED_BYTES: u64 = 8 << 30;
 
     /// Elements of an XML file within each other
     MAX_XML_DEPTH: usize = 500;

@@ -15,7 +15,7 @@ use super::super::bar::Bar;
 use super::super::stdio::say;
 
 /// Endings of recordings, which bodies do not have.
-const RECORDINGS: [&str; 7] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv"];
+const RECORDINGS: [&str; 8] = ["mcap", "csv", "asf", "lst", "asc", "txt", "tsv", "gz"];
 
 /// Which touch.
 #[derive(Args)]

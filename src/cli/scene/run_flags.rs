@@ -31,10 +31,11 @@ pub(in crate::cli) struct RunFlags {
     /// Where touch frames come from, such as csv:FILE, serial:PORT, or - for NDJSON on standard input [default: a
     /// bundled touch].
     ///
-    /// Recordings: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a ROS 2 bag, sim:FILE.toml, or a pressure
-    /// system's export (.csv, .asf, .lst, .asc, .txt). Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or
-    /// more zenoh:KEY for limbs on other computers. A board that prints numbers: text:PORT[@BAUD],
-    /// text:tcp://HOST:PORT, text:udp://:PORT or text:-. Standard input: - for NDJSON, csv:- for CSV.
+    /// Recordings: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a ROS 2 bag, sim:FILE.toml,
+    /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
+    /// .txt); those of text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
+    /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
+    /// text:-. Standard input: - for NDJSON, csv:- for CSV.
     #[arg(id = "source", long = "source", value_name = "SOURCE")]
     pub(in crate::cli) sources: Vec<String>,
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use somatic::internal::setup::Setup;
 use somatic::internal::setup::bodies::load_body;
-use somatic::internal::source::BagName;
+use somatic::internal::source::{BagName, LeRobotName};
 use somatic::source::SimulatedSource;
 use somatic::{Body, Error, Result, bundled};
 
@@ -34,12 +34,13 @@ pub(super) fn subject(what: Option<&str>, asked: &RunFlags) -> Result<Subject> {
         Ok(Subject::Recording(Box::new(asked.with(None)?)))
     };
     match ending.as_deref() {
-        _ if what.starts_with("ros2-mcap:") => as_source(""),
+        _ if what.starts_with("ros2-mcap:") || what.starts_with("lerobot:") => as_source(""),
         _ if BagName::is_folder(Path::new(what)) => as_source("ros2-mcap"),
+        _ if LeRobotName::is_folder(Path::new(what)) => as_source("lerobot"),
         Some("mcap") => as_source("mcap"),
         Some("db3") => as_source("ros2-mcap"),
         Some("csv") => as_source("csv"),
-        Some("asf" | "lst" | "asc" | "txt" | "tsv") => as_source(""),
+        Some("asf" | "lst" | "asc" | "txt" | "tsv" | "gz") => as_source(""),
         Some("toml") if SimulatedSource::is_named(what) => as_source("sim"),
         Some("toml") => Ok(Subject::Recording(Box::new(asked.with(Some(Path::new(what)))?))),
         _ if ending.is_none() && bundled::body(what).is_none() && !Path::new(what).exists() => Err(Error::usage(

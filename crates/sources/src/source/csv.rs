@@ -5,7 +5,6 @@
 //! quote is an error. Rows are read one at a time, so memory does not grow with the length of a recording.
 
 use std::collections::VecDeque;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -15,6 +14,7 @@ use super::Source;
 use super::csv_cells::{number, shortened, trimmed};
 use super::csv_header::{self, Header};
 use super::csv_named;
+use super::gzip;
 use super::skipped_bad::SkippedBad;
 use super::text::TextOptions;
 use super::time_column::TimeColumn;
@@ -65,9 +65,8 @@ impl CsvSource {
     /// The file cannot be read or has no valid header; a usage error if `rate_hz` is missing or not allowed.
     pub fn open(path: impl AsRef<Path>, rate_hz: Option<f64>) -> Result<Self> {
         let path = path.as_ref();
-        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-        let length = file.metadata().ok().filter(std::fs::Metadata::is_file).map(|m| m.len());
-        Self::from_reader(path.display().to_string(), file, length, rate_hz)
+        let (text, length) = gzip::open(path).map_err(|e| Error::io(path, &e))?;
+        Self::from_reader(path.display().to_string(), text, length, rate_hz)
     }
 
     /// The same with columns that are named instead of found out, if [`VendorOptions::text`] names any: for a body with the taxels
@@ -77,9 +76,8 @@ impl CsvSource {
     /// As [`CsvSource::open`]; a usage error if there are no such columns, or not as many as taxels.
     pub fn open_for(path: impl AsRef<Path>, options: &VendorOptions, ids: &[u32]) -> Result<Self> {
         let path = path.as_ref();
-        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-        let length = file.metadata().ok().filter(std::fs::Metadata::is_file).map(|m| m.len());
-        Self::from_reader_for(path.display().to_string(), file, length, options, ids)
+        let (text, length) = gzip::open(path).map_err(|e| Error::io(path, &e))?;
+        Self::from_reader_for(path.display().to_string(), text, length, options, ids)
     }
 
     /// Reads a recording from `reader`, called `name` in messages. `total_bytes` is for [`Source::progress`].

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::gzip;
 use super::skipped_bad::SkippedBad;
 use super::time_column::{TimeColumn, unit_in_head};
 use crate::error::{Error, Result, failed};
@@ -58,7 +59,8 @@ impl JointStates {
         let path = path.as_ref();
         let mut skipped = SkippedBad::new(skip_bad);
         let failed = |e: std::io::Error| Error::io(path, &e);
-        let mut reader = BufReader::new(limits::open(path, MAX_STATES_BYTES).map_err(failed)?);
+        let file = limits::open(path, MAX_STATES_BYTES).map_err(failed)?;
+        let mut reader = BufReader::new(gzip::unpacked(file, MAX_STATES_BYTES).map_err(failed)?.0);
         let is_json = reader.fill_buf().map_err(failed)?.trim_ascii_start().first() == Some(&b'{');
         let mut states = Self { name: path.display().to_string(), ..Self::default() };
         let read =

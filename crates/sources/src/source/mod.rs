@@ -11,7 +11,11 @@ mod csv_cells;
 mod csv_file;
 mod csv_header;
 mod csv_named;
+mod gzip;
 mod joint_states;
+#[cfg(feature = "parquet")]
+mod lerobot;
+mod lerobot_name;
 #[cfg(feature = "zenoh")]
 mod limbs;
 mod ndjson;
@@ -19,6 +23,7 @@ mod ndjson;
 mod ports;
 #[cfg(feature = "mcap")]
 mod recorded;
+mod refused;
 mod replay;
 #[cfg(any(feature = "serial", feature = "zenoh", feature = "mcap"))]
 pub mod send_rate;
@@ -34,6 +39,9 @@ mod vendor;
 
 pub use self::bag_name::BagName;
 pub use self::csv::CsvSource;
+#[cfg(feature = "parquet")]
+pub use self::lerobot::LeRobotSource;
+pub use self::lerobot_name::LeRobotName;
 #[cfg(any(feature = "serial", feature = "zenoh"))]
 pub use boards::{BoardAccount, BoardState, ChannelWiper, LimbPercepts, Lines, Notice, WiperTrouble};
 pub use csv_file::CsvFile;

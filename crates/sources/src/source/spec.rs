@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::bag_name::BagName;
+use super::lerobot_name::LeRobotName;
+use super::refused;
 use super::{CsvSource, NdjsonSource, SimulatedSource, Source, TextPlace, TextSource, VendorOptions, VendorSource};
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 11] = [
+const FORMS: [(&str, &str); 12] = [
     ("csv", "csv:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("text", "text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers"),
@@ -17,6 +19,7 @@ const FORMS: [(&str, &str); 11] = [
     ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
     ("ros2-mcap", "ros2-mcap:PATH[:/TOPIC,...][@TYPE]"),
+    ("lerobot", "lerobot:DIR[:FEATURE][#EPISODE]"),
     ("export", "a pressure system's .csv, .asf, .lst, .asc or .txt"),
     ("sim", "sim:FILE.toml"),
     ("-", "- for NDJSON on standard input"),
@@ -54,6 +57,8 @@ pub enum SourceSpec {
     Mcap(PathBuf),
     /// `ros2-mcap:PATH[:/TOPIC,...][@TYPE]`: topics of a bag of ROS 2.
     Ros2Mcap(BagName),
+    /// `lerobot:DIR[:FEATURE][#EPISODE]`: episodes of a LeRobot dataset.
+    LeRobot(LeRobotName),
     /// A bare `FILE.lst`, `.asf`, `.asc` or `.txt`, or any file with content or a format that says so: a pressure system's
     /// export.
     Vendor(PathBuf),
@@ -86,6 +91,7 @@ impl fmt::Display for SourceSpec {
             Self::Zenoh(key) => write!(f, "zenoh:{key}"),
             Self::Mcap(path) => write!(f, "mcap:{}", path.display()),
             Self::Ros2Mcap(bag) => write!(f, "ros2-mcap:{bag}"),
+            Self::LeRobot(name) => write!(f, "lerobot:{name}"),
             Self::Vendor(path) => write!(f, "{}", path.display()),
             Self::Sim(path) => write!(f, "sim:{}", path.display()),
             Self::Stdin => f.write_str("-"),
@@ -101,8 +107,33 @@ fn is_port(text: &str) -> bool {
         || text.strip_prefix("COM").is_some_and(is_com)
 }
 
+/// A topic of ROS 2, live: `/TOPIC[@TYPE]`.
+fn topic(text: &str) -> Result<SourceSpec> {
+    let (topic, kind) = text.split_once('@').map_or((text, None), |(topic, kind)| (topic, Some(kind)));
+    if !topic.starts_with('/') || kind.is_some_and(str::is_empty) {
+        return Err(Error::usage(format!(
+            "`{text}` is not a topic; write ros2:/TOPIC, or ros2:/TOPIC@sensor_msgs/msg/PointCloud2"
+        )));
+    }
+    // As ROS 1 and people write types.
+    let whole = |kind: &str| super::bag_name::type_of(kind).unwrap_or_else(|| kind.to_owned());
+    Ok(SourceSpec::Ros2 { topic: topic.to_owned(), kind: kind.map(whole) })
+}
+
+/// A serial line: `PORT[@BAUD]`.
+fn port(text: &str) -> Result<SourceSpec> {
+    let Some((port, baud)) = text.rsplit_once('@') else {
+        return Ok(SourceSpec::Serial { port: text.to_owned(), baud: None });
+    };
+    match baud.parse() {
+        Ok(baud) if baud > 0 && !port.is_empty() => Ok(SourceSpec::Serial { port: port.to_owned(), baud: Some(baud) }),
+        _ => Err(Error::usage(format!("`{baud}` is not a baud rate; write serial:PORT@115200"))),
+    }
+}
+
 impl SourceSpec {
-    /// Parses a source of one of `kinds`: `csv`, `serial`, `text`, `ros2`, `zenoh`, `mcap`, `ros2-mcap`, `sim`, `-` and `csv:-`.
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `text`, `ros2`, `zenoh`, `mcap`, `ros2-mcap`, `lerobot`, `export`,
+    /// `sim`, `-` and `csv:-`.
     ///
     /// # Errors
     /// A usage error that lists the syntax of these kinds.
@@ -113,12 +144,17 @@ impl SourceSpec {
             forms => forms.concat(),
         };
         let bad = |what: String| Err(Error::usage(what));
-        let ending = |wanted: &str| Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
+        let is_read = kinds.contains(&"export");
+        // Text is read compressed, too.
+        let is_packed = Path::new(text).extension().is_some_and(|own| own.eq_ignore_ascii_case("gz"));
+        let whole = if is_packed && is_read { Path::new(text).with_extension("") } else { text.into() };
+        let ending = |wanted: &str| whole.extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
         if kinds.contains(&"serial") && is_port(text) {
             return bad(format!(
                 "`{text}` is a serial port; write text:{text} if its board prints numbers, or serial:{text} if it speaks somatic's protocol"
             ));
         }
+        let known = refused::what_to_do(text).filter(|_| is_read);
         let (kind, rest) = match text.split_once(':') {
             Some(("csv", "-")) => ("csv:-", text),
             Some((kind, rest)) if !["-", "export"].contains(&kind) && FORMS.iter().any(|(known, _)| *known == kind) => {
@@ -126,6 +162,8 @@ impl SourceSpec {
             }
             _ if text == "-" => ("-", text),
             _ if BagName::is_folder(Path::new(text)) => ("ros2-mcap", text),
+            _ if LeRobotName::is_folder(Path::new(text)) => ("lerobot", text),
+            _ if known.is_some() => return bad(known.unwrap_or_default()),
             _ if ending("csv") => ("csv", text),
             _ if ending("mcap") => ("mcap", text),
             // `.bag` is not read; but the file says what to do.
@@ -152,32 +190,18 @@ impl SourceSpec {
                 Ok(name) => Self::Ros2Mcap(name),
                 Err(e) => return bad(e.to_string()),
             },
+            "lerobot" => match rest.parse() {
+                Ok(name) => Self::LeRobot(name),
+                Err(e) => return bad(e.to_string()),
+            },
             "export" => Self::Vendor(rest.into()),
             "sim" => Self::Sim(rest.into()),
             "text" => Self::Text(rest.parse()?),
             "zenoh" => Self::Zenoh(crate::limb::checked_key(rest)?),
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
-            "ros2" => {
-                let (topic, kind) = rest.split_once('@').map_or((rest, None), |(topic, kind)| (topic, Some(kind)));
-                if !topic.starts_with('/') || kind.is_some_and(str::is_empty) {
-                    return bad(format!(
-                        "`{rest}` is not a topic; write ros2:/TOPIC, or ros2:/TOPIC@sensor_msgs/msg/PointCloud2"
-                    ));
-                }
-                // As ROS 1 and people write types.
-                let whole = |kind: &str| super::bag_name::type_of(kind).unwrap_or_else(|| kind.to_owned());
-                Self::Ros2 { topic: topic.to_owned(), kind: kind.map(whole) }
-            }
-            _ => match rest.rsplit_once('@') {
-                None => Self::Serial { port: rest.to_owned(), baud: None },
-                Some((port, baud)) => match baud.parse() {
-                    Ok(baud) if baud > 0 && !port.is_empty() => {
-                        Self::Serial { port: port.to_owned(), baud: Some(baud) }
-                    }
-                    _ => return bad(format!("`{baud}` is not a baud rate; write serial:PORT@115200")),
-                },
-            },
+            "ros2" => return topic(rest),
+            _ => return port(rest),
         })
     }
 
@@ -205,6 +229,7 @@ impl SourceSpec {
         match self {
             Self::Csv(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => Some(path),
             Self::Ros2Mcap(name) => Some(&name.path),
+            Self::LeRobot(name) => Some(&name.path),
             Self::Serial { .. } | Self::Text(_) | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => {
                 None
             }
@@ -269,6 +294,10 @@ impl SourceSpec {
                 };
                 Err(Error::failed(what).at(name.path.display()))
             }
+            #[cfg(feature = "parquet")]
+            Self::LeRobot(name) => Ok(Box::new(super::LeRobotSource::open(name, taxels)?)),
+            #[cfg(not(feature = "parquet"))]
+            Self::LeRobot(name) => Err(Error::failed(refused::NO_PARQUET).at(name.path.display())),
             Self::Ros2 { topic, .. } => {
                 let what = "a topic of ROS 2 is read live, by `somatic run` in a build with feature `ros2`: cargo install \
                             --path . --features ros2";
@@ -333,6 +362,7 @@ mod tests {
             "zenoh:robot/left",
             "mcap:a.mcap",
             "ros2-mcap:a/bag:/arm/skin",
+            "lerobot:a/pick:observation.tactile#3",
             "walk.lst",
             "sim:touch.toml",
             "-",
@@ -354,7 +384,7 @@ mod tests {
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], lerobot:DIR[:FEATURE][#EPISODE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

@@ -1,6 +1,5 @@
 //! The lines of a file, in whatever encoding, one at a time.
 
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
@@ -9,6 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use encoding_rs::{UTF_16BE, UTF_16LE};
 use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 
+use super::super::gzip;
 use crate::error::{Error, Result};
 use crate::limits::MAX_LINE_BYTES;
 
@@ -49,9 +49,8 @@ impl Read for Counted {
 impl Lines {
     /// The lines of the file at `path`.
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
-        let total = file.metadata().ok().filter(std::fs::Metadata::is_file).map(|data| data.len());
-        Self::new(Box::new(file), total).map_err(|e| e.at(path.display()))
+        let (text, total) = gzip::open(path).map_err(|e| Error::io(path, &e))?;
+        Self::new(text, total).map_err(|e| e.at(path.display()))
     }
 
     /// The lines of what `reader` gives, which is `total` bytes long if that is known.

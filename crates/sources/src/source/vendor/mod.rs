@@ -209,11 +209,12 @@ impl VendorSource {
         &self.layout
     }
 
-    /// The name of its body: the file's, without what follows the last point.
+    /// The name of its body: the file's, without what follows the last point, and without `.gz`.
     #[must_use]
     pub fn body_name(&self) -> String {
-        let stem =
-            self.path.file_stem().map_or_else(|| "recording".to_owned(), |stem| stem.to_string_lossy().into_owned());
+        let is_packed = self.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gz"));
+        let path = if is_packed { self.path.with_extension("") } else { self.path.clone() };
+        let stem = path.file_stem().map_or_else(|| "recording".to_owned(), |stem| stem.to_string_lossy().into_owned());
         format!("{stem}.glb")
     }
 
