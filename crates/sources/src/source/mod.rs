@@ -14,6 +14,7 @@ mod csv_named;
 mod joint_states;
 #[cfg(feature = "zenoh")]
 mod limbs;
+mod map;
 mod ndjson;
 #[cfg(feature = "serial")]
 mod ports;
@@ -25,6 +26,7 @@ pub mod send_rate;
 #[cfg(feature = "serial")]
 mod serial;
 mod simulated;
+mod sizes;
 mod skipped_bad;
 mod spec;
 mod text;
@@ -40,6 +42,9 @@ pub use csv_file::CsvFile;
 pub use joint_states::{JointPosition, JointStates, position_between};
 #[cfg(feature = "zenoh")]
 pub use limbs::{LimbOptions, LimbSource};
+pub use map::{
+    ArrayMap, ArrayPath, Came, Decoder, Dimension, JsonLines, Lies, MapTime, MappedSource, Messages, Step, order,
+};
 pub use ndjson::NdjsonSource;
 #[cfg(feature = "serial")]
 pub use ports::{PortSummary, serial_ports};
