@@ -95,7 +95,7 @@ fn state(value: impl Fn(usize, usize) -> f32) -> Vec<u8> {
     [&[0, 1, 0, 0][..], &bytes.0].concat()
 }
 
-/// Three messages: pad 4 is pressed in the second, and one value of pad 0 is no reading.
+/// Three messages: pad 4 is pressed in the second, and one value of pad 0 counts as missing.
 fn messages() -> Vec<(String, String, i64, Vec<u8>)> {
     let pressed = |frame: usize| {
         state(move |pad, at| match (pad, at) {
@@ -147,7 +147,7 @@ fn a_hand_is_read_from_a_bag_by_a_map_and_by_its_name() {
     let said = stderr(&run);
     assert_eq!(run.status.code(), Some(0), "{said}");
     assert!(said.contains(&format!("{TOPIC} ({STATE}): press_sensor_state[*].pressure")), "{said}");
-    assert!(said.contains("108 values a message; 30000 is no reading; numbers are multiplied by 0.0001"), "{said}");
+    assert!(said.contains("108 values a message; 30000 counts as missing; numbers are multiplied by 0.0001"), "{said}");
     assert!(said.contains("a body is made: a grid of 9 × 12 sensors"), "{said}");
     let sums: Vec<f64> = totals(&String::from_utf8(run.stdout).unwrap()).iter().map(|own| own["grid"]).collect();
     for (sum, right) in sums.iter().zip([1070.0, 1075.0, 1070.0]) {

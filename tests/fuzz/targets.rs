@@ -8,7 +8,7 @@ use somatic::internal::author::icub::IcubFile;
 use somatic::internal::body::{Original, read_taxel_table};
 use somatic::internal::recording::BagSurvey;
 use somatic::internal::robot::messages::{Float32MultiArray, JointState, Message, PointCloud2, TfMessage};
-use somatic::internal::source::JointStates;
+use somatic::internal::source::{ArrayMap, JointStates, JsonLines, MappedSource};
 use somatic::internal::wire::{Decoder, Event};
 use somatic::recording::Reader;
 use somatic::robot::Kinematics;
@@ -240,6 +240,18 @@ pub(super) fn bag() -> Target {
             Err(format!("{} messages of {expected}, and nothing is said to be lost", count(&survey)))
         }
         read => told(read),
+    })
+}
+
+pub(super) fn map() -> Target {
+    target("map", "a.toml", [seeds::MAP], |case| told(ArrayMap::parse(&case.text())))
+}
+
+pub(super) fn mapped_lines() -> Target {
+    target("mapped_lines", "a.ndjson", [seeds::MAPPED_LINES], |case| {
+        let map = ArrayMap::parse("values = ['pads[*].p', 'digits']\ndecoder = 'u8'").unwrap();
+        let source = JsonLines::open(case.path, &map).and_then(|lines| MappedSource::new(Box::new(lines), &map, true));
+        told(source.and_then(|mut source| frames(&mut source)))
     })
 }
 

@@ -225,7 +225,7 @@ mod tests {
             let map = format!("{which}values = 'position'\nmissing = [30000]\nscale = 2");
             let (frames, notices) = read(&bag, &map).unwrap();
             assert_eq!(frames, expected, "{which}");
-            let says = "/hand (sensor_msgs/msg/JointState): position; time is header.stamp: 2 values a message; 30000 is no reading";
+            let says = "/hand (sensor_msgs/msg/JointState): position; time is header.stamp: 2 values a message; 30000 counts as missing";
             assert!(notices[0].contains(says), "{notices:?}");
         }
         assert_eq!(read(&bag, "values = 'data'").unwrap().0[2], (12.0, vec![Some(7.0); 4]));

@@ -211,7 +211,7 @@ impl ArrayMap {
         let mut words = String::new();
         if !self.missing.is_empty() {
             let codes: Vec<String> = self.missing.iter().map(f64::to_string).collect();
-            words += &format!("; {} is no reading", codes.join(" or "));
+            words += &format!("; {} counts as missing", codes.join(" or "));
         }
         if self.scale != 1.0 {
             words += &format!("; numbers are multiplied by {}", self.scale);
@@ -276,7 +276,7 @@ mod tests {
         assert_eq!((map.value(30000.0), map.value(100_000.0)), (RawValue::MISSING, RawValue::new(10.0)));
         assert_eq!(map.ids, Some(vec![4, 5]));
         assert_eq!(map.time, MapTime::At("stamp_ms".parse().unwrap(), 1e3));
-        assert_eq!(map.treatment(), "; 30000 is no reading; numbers are multiplied by 0.0001");
+        assert_eq!(map.treatment(), "; 30000 counts as missing; numbers are multiplied by 0.0001");
         let many = ArrayMap::parse("values = ['a', 'b[*].c', 'd']\ntime = 'a.t:us'").unwrap();
         assert_eq!((many.paths().as_str(), many.values.len()), ("a to d", 3));
         assert_eq!(many.time, MapTime::At("a.t".parse().unwrap(), 1e6));

@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(
             notices,
             [
-                "lines: sensordata; time is time in s: 2 values a message; 30000 is no reading; numbers are multiplied by 2"
+                "lines: sensordata; time is time in s: 2 values a message; 30000 counts as missing; numbers are multiplied by 2"
             ]
         );
         assert!(losses.is_empty());
