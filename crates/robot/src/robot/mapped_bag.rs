@@ -203,7 +203,10 @@ mod tests {
         bag.finish().unwrap();
     }
 
-    fn read(bag: &BagName, map: &str) -> Result<(Vec<(f64, Vec<Option<f64>>)>, Vec<String>)> {
+    /// Times in s, and values.
+    type Frames = Vec<(f64, Vec<Option<f64>>)>;
+
+    fn read(bag: &BagName, map: &str) -> Result<(Frames, Vec<String>)> {
         let mut source = mapped_bag(bag, &ArrayMap::parse(map)?, false)?;
         let (mut frame, mut all) = (Frame::default(), Vec::new());
         while source.next_frame(&mut frame)? {
@@ -219,8 +222,7 @@ mod tests {
         let path = folder.path().join("bag");
         write(&path, 5);
         let bag = BagName::new(&path);
-        let expected: Vec<(f64, Vec<Option<f64>>)> =
-            (0..3).map(|at| (5.0 + f64::from(at), vec![Some(2.0 * f64::from(at)), None])).collect();
+        let expected: Frames = (0..3).map(|at| (5.0 + f64::from(at), vec![Some(2.0 * f64::from(at)), None])).collect();
         for which in ["", "message = '/hand'\n", "type = 'sensor_msgs/JointState'\n"] {
             let map = format!("{which}values = 'position'\nmissing = [30000]\nscale = 2");
             let (frames, notices) = read(&bag, &map).unwrap();
