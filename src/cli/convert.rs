@@ -13,8 +13,9 @@ use somatic::internal::recording::{BODY, CALIBRATION};
 use somatic::internal::run::left_out;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::attached::{self, body_bytes, file_name};
+use somatic::internal::setup::bodies::load_body;
 use somatic::internal::setup::overlaid::{How, overlaid};
-use somatic::internal::setup::source_of;
+use somatic::internal::setup::{open_mapped, source_of};
 use somatic::recording::Reader;
 use somatic::source::{SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Result};
@@ -22,7 +23,7 @@ use somatic::{Error, Result};
 use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::interrupt::stop_soon_on_signal;
-use super::scene::said;
+use super::scene::{in_flags, said};
 use super::stdio::{say, tell_losses};
 use super::words::count;
 
@@ -90,7 +91,11 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
             .at(&arguments.from));
     }
     let options = arguments.export.options()?;
-    let from = source_of(&arguments.from, &["csv", "mcap", "export", "sim"], &options);
+    let kinds: &[&str] = match options.map {
+        Some(_) => &["ndjson", "mcap", "ros2-mcap"],
+        None => &["csv", "mcap", "export", "sim"],
+    };
+    let from = source_of(&arguments.from, kinds, &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
     let to = match to_name {
         // As a source it is another kind.
@@ -101,13 +106,25 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
         unreachable!("it is of one of these kinds");
     };
     let read = FilesRead::default().named(slice::from_ref(&arguments.from)).files(&arguments.calibration);
-    let read = read.files(&arguments.export.layout);
+    let read = read.files(&arguments.export.layout).files(&arguments.export.map);
     let output = read.bodies(&arguments.body).outputs(arguments.force).add(to_path)?;
     let (mut source, attached): (Box<dyn Source + Send>, _) = match &from {
         SourceSpec::Vendor(path) => {
             let export = VendorSource::open(path, &options)?;
             let attached = files(arguments, &from, Some(&export))?;
             (Box::new(export), attached)
+        }
+        _ if options.map.is_some() => {
+            let mut mapped = open_mapped(&from, &options).map_err(in_flags)?;
+            let mut attached = files(arguments, &from, None)?;
+            if let Some(name) = &arguments.body {
+                let ids: Vec<u32> = load_body(name)?.taxels.iter().map(|taxel| taxel.id).collect();
+                mapped = mapped.for_body(&ids)?;
+            } else if matches!(to, SourceSpec::Mcap(_)) {
+                say(&mapped.about_body());
+                attached.push(("map.glb".to_owned(), BODY.to_owned(), mapped.body()?));
+            }
+            (Box::new(mapped), attached)
         }
         _ => (from.open(&[], &options)?, files(arguments, &from, None)?),
     };

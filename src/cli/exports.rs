@@ -42,15 +42,21 @@ pub(super) struct ExportFlags {
     /// It is in metres and square metres. The exports of pedar do not have it.
     #[arg(long, value_name = "FILE.csv")]
     pub(super) layout: Option<PathBuf>,
+
+    /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
+    ///
+    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    #[arg(long, value_name = "FILE")]
+    pub(super) map: Option<String>,
 }
 
 impl ExportFlags {
     /// What a scene would say of it.
     pub(super) fn keys(&self) -> SceneFile {
-        let Self { rate, format, grid, pitch, unit, layout } = self.clone();
+        let Self { rate, format, grid, pitch, unit, layout, map } = self.clone();
         let mut keys = SceneFile::default();
         (keys.rate_hz, keys.format, keys.grid, keys.pitch) = (rate, format, grid, pitch);
-        (keys.unit, keys.layout) = (unit, layout);
+        (keys.unit, keys.layout, keys.map) = (unit, layout, map);
         keys
     }
 

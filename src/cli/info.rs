@@ -10,7 +10,7 @@ use serde_json::Value;
 use somatic::internal::contents::{Contents, bag_as_json};
 use somatic::internal::recording::BagSurvey;
 use somatic::internal::setup::attached;
-use somatic::internal::setup::source_of;
+use somatic::internal::setup::{open_mapped, source_of};
 use somatic::internal::source::Layout;
 use somatic::recording::Reader;
 use somatic::source::{CsvSource, Source, SourceSpec, VendorSource};
@@ -19,10 +19,14 @@ use somatic::{Body, Calibration, Error, Frame, Result};
 use self::contacts::Contacts;
 use super::bar::Bar;
 use super::exports::ExportFlags;
-use super::scene::said;
+use super::scene::{in_flags, said};
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
 use super::words::{number, one_line, size_words, span, title};
+
+/// The kinds of recordings, and those that hold arrays within messages.
+const KINDS: &[&str] = &["csv", "mcap", "ros2-mcap", "export"];
+const MAPPED: &[&str] = &["ndjson", "mcap", "ros2-mcap"];
 
 const EXAMPLES: &str = "\
 Examples:
@@ -53,7 +57,7 @@ pub(super) struct Arguments {
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     let mut bar = Bar::new("reading");
     let options = arguments.export.options()?;
-    let recording = source_of(&arguments.recording, &["csv", "mcap", "ros2-mcap", "export"], &options);
+    let recording = source_of(&arguments.recording, if options.map.is_some() { MAPPED } else { KINDS }, &options);
     let (known, contacts) = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
         SourceSpec::Mcap(path) => {
             if arguments.export.rate.is_some() {
@@ -66,6 +70,11 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 None
             });
             (known, contacts)
+        }
+        spec @ (SourceSpec::Ros2Mcap(_) | SourceSpec::Ndjson(_)) if options.map.is_some() => {
+            let mut source = open_mapped(&spec, &options).map_err(in_flags)?;
+            let path = spec.file().unwrap_or(Path::new("")).to_owned();
+            (of_frames("messages", &path, &mut source, None, &mut bar)?, None)
         }
         SourceSpec::Ros2Mcap(bag) => {
             let mut survey = BagSurvey::read(&bag.path, |share| bar.show(share))?;

@@ -104,7 +104,10 @@ pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
         sources => sources.iter().map(|source| asked(arguments, Some(source), wanted)).collect::<Result<_>>()?,
     };
     let read = runs.iter().fold(FilesRead::default(), |read, asked| {
-        read.files(asked.calibration.iter().chain(&asked.layout)).bodies(&asked.body).sources(&asked.sources)
+        read.files(asked.calibration.iter().chain(&asked.layout))
+            .files(&asked.map)
+            .bodies(&asked.body)
+            .sources(&asked.sources)
     });
     let mut outputs = read.outputs(arguments.force);
     let file = PlotFile::at(&arguments.output, "-o", &mut outputs)?;

@@ -7,7 +7,7 @@ use crate::percept::Outputs;
 use crate::scene::{AskedOutputs, MotionFilter, Scene};
 use crate::signal::{Calibration, Letter, Quantity, Receptor, UnitOfP};
 use crate::sink::TableWish;
-use crate::source::{SourceSpec, VendorOptions};
+use crate::source::{ArrayMap, SourceSpec, VendorOptions};
 use crate::touch;
 
 impl SceneFile {
@@ -151,6 +151,7 @@ impl SceneFile {
             layout: self.layout.clone(),
             skip_bad: self.skip_bad,
             text: self.text.options()?,
+            map: self.map.as_deref().map(ArrayMap::named).transpose().map_err(|e| e.at("`map`"))?,
         })
     }
 }

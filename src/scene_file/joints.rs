@@ -36,7 +36,8 @@ impl SceneFile {
             };
         }
         let states = self.states()?;
-        let carries_joints = |source: &SourceSpec| matches!(source, SourceSpec::Stdin | SourceSpec::Mcap(_));
+        let carries_joints =
+            |source: &SourceSpec| matches!(source, SourceSpec::Stdin | SourceSpec::Ndjson(_) | SourceSpec::Mcap(_));
         if states.is_none() && !self.sources.iter().any(carries_joints) {
             return Err(Error::usage(
                 "frames of this source carry no joint states; give a recording of them: `joint_states = \"FILE\"`, a CSV under \

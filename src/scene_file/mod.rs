@@ -59,7 +59,7 @@ pub struct SceneFile {
     /// Where touch frames come from, such as csv:FILE, serial:PORT, or - for NDJSON on standard input [default: a
     /// bundled touch].
     ///
-    /// Recordings: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a ROS 2 bag, sim:FILE.toml,
+    /// Recordings: csv:FILE, ndjson:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a ROS 2 bag, sim:FILE.toml,
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); those of text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
@@ -247,6 +247,11 @@ pub struct SceneFile {
         schemars(description = "The form of the lines of `text:`, if it is not to be found out.")
     )]
     pub text: TextKeys,
+
+    /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
+    ///
+    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    pub map: Option<String>,
 
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
     pub zenoh_config: Option<PathBuf>,

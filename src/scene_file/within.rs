@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{SceneFile, StatesSpec};
 use crate::bundled;
 use crate::sink::SinkSpec;
-use crate::source::{BagName, LeRobotName, SourceSpec};
+use crate::source::{ArrayMap, BagName, LeRobotName, SourceSpec};
 
 impl SceneFile {
     /// It with paths that are relative to where we are, where it is in `folder`.
@@ -15,6 +15,11 @@ impl SceneFile {
             calibration: self.calibration.map(there),
             wiring: self.wiring.map(there),
             layout: self.layout.map(there),
+            // A preset, unless a file is called the same.
+            map: self.map.map(|map| match there(map.clone().into()) {
+                file if file.exists() || !ArrayMap::is_preset(&map) => file.display().to_string(),
+                _ => map,
+            }),
             zenoh_config: self.zenoh_config.map(there),
             joints: self.joints.map(there),
             joint_states: self.joint_states.map(|states| states_within(folder, states)),
@@ -37,6 +42,7 @@ fn bag_within(folder: &Path, bag: BagName) -> BagName {
 fn source_within(folder: &Path, source: SourceSpec) -> SourceSpec {
     match source {
         SourceSpec::Csv(file) => SourceSpec::Csv(folder.join(file)),
+        SourceSpec::Ndjson(file) => SourceSpec::Ndjson(folder.join(file)),
         SourceSpec::Mcap(file) => SourceSpec::Mcap(folder.join(file)),
         SourceSpec::Ros2Mcap(bag) => SourceSpec::Ros2Mcap(bag_within(folder, bag)),
         SourceSpec::LeRobot(name) => SourceSpec::LeRobot(LeRobotName { path: folder.join(&name.path), ..name }),

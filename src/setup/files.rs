@@ -15,7 +15,7 @@ impl FilesRead {
     /// The files that `asked` names, by flags or by the scene file at `scene`.
     pub fn from_scene(asked: &SceneFile, scene: Option<&Path>) -> Self {
         let named = scene.into_iter().chain(asked.calibration.as_deref()).chain(asked.wiring.as_deref());
-        let named = named.chain(asked.layout.as_deref());
+        let named = named.chain(asked.layout.as_deref()).chain(asked.map.as_deref().map(Path::new));
         let named = named.chain(asked.joints.as_deref()).chain(asked.zenoh_config.as_deref());
         let files = Self::default().files(named).bodies(&asked.body).sources(&asked.sources);
         match asked.joint_states.as_deref().map(StatesSpec::named) {
@@ -49,7 +49,9 @@ impl FilesRead {
     /// The files of `sources`.
     pub fn sources(self, sources: &[SourceSpec]) -> Self {
         sources.iter().fold(self, |files, source| match source {
-            SourceSpec::Csv(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => files.files([path]),
+            SourceSpec::Csv(path) | SourceSpec::Ndjson(path) | SourceSpec::Mcap(path) | SourceSpec::Vendor(path) => {
+                files.files([path])
+            }
             SourceSpec::Ros2Mcap(bag) => files.bag(bag),
             SourceSpec::LeRobot(dataset) => files.files(dataset.tables()).files([dataset.info()]),
             SourceSpec::Sim(path) => files.files(SimulatedSource::files(path)),

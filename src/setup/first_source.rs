@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::Tell;
+use super::mapped::open_mapped;
 use crate::error::{Error, Result};
-use crate::source::{Source as _, SourceSpec, TextSource, VendorOptions, VendorSource};
+use crate::source::{MappedSource, Source as _, SourceSpec, TextSource, VendorOptions, VendorSource};
 
 /// The source `text` as one of `kinds`, and what its content says that it is.
 pub fn source_of(text: &str, kinds: &[&str], options: &VendorOptions) -> Result<SourceSpec> {
@@ -39,6 +40,7 @@ pub(super) struct Found {
     pub(super) spec: SourceSpec,
     export: Option<Export>,
     lines: Option<Text>,
+    mapped: Option<Mapped>,
 }
 
 /// Lines of text that are listened to, and the body that is made for them.
@@ -47,6 +49,14 @@ pub(super) struct Text {
     pub(super) about_body: String,
     /// Until it is read.
     pub(super) source: Option<Box<TextSource>>,
+}
+
+/// Arrays within messages, and the body that is made for them.
+pub(super) struct Mapped {
+    pub(super) body: Result<Vec<u8>>,
+    pub(super) about_body: String,
+    /// Until it is read.
+    pub(super) source: Option<Box<MappedSource>>,
 }
 
 /// What an export says of itself, and its frames.
@@ -73,7 +83,7 @@ impl FirstSource {
             Some(found) if found.asked == *asked && found.options == options => found,
             _ => {
                 let spec = with_content(asked.clone(), &options)?;
-                Found { asked: asked.clone(), options, spec, export: None, lines: None }
+                Found { asked: asked.clone(), options, spec, export: None, lines: None, mapped: None }
             }
         };
         look(known.insert(found))
@@ -98,6 +108,18 @@ impl Found {
             self.lines = Some(Text { body, about_body, source: Some(Box::new(source)) });
         }
         Ok(self.lines.as_mut())
+    }
+
+    /// The source whose messages hold arrays, if there is a map, and it is not lines that come live. `tell` gets what was taken
+    /// for what.
+    pub(super) fn mapped(&mut self, tell: &Tell) -> Result<Option<&mut Mapped>> {
+        if self.options.map.is_some() && self.mapped.is_none() && !matches!(self.spec, SourceSpec::Text(_)) {
+            let mut source = open_mapped(&self.spec, &self.options)?;
+            source.take_notices().iter().for_each(|notice| tell.say(notice));
+            let (body, about_body) = (source.body(), source.about_body());
+            self.mapped = Some(Mapped { body, about_body, source: Some(Box::new(source)) });
+        }
+        Ok(self.mapped.as_mut())
     }
 
     /// The export, opened if it is one.

@@ -3,6 +3,7 @@
 use super::Setup;
 use super::attached;
 use super::bodies::{check_body_name, load_body};
+use super::mapped::open_mapped;
 use crate::body::Body;
 use crate::bundled;
 use crate::error::{Error, Result};
@@ -106,7 +107,10 @@ impl Input {
                 Some((name, bytes)) => Body::from_bytes(&name, &bytes),
                 None => load_body("hand"),
             },
-            (None, _) => load_body("hand"),
+            (None, _) => match setup.mapped_body()? {
+                Some((name, bytes)) => Body::from_bytes(&name, &bytes),
+                None => load_body("hand"),
+            },
         }
     }
 
@@ -118,7 +122,13 @@ impl Input {
     pub fn holds_any(&self) -> bool {
         matches!(
             self.spec,
-            Some(SourceSpec::Stdin | SourceSpec::Ros2 { .. } | SourceSpec::Ros2Mcap(_) | SourceSpec::Zenoh(_))
+            Some(
+                SourceSpec::Stdin
+                    | SourceSpec::Ndjson(_)
+                    | SourceSpec::Ros2 { .. }
+                    | SourceSpec::Ros2Mcap(_)
+                    | SourceSpec::Zenoh(_)
+            )
         )
     }
 
@@ -197,12 +207,27 @@ impl Input {
         let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), setup.rate_hz);
         let options = setup.export_options()?;
         let strict = setup.strict;
-        let of_bag = matches!(spec, Some(SourceSpec::Ros2Mcap(_))).then(|| self.body(setup)).transpose()?;
+        let is_plain = options.map.is_none();
+        let of_bag =
+            (is_plain && matches!(spec, Some(SourceSpec::Ros2Mcap(_)))).then(|| self.body(setup)).transpose()?;
         // It was opened for its sensors; what comes after its first frame is still to be read.
         let mut opened = setup.take_export()?;
+        let mut mapped = setup.take_mapped()?;
         let mut open = move || -> Result<Box<dyn Source + Send>> {
             if let Some(source) = opened.take() {
                 return Ok(source);
+            }
+            if let (Some(spec), false) = (&spec, is_plain) {
+                let source = match mapped.take() {
+                    Some(source) => *source,
+                    None => {
+                        let mut again = open_mapped(spec, &options)?;
+                        // They were said before.
+                        again.take_notices();
+                        again
+                    }
+                };
+                return Ok(Box::new(source.for_body(&ids)?));
             }
             if let (Some(spec @ SourceSpec::Ros2Mcap(bag)), Some(body)) = (&spec, &of_bag) {
                 spec.check_options(&options)?;

@@ -8,6 +8,7 @@ mod files;
 mod first_source;
 mod input;
 mod jointed;
+mod mapped;
 pub mod overlaid;
 mod recorded;
 mod tell;
@@ -20,6 +21,7 @@ pub use self::files::FilesRead;
 use self::first_source::FirstSource;
 pub use self::first_source::source_of;
 pub use self::input::{Input, OpenedLines, RECORDED_BATCH};
+pub use self::mapped::open_mapped;
 pub use self::tell::Tell;
 use crate::body::Body;
 use crate::engine::Options;
@@ -56,7 +58,7 @@ impl Setup {
     #[must_use]
     pub fn recording(&self) -> Option<&PathBuf> {
         match self.sources.first() {
-            Some(SourceSpec::Mcap(path)) if self.body.is_none() => Some(path),
+            Some(SourceSpec::Mcap(path)) if self.body.is_none() && self.map.is_none() => Some(path),
             _ => None,
         }
     }

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::Setup;
-use super::first_source::{Export, Found, Text};
+use super::first_source::{Export, Found, Mapped, Text};
 use crate::error::Result;
-use crate::source::{SourceSpec, TextSource, VendorSource};
+use crate::source::{MappedSource, SourceSpec, TextSource, VendorSource};
 
 impl Setup {
     /// What `look` sees of the lines of text that are listened to, if there are any.
@@ -26,6 +26,25 @@ impl Setup {
         let Some((body, about)) = made.filter(|_| self.body.is_none()) else { return Ok(None) };
         self.tell.say(&about);
         Ok(Some(("text".to_owned(), body?)))
+    }
+
+    /// What `look` sees of the source whose messages hold arrays, if there is a map.
+    fn mapped<T>(&self, look: impl FnOnce(&mut Mapped) -> T) -> Result<Option<T>> {
+        Ok(self.found(|found| Ok(found.mapped(&self.tell)?.map(look)))?.flatten())
+    }
+
+    /// The source whose messages hold arrays, from its first frame on, if there is one and it has not been taken before.
+    pub(crate) fn take_mapped(&self) -> Result<Option<Box<MappedSource>>> {
+        Ok(self.mapped(|mapped| mapped.source.take())?.flatten())
+    }
+
+    /// The body that is made for arrays within messages, where none is named.
+    pub(crate) fn mapped_body(&self) -> Result<Option<(String, Vec<u8>)>> {
+        let made = self.mapped(|mapped| (mapped.body.clone(), mapped.about_body.clone()))?;
+        let Some((body, about)) = made.filter(|_| self.body.is_none()) else { return Ok(None) };
+        let body = body?;
+        self.tell.once(&about);
+        Ok(Some(("map".to_owned(), body)))
     }
 
     /// What `look` sees of the first source, which is found out once.

@@ -46,7 +46,7 @@ fn messages(bag: &Path) -> Vec<(String, String, i64, Vec<u8>)> {
 }
 
 /// Writes `messages` as rosbag2 of Humble does, whose schema is the third.
-fn write_db3(path: &Path, messages: &[(String, String, i64, Vec<u8>)]) {
+pub(super) fn write_db3(path: &Path, messages: &[(String, String, i64, Vec<u8>)]) {
     let database = Connection::open(path).unwrap();
     let tables = "BEGIN;
         CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);

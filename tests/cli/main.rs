@@ -34,6 +34,7 @@ mod limbs_others;
 mod limbs_touches;
 mod limits;
 mod live;
+mod map;
 mod mjcf;
 mod names;
 mod other_readers;

@@ -199,7 +199,7 @@ macro_rules! targets {
 targets! {
     csv csv_skin ndjson text xsensor tekscan emed pedar pliance matrix insoles mcap bag_metadata bag bag_db3 point_cloud joint_state transforms
     number_array urdf urdf_joints mjcf collada stl obj ply glb gltf body_extras icub recipe scene calibration wiring simulation
-    board_line http web_socket source_names sink_names grid regions joint_states
+    map mapped_lines board_line http web_socket source_names sink_names grid regions joint_states
 }
 
 #[test]

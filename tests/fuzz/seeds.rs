@@ -265,6 +265,13 @@ pub(super) fn bag_db3() -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
+pub(super) const MAP: &str = "message = '/hand'\ntype = 'maker/msg/Hand'\nvalues = ['pads[*].pressure', 'data[2:5]', 'one']\nids = '4-19'\n\
+    grid = '4x4'\npitch = '4mm,5mm'\nmissing = [30000, -1]\nscale = 1e-4\ntime = 'clock:ms'\ndecoder = 'i16le'\n\
+    [[pads]]\nname = 'tip'\ngrid = '4x4'\npitch = '2mm'\nat_mm = [-3, 4.5]\n";
+
+pub(super) const MAPPED_LINES: &str = "{\"t\":0,\"pads\":[{\"p\":[1,2]},{\"p\":[3,4]}],\"digits\":\"00ff\"}\n\
+    {\"t\":0.1,\"pads\":[{\"p\":[9,0]},{\"p\":[3,4]}],\"digits\":\"0a0b\"}\n";
+
 pub(super) const NDJSON: &str = "{\"t\":0,\"values\":{\"1\":3,\"2\":4.5}}\n{\"t\":0.1,\"values\":{\"1\":null,\"9\":1e3},\"joints\":{\"a\":0.5}}\n\
     {\"t\":0.2,\"values\":{},\"pose\":{\"hand\":[0,0,1,0,0,0,1]}}\n{\"t\":0.3,\"values\":{\"1\":1}}\n";
 

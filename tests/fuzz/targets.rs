@@ -9,7 +9,7 @@ use somatic::internal::body::{Original, read_taxel_table};
 use somatic::internal::recording::BagSurvey;
 use somatic::internal::robot::BagSource;
 use somatic::internal::robot::messages::{Float32MultiArray, JointState, Message, PointCloud2, TfMessage};
-use somatic::internal::source::{BagName, JointStates};
+use somatic::internal::source::{ArrayMap, BagName, JointStates, JsonLines, MappedSource};
 use somatic::internal::wire::{Decoder, Event};
 use somatic::recording::Reader;
 use somatic::robot::Kinematics;
@@ -251,6 +251,18 @@ pub(super) fn bag_db3() -> Target {
         let read = BagSource::open(&BagName::new(case.path), &body).and_then(|mut source| frames(&mut source));
         told(read)?;
         told(BagSurvey::read(case.path, |_| {}))
+    })
+}
+
+pub(super) fn map() -> Target {
+    target("map", "a.toml", [seeds::MAP], |case| told(ArrayMap::parse(&case.text())))
+}
+
+pub(super) fn mapped_lines() -> Target {
+    target("mapped_lines", "a.ndjson", [seeds::MAPPED_LINES], |case| {
+        let map = ArrayMap::parse("values = ['pads[*].p', 'digits']\ndecoder = 'u8'").unwrap();
+        let source = JsonLines::open(case.path, &map).and_then(|lines| MappedSource::new(Box::new(lines), &map, true));
+        told(source.and_then(|mut source| frames(&mut source)))
     })
 }
 

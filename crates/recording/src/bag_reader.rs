@@ -30,6 +30,41 @@ pub struct BagMessage<'a> {
     pub data: &'a [u8],
 }
 
+/// A topic of a bag, with what its messages are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DefinedTopic {
+    /// Its name.
+    pub name: String,
+    /// The type of its messages, such as `sensor_msgs/msg/JointState`.
+    pub kind: String,
+    /// The encoding of its messages: `cdr` in bags of ROS 2.
+    pub encoding: String,
+    /// The definition of that type and of those it is made of, as schema `ros2msg` has it, where the bag has it.
+    pub definition: Option<String>,
+}
+
+impl DefinedTopic {
+    /// All topics of the bag at `path`, a file in MCAP or SQLite, or a folder of such, by their names.
+    ///
+    /// # Errors
+    /// It cannot be read, or is not a bag.
+    pub fn all_of(path: &Path) -> Result<Vec<Self>> {
+        let (mut topics, mut definitions) = (BTreeSet::new(), BTreeMap::new());
+        for file in bag_files(path)? {
+            let mut storage = Storage::open(&file)?;
+            for topic in storage.topics().map_err(|e| e.at(file.display()))? {
+                topics.insert((topic.name, topic.kind, topic.encoding));
+            }
+            definitions.extend(storage.definitions());
+        }
+        let with_definition = |(name, kind, encoding): (String, String, String)| {
+            let definition = definitions.get(&kind).cloned();
+            Self { name, kind, encoding, definition }
+        };
+        Ok(topics.into_iter().map(with_definition).collect())
+    }
+}
+
 /// Reads the messages of topics, in the order of the files.
 pub struct BagReader {
     files: Vec<PathBuf>,

@@ -101,9 +101,24 @@ pub(super) fn channel(parts: &mut Parts<'_>) -> Option<(u16, Channel)> {
     Some((id, Channel { schema, topic, encoding, taxels, world }))
 }
 
-/// The id of a schema, and its name.
-pub(super) fn schema(parts: &mut Parts<'_>) -> Option<(u16, String)> {
-    Some((parts.u16()?, parts.text()?.to_owned()))
+/// What a schema says.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Schema {
+    /// The type of messages.
+    pub(super) name: String,
+    /// The definition of that type and of those it is made of, as `ros2msg` has it.
+    pub(super) definition: Option<String>,
+}
+
+/// The id of a schema, and what it says.
+pub(super) fn schema(parts: &mut Parts<'_>) -> Option<(u16, Schema)> {
+    let (id, name) = (parts.u16()?, parts.text()?.to_owned());
+    // What follows may be damaged, and the name is still good.
+    let definition = match parts.text() {
+        Some("ros2msg") => parts.text().map(str::to_owned),
+        _ => None,
+    };
+    Some((id, Schema { name, definition }))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::account::Account;
 use super::bag_files::not_mcap;
 use super::chunks::{Chunks, Refusal};
-use super::entries::{Attached, Channel, channel, data_of, schema};
+use super::entries::{Attached, Channel, Schema, channel, data_of, schema};
 use super::frames::FrameMessage;
 use super::head::Head;
 use super::records::{Parts, Record, Records, op};
@@ -34,8 +34,7 @@ pub struct Reader {
     /// Whether what is attached may be more than [`Reader::attached`].
     may_lack_attached: bool,
     pub(super) channels: HashMap<u16, Channel>,
-    /// The names of schemas.
-    pub(super) schemas: HashMap<u16, String>,
+    pub(super) schemas: HashMap<u16, Schema>,
     /// Whether the file's summary tells its channels.
     pub(super) has_summary: bool,
     chunk: Vec<u8>,

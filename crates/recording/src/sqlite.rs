@@ -100,6 +100,20 @@ impl SqliteFile {
         &self.topics
     }
 
+    /// The definition of each type of messages, which bags since ROS 2 Iron have.
+    pub(super) fn definitions(&self) -> BTreeMap<String, String> {
+        let read = || -> rusqlite::Result<BTreeMap<String, String>> {
+            let mut listed = self.database.prepare(
+                "SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg' \
+                 AND length(encoded_message_definition) > 0",
+            )?;
+            let own = listed.query_map((), |row| Ok((whole(&row.get::<_, String>(0)?), row.get(1)?)))?;
+            own.collect()
+        };
+        // Older ones lack the table.
+        read().unwrap_or_default()
+    }
+
     /// Passes over messages of other topics than `wanted`, whose bytes are then not read.
     pub(super) fn only(&mut self, wanted: &[String]) {
         let unwanted = self.topics.iter().filter(|(_, topic)| !wanted.contains(&topic.name));

@@ -1,9 +1,11 @@
 //! Where the messages of a bag come from: a file of MCAP, or one of SQLite.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::entries::Schema;
 use super::reader::{Message, Reader};
 #[cfg(feature = "sqlite")]
 use super::sqlite::SqliteFile;
@@ -70,13 +72,25 @@ impl Storage {
             Kind::Mcap(reader, _) => {
                 let topic = |channel: &super::entries::Channel| StoredTopic {
                     name: channel.topic.clone(),
-                    kind: whole(reader.schemas.get(&channel.schema).map_or("", String::as_str)),
+                    kind: whole(reader.schemas.get(&channel.schema).map_or("", |schema| &schema.name)),
                     encoding: channel.encoding.clone(),
                 };
                 reader.channels.values().map(topic).collect()
             }
             #[cfg(feature = "sqlite")]
             Kind::Sqlite(file) => file.topics().values().cloned().collect(),
+        }
+    }
+
+    /// The definition of each type of messages that is known so far, as `ros2msg` has it.
+    pub(super) fn definitions(&self) -> BTreeMap<String, String> {
+        match &self.kind {
+            Kind::Mcap(reader, _) => {
+                let own = |schema: &Schema| Some((whole(&schema.name), schema.definition.clone()?));
+                reader.schemas.values().filter_map(own).collect()
+            }
+            #[cfg(feature = "sqlite")]
+            Kind::Sqlite(file) => file.definitions(),
         }
     }
 
@@ -141,7 +155,7 @@ impl Storage {
         match &self.kind {
             Kind::Mcap(reader, _) => {
                 let channel = u16::try_from(topic).ok().and_then(|id| reader.channels.get(&id))?;
-                let kind = whole(reader.schemas.get(&channel.schema).map_or("", String::as_str));
+                let kind = whole(reader.schemas.get(&channel.schema).map_or("", |schema| &schema.name));
                 Some(StoredTopic { name: channel.topic.clone(), kind, encoding: channel.encoding.clone() })
             }
             #[cfg(feature = "sqlite")]

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::io::{self, Read, Seek};
 
-use super::entries::{Attached, Channel, channel, schema};
+use super::entries::{Attached, Channel, Schema, channel, schema};
 use super::records::{Footer, HEAD, Parts, Records, op};
 use super::unpack;
 use crate::limits::MAX_CHUNK_BYTES;
@@ -68,8 +68,7 @@ pub(super) struct Summary {
     pub(super) shift: i64,
     pub(super) statistics: Option<Statistics>,
     pub(super) channels: HashMap<u16, Channel>,
-    /// The names of schemas.
-    pub(super) schemas: HashMap<u16, String>,
+    pub(super) schemas: HashMap<u16, Schema>,
     /// All attachments, if it lists them all.
     pub(super) attached: Option<Vec<Attached>>,
 }
@@ -168,7 +167,7 @@ struct Listed {
     chunks: Vec<ListedChunk>,
     statistics: Option<Statistics>,
     channels: HashMap<u16, Channel>,
-    schemas: HashMap<u16, String>,
+    schemas: HashMap<u16, Schema>,
     attached: Option<Vec<Attached>>,
 }
 

@@ -31,7 +31,7 @@ pub(in crate::cli) struct RunFlags {
     /// Where touch frames come from, such as csv:FILE, serial:PORT, or - for NDJSON on standard input [default: a
     /// bundled touch].
     ///
-    /// Recordings: csv:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a ROS 2 bag, sim:FILE.toml,
+    /// Recordings: csv:FILE, ndjson:FILE, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...] for a ROS 2 bag, sim:FILE.toml,
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); those of text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
@@ -246,6 +246,12 @@ pub(in crate::cli) struct RunFlags {
     #[command(flatten)]
     pub(in crate::cli) text: TextFlags,
 
+    /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
+    ///
+    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    #[arg(long, help_heading = RECORDINGS, value_name = "FILE")]
+    pub(in crate::cli) map: Option<String>,
+
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].
     #[arg(long, help_heading = LIVE, value_name = "FILE.json5")]
     pub(in crate::cli) zenoh_config: Option<PathBuf>,
@@ -384,7 +390,7 @@ impl RunFlags {
         }
         lay! {
             values: zenoh_config ros_time joints joint_states up joints_delay_s joints_max_age_s body backend calibration rate_hz wiring
-                format grid pitch unit layout live_rate_hz board_rate_hz batch playback_speed from_s to_s repeat max_age_s max_gap_s
+                format grid pitch unit layout map live_rate_hz board_rate_hz batch playback_speed from_s to_s repeat max_age_s max_gap_s
                 contact_tolerance_m coordinates relative_to filter_window filter_by filter_time_s filter_over_s,
             lists: allow_hosts outputs fields letters signal record,
             switches: all_fields header tare strict skip_bad overwrite verify quiet

@@ -21,6 +21,8 @@ mod bag_source;
 mod bag_states;
 #[cfg(feature = "mcap")]
 mod cloud_merge;
+#[cfg(feature = "mcap")]
+mod defined;
 #[cfg(feature = "meshes")]
 mod drawn;
 #[cfg(any(feature = "mcap", feature = "ros2"))]
@@ -35,6 +37,8 @@ mod joints_delay;
 mod kinematics;
 #[cfg(feature = "ros2")]
 mod live_joints;
+#[cfg(feature = "mcap")]
+mod mapped_bag;
 #[cfg(feature = "meshes")]
 mod matching;
 pub mod messages;
@@ -59,6 +63,8 @@ pub use joints_delay::{DelayEstimate, Transport};
 pub use kinematics::Kinematics;
 #[cfg(feature = "ros2")]
 pub use live_joints::{LiveJoints, StatesTime};
+#[cfg(feature = "mcap")]
+pub use mapped_bag::mapped_bag;
 #[cfg(feature = "meshes")]
 pub use matching::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M};
 #[cfg(feature = "ros2")]

@@ -18,6 +18,7 @@ mod lerobot;
 mod lerobot_name;
 #[cfg(feature = "zenoh")]
 mod limbs;
+mod map;
 mod ndjson;
 #[cfg(feature = "serial")]
 mod ports;
@@ -30,6 +31,7 @@ pub mod send_rate;
 #[cfg(feature = "serial")]
 mod serial;
 mod simulated;
+mod sizes;
 mod skipped_bad;
 mod spec;
 mod text;
@@ -48,6 +50,9 @@ pub use csv_file::CsvFile;
 pub use joint_states::{JointPosition, JointStates, position_between};
 #[cfg(feature = "zenoh")]
 pub use limbs::{LimbOptions, LimbSource};
+pub use map::{
+    ArrayMap, ArrayPath, Came, Decoder, Dimension, JsonLines, Lies, MapTime, MappedSource, Messages, Step, order,
+};
 pub use ndjson::NdjsonSource;
 #[cfg(feature = "serial")]
 pub use ports::{PortSummary, serial_ports};

@@ -8,7 +8,9 @@ mod key;
 
 use std::collections::HashMap;
 use std::fmt;
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _};
+use std::path::Path;
 
 use glam::{DQuat, DVec3};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
@@ -64,6 +66,15 @@ impl NdjsonSource {
     #[must_use]
     pub fn stdin(ids: Vec<u32>) -> Self {
         Self::new("stdin", BufReader::with_capacity(1 << 16, std::io::stdin()), ids)
+    }
+
+    /// Reads frames from the file at `path` for a body with the taxels `ids`.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn open(path: &Path, ids: Vec<u32>) -> Result<Self> {
+        let file = File::open(path).map_err(|e| Error::io(path, &e))?;
+        Ok(Self::new(path.display().to_string(), BufReader::with_capacity(1 << 16, file), ids))
     }
 
     /// Makes a taxel that the body does not have an error.

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use super::bag_name::BagName;
 use super::lerobot_name::LeRobotName;
+use super::map::{ArrayMap, JsonLines, MappedSource};
 use super::refused;
 use super::{CsvSource, NdjsonSource, SimulatedSource, Source, TextPlace, TextSource, VendorOptions, VendorSource};
 use crate::error::{Error, Result, nearest};
@@ -13,6 +14,7 @@ use crate::error::{Error, Result, nearest};
 /// The syntax of each kind of source.
 const FORMS: [(&str, &str); 12] = [
     ("csv", "csv:FILE"),
+    ("ndjson", "ndjson:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("text", "text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers"),
     ("ros2", "ros2:/TOPIC[@TYPE]"),
@@ -35,6 +37,8 @@ const EXPORTS: [&str; 5] = ["asf", "lst", "asc", "txt", "tsv"];
 pub enum SourceSpec {
     /// `csv:FILE`, or a bare `FILE.csv`: a recording.
     Csv(PathBuf),
+    /// `ndjson:FILE`, or a bare `FILE.ndjson` or `FILE.jsonl`: a recording in lines of JSON.
+    Ndjson(PathBuf),
     /// `serial:PORT[@BAUD]`: a board on a serial line.
     Serial {
         /// The port's name, such as `/dev/ttyUSB0`.
@@ -83,6 +87,7 @@ impl fmt::Display for SourceSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Csv(path) => write!(f, "csv:{}", path.display()),
+            Self::Ndjson(path) => write!(f, "ndjson:{}", path.display()),
             Self::Serial { port, baud: None } => write!(f, "serial:{port}"),
             Self::Serial { port, baud: Some(baud) } => write!(f, "serial:{port}@{baud}"),
             Self::Text(place) => place.fmt(f),
@@ -160,11 +165,13 @@ impl SourceSpec {
             Some((kind, rest)) if !["-", "export"].contains(&kind) && FORMS.iter().any(|(known, _)| *known == kind) => {
                 (kind, rest)
             }
+            Some(("ws" | "wss", _)) => ("text", text),
             _ if text == "-" => ("-", text),
             _ if BagName::is_folder(Path::new(text)) => ("ros2-mcap", text),
             _ if LeRobotName::is_folder(Path::new(text)) => ("lerobot", text),
             _ if known.is_some() => return bad(known.unwrap_or_default()),
             _ if ending("csv") => ("csv", text),
+            _ if ending("ndjson") || ending("jsonl") => ("ndjson", text),
             _ if ending("mcap") => ("mcap", text),
             // `.bag` is not read; but the file says what to do.
             _ if ending("db3") || ending("bag") => ("ros2-mcap", text),
@@ -185,6 +192,7 @@ impl SourceSpec {
         }
         Ok(match kind {
             "csv" => Self::Csv(rest.into()),
+            "ndjson" => Self::Ndjson(rest.into()),
             "mcap" => Self::Mcap(rest.into()),
             "ros2-mcap" => match rest.parse() {
                 Ok(name) => Self::Ros2Mcap(name),
@@ -217,6 +225,8 @@ impl SourceSpec {
         match self {
             // Named columns are of a table.
             Self::Csv(path) if options.text.given().is_some() => Self::Csv(path),
+            // Of other programs: a bag.
+            Self::Mcap(path) if options.map.is_some() => Self::Ros2Mcap(BagName::new(path)),
             Self::Csv(path) if options.format.or_else(|| VendorSource::detect(&path)).is_some() => Self::Vendor(path),
             Self::Csv(path) if options.grid.is_some() => Self::Vendor(path),
             other => other,
@@ -227,7 +237,9 @@ impl SourceSpec {
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         match self {
-            Self::Csv(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => Some(path),
+            Self::Csv(path) | Self::Ndjson(path) | Self::Mcap(path) | Self::Vendor(path) | Self::Sim(path) => {
+                Some(path)
+            }
             Self::Ros2Mcap(name) => Some(&name.path),
             Self::LeRobot(name) => Some(&name.path),
             Self::Serial { .. } | Self::Text(_) | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => {
@@ -243,6 +255,9 @@ impl SourceSpec {
     pub fn check_options(&self, options: &VendorOptions) -> Result<()> {
         if !matches!(self, Self::Vendor(_)) {
             options.check_unused(matches!(self, Self::Text(_)))?;
+        }
+        if options.map.is_some() {
+            self.check_map(options)?;
         }
         let is_table = matches!(self, Self::Csv(_) | Self::CsvStdin);
         if is_table && options.text.frame_end.is_some() {
@@ -263,6 +278,32 @@ impl SourceSpec {
         Ok(())
     }
 
+    /// Checks that a map is for this source.
+    fn check_map(&self, options: &VendorOptions) -> Result<()> {
+        if !matches!(self, Self::Ros2Mcap(_) | Self::Ndjson(_) | Self::Stdin | Self::Text(_)) {
+            return Err(Error::usage(
+                "--map is for ROS 2 bags, NDJSON and lines of JSON; leave it out here, or name columns with --columns",
+            ));
+        }
+        match options.text.given() {
+            Some(flag) => Err(Error::usage(format!("the map has what {flag} says; write it there"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Opens lines of JSON by `map`; `None` where it is another source.
+    ///
+    /// # Errors
+    /// They cannot be read, or have not what the map says.
+    pub fn open_json(&self, map: &ArrayMap, skip_bad: bool) -> Result<Option<MappedSource>> {
+        let lines = match self {
+            Self::Stdin => JsonLines::stdin(map),
+            Self::Ndjson(path) => JsonLines::open(path, map)?,
+            _ => return Ok(None),
+        };
+        MappedSource::new(Box::new(lines), map, skip_bad).map(Some)
+    }
+
     /// Opens the source. `taxels` are the ids that the body has; `options` say what its file does not, such as the rate of a
     /// CSV without a column `t`.
     ///
@@ -271,12 +312,18 @@ impl SourceSpec {
     pub fn open(&self, taxels: &[u32], options: &VendorOptions) -> Result<Box<dyn Source + Send>> {
         self.check_options(options)?;
         let skip_bad = options.skip_bad;
+        if let Some(map) = &options.map
+            && let Some(source) = self.open_json(map, skip_bad)?
+        {
+            return Ok(Box::new(source.for_body(taxels)?));
+        }
         match self {
             Self::Csv(path) => Ok(Box::new(CsvSource::open_for(path, options, taxels)?)),
             Self::CsvStdin => {
                 Ok(Box::new(CsvSource::from_reader_for("stdin", std::io::stdin(), None, options, taxels)?))
             }
             Self::Stdin => Ok(Box::new(NdjsonSource::stdin(taxels.to_vec()).skip_bad(skip_bad))),
+            Self::Ndjson(path) => Ok(Box::new(NdjsonSource::open(path, taxels.to_vec())?.skip_bad(skip_bad))),
             #[cfg(feature = "mcap")]
             Self::Mcap(path) => Ok(Box::new(crate::recording::Reader::open(path)?)),
             #[cfg(not(feature = "mcap"))]
@@ -335,6 +382,7 @@ mod tests {
         let parsed = |text: &str| text.parse::<SourceSpec>().unwrap();
         assert_eq!(parsed("csv:a/b.txt"), SourceSpec::Csv("a/b.txt".into()));
         assert_eq!(parsed("a/b.CSV"), SourceSpec::Csv("a/b.CSV".into()));
+        assert_eq!(parsed("a/b.jsonl"), SourceSpec::Ndjson("a/b.jsonl".into()));
         assert_eq!(parsed("C:\\b.csv"), SourceSpec::Csv("C:\\b.csv".into()));
         let bag = BagName { topics: vec!["/arm/skin".into()], ..BagName::new("a/bag") };
         assert_eq!(parsed("ros2-mcap:a/bag:/arm/skin"), SourceSpec::Ros2Mcap(bag));
@@ -355,6 +403,7 @@ mod tests {
     fn a_source_is_written_as_it_is_named() {
         for text in [
             "csv:a/b.txt",
+            "ndjson:a/b.txt",
             "serial:/dev/ttyUSB0",
             "serial:COM3@921600",
             "ros2:/arm/skin",
@@ -384,7 +433,7 @@ mod tests {
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], lerobot:DIR[:FEATURE][#EPISODE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, ndjson:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], lerobot:DIR[:FEATURE][#EPISODE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

@@ -3,9 +3,6 @@
 use crate::body::{Sheet, SheetCell, sheets};
 use crate::error::Result;
 
-/// From one sensor to the next where nobody says it, m.
-pub(super) const USUAL_PITCH_M: f64 = 0.01;
-
 /// A `.glb` of the sensors `ids` in rows and columns as they are printed, `pitch_m` from one row, and from one column, to the next.
 pub(super) fn glb(ids: &[u32], [rows, columns]: [usize; 2], pitch_m: [f64; 2]) -> Result<Vec<u8>> {
     let from_middle = |index: usize, count: usize| index as f64 - (count as f64 - 1.0) / 2.0;

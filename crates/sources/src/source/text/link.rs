@@ -7,6 +7,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::place::TextPlace;
+#[cfg(feature = "websocket")]
+use super::web_socket::Socket;
 use crate::error::{Error, Result, failed};
 
 /// How long a read waits before it says that nothing came.
@@ -40,6 +42,8 @@ enum Open {
     Port(Box<dyn serialport::SerialPort>),
     Tcp(TcpStream),
     Udp(UdpSocket),
+    #[cfg(feature = "websocket")]
+    WebSocket(Box<Socket>),
     Stdin(Receiver<Vec<u8>>),
     /// What is there already.
     Given(io::Cursor<Vec<u8>>),
@@ -84,7 +88,7 @@ impl Link {
 
     /// Whether what comes at once ends with a line.
     pub(super) fn is_in_datagrams(&self) -> bool {
-        matches!(self.place, TextPlace::Udp(_))
+        matches!(self.place, TextPlace::Udp(_) | TextPlace::WebSocket(_))
     }
 
     /// The speed of the line, if it has one that is given or tried.
@@ -120,19 +124,18 @@ impl Link {
     fn connect(&self) -> Result<Open> {
         match &self.place {
             TextPlace::Port { port, .. } => self.port(port),
-            TextPlace::Tcp(address) => {
-                let all = address.to_socket_addrs().map_err(|e| failed!("there is no such host: {e}"))?;
-                let mut last = Error::failed("the host has no address");
-                for one in all {
-                    match TcpStream::connect_timeout(&one, CONNECT_TIMEOUT) {
-                        Ok(stream) => {
-                            stream.set_read_timeout(Some(READ_TIMEOUT)).map_err(|e| Error::failed(e.to_string()))?;
-                            return Ok(Open::Tcp(stream));
-                        }
-                        Err(e) => last = failed!("nothing answers there: {e}; does the board or program listen?"),
-                    }
-                }
-                Err(last)
+            TextPlace::Tcp(address) => connected(address, READ_TIMEOUT).map(Open::Tcp),
+            #[cfg(feature = "websocket")]
+            TextPlace::WebSocket(address) => {
+                let host = address.split('/').next().unwrap_or(address);
+                let socket = Socket::open(&format!("ws://{address}"), connected(host, CONNECT_TIMEOUT)?)?;
+                let set = socket.stream().set_read_timeout(Some(READ_TIMEOUT));
+                set.map_err(|e| Error::failed(e.to_string()))?;
+                Ok(Open::WebSocket(Box::new(socket)))
+            }
+            #[cfg(not(feature = "websocket"))]
+            TextPlace::WebSocket(_) => {
+                Err(Error::failed("built without the feature `websocket`: cargo install --path . --features websocket"))
             }
             TextPlace::Udp(address) => {
                 let bound = UdpSocket::bind(address).and_then(|socket| {
@@ -194,6 +197,8 @@ impl Link {
             #[cfg(feature = "serial")]
             Open::Port(port) => port.read(&mut self.buffer),
             Open::Tcp(stream) => stream.read(&mut self.buffer),
+            #[cfg(feature = "websocket")]
+            Open::WebSocket(socket) => socket.read(&mut self.buffer),
             Open::Udp(socket) => match socket.recv(&mut self.buffer) {
                 // An empty datagram is not an end.
                 Ok(0) => return Came::Nothing,
@@ -249,4 +254,20 @@ impl Link {
         self.open = Open::Gone(Instant::now());
         Came::Gone
     }
+}
+
+/// A connection to `address`, whose reads wait as long as `wait`.
+fn connected(address: &str, wait: Duration) -> Result<TcpStream> {
+    let all = address.to_socket_addrs().map_err(|e| failed!("there is no such host: {e}"))?;
+    let mut last = Error::failed("the host has no address");
+    for one in all {
+        match TcpStream::connect_timeout(&one, CONNECT_TIMEOUT) {
+            Ok(stream) => {
+                stream.set_read_timeout(Some(wait)).map_err(|e| Error::failed(e.to_string()))?;
+                return Ok(stream);
+            }
+            Err(e) => last = failed!("nothing answers there: {e}; does the board or program listen?"),
+        }
+    }
+    Err(last)
 }

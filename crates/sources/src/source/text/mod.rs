@@ -6,6 +6,7 @@
 
 mod assembler;
 mod body;
+mod by_map;
 mod cells;
 mod form;
 mod link;
@@ -16,6 +17,8 @@ mod recognise;
 mod skipped;
 mod splitter;
 mod stamps;
+#[cfg(feature = "websocket")]
+mod web_socket;
 
 use std::time::{Duration, Instant};
 
@@ -30,6 +33,8 @@ use self::recognise::Known;
 use self::splitter::Splitter;
 use self::stamps::Stamps;
 use super::Source;
+use super::map::{self, ArrayMap};
+use super::sizes::USUAL_PITCH_M;
 use super::vendor::VendorOptions;
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue};
@@ -51,6 +56,7 @@ pub struct TextSource {
     form: Form,
     ids: Vec<u32>,
     pitch_m: Option<[f64; 2]>,
+    map: Option<ArrayMap>,
     start: Instant,
     stamps: Stamps,
     rate_hz: Option<f64>,
@@ -94,9 +100,16 @@ impl TextSource {
 
     fn listen(place: &TextPlace, mut link: Link, options: &VendorOptions, tell: &mut dyn FnMut(&str)) -> Result<Self> {
         let start = Instant::now();
-        let grid = options.grid.map(|[rows, columns]| [rows as usize, columns as usize]);
+        let grid = options.grid.or(options.map.as_ref().and_then(|map| map.grid));
+        let grid = grid.map(|[rows, columns]| [rows as usize, columns as usize]);
+        let by_map = options.map.as_ref().map(by_map::options_of).transpose()?;
         let is_joined = link.joins_midway();
-        let known = Known { options: &options.text, grid, is_joined, has_rate: options.rate_hz.is_some() };
+        let known = Known {
+            options: by_map.as_ref().unwrap_or(&options.text),
+            grid,
+            is_joined,
+            has_rate: options.rate_hz.is_some(),
+        };
         let Opened { form, kept, is_ended } = listen(&mut link, place, start, known, tell).map_err(|e| e.at(place))?;
         let ids = form.ids.clone().unwrap_or_else(|| (0..form.sensors() as u32).collect());
         let mut source = Self {
@@ -105,7 +118,8 @@ impl TextSource {
             splitter: Splitter::default(),
             assembler: Assembler::new(form.clone(), is_joined),
             ids,
-            pitch_m: options.pitch_m,
+            pitch_m: options.pitch_m.or(options.map.as_ref().and_then(|map| map.pitch_m)),
+            map: options.map.clone(),
             start,
             stamps: Stamps::default(),
             rate_hz: options.rate_hz,
@@ -121,6 +135,9 @@ impl TextSource {
             form,
         };
         source.notices.push(source.understood());
+        if let Some(map) = &source.map {
+            source.notices.extend(map.notes.iter().map(|note| format!("{}: {note}", map.name)));
+        }
         for (at, bytes) in kept {
             source.take(&bytes, at.as_secs_f64());
         }
@@ -135,7 +152,8 @@ impl TextSource {
     pub fn understood(&self) -> String {
         let speed = self.link.baud().filter(|_| !self.name.contains('@')).map(|baud| format!(" (at {baud} baud)"));
         let advice = self.form.advice().map_or_else(String::new, |advice| format!("; {advice}"));
-        format!("{}{}{advice}", self.form.words(self.rate_hz.is_some()), speed.unwrap_or_default())
+        let treatment = self.map.as_ref().map_or_else(String::new, ArrayMap::treatment);
+        format!("{}{}{treatment}{advice}", self.form.words(self.rate_hz.is_some()), speed.unwrap_or_default())
     }
 
     /// Rows and columns of its sensors; one row where it is not known that they are a grid.
@@ -148,13 +166,19 @@ impl TextSource {
     /// # Errors
     /// Two of its sensors have the same id, or it has too many.
     pub fn body(&self) -> Result<Vec<u8>> {
-        body::glb(&self.ids, self.size(), self.pitch_m.unwrap_or([body::USUAL_PITCH_M; 2]))
-            .map_err(|e| e.at(&self.name))
+        let made = match self.map.as_ref().filter(|map| !map.pads.is_empty()) {
+            Some(map) => map::body::glb(map, &self.ids),
+            None => body::glb(&self.ids, self.size(), self.pitch_m.unwrap_or([USUAL_PITCH_M; 2])),
+        };
+        made.map_err(|e| e.at(&self.name))
     }
 
     /// What is to be said of [`TextSource::body`], whose places nobody has measured.
     #[must_use]
     pub fn about_body(&self) -> String {
+        if let Some(map) = self.map.as_ref().filter(|map| !map.pads.is_empty()) {
+            return map::body::about(map, self.ids.len());
+        }
         let [rows, columns] = self.size();
         let what = match rows {
             1 => format!("a row of {columns} sensors"),
@@ -261,7 +285,12 @@ impl TextSource {
 
     /// The next frame that is whole, if one is.
     fn ready(&mut self, frame: &mut Frame) -> bool {
-        let Some((next, _)) = self.assembler.ready.pop_front() else { return false };
+        let Some((mut next, _)) = self.assembler.ready.pop_front() else { return false };
+        if let Some(map) = &self.map {
+            for value in &mut next.values {
+                *value = value.number().map_or(*value, |number| map.value(number));
+            }
+        }
         self.assembler.give_back(std::mem::replace(frame, next));
         self.last = Some((Instant::now(), frame.t_s));
         if std::mem::take(&mut self.is_stale) && !self.is_gone {

@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use super::super::map::path::ArrayPath;
 use super::super::time_column::TimeUnit;
 use crate::error::{Error, Result};
 
@@ -40,6 +41,8 @@ pub(in crate::source) enum Column {
     Numbers(usize, usize),
     /// All that begin with it, if it ends with `*`.
     Name(String),
+    /// All values at this path of lines of JSON.
+    Path(ArrayPath),
 }
 
 impl Column {
@@ -68,6 +71,7 @@ impl Column {
                 Some(start) => name.starts_with(start),
                 None => name == wanted,
             }),
+            Self::Path(path) => name.is_some_and(|name| path.leads_to(name)),
         }
     }
 
@@ -77,6 +81,7 @@ impl Column {
             Self::Numbers(low, high) if low == high => low.to_string(),
             Self::Numbers(low, high) => format!("{low}-{high}"),
             Self::Name(name) => name.clone(),
+            Self::Path(path) => path.to_string(),
         }
     }
 }

@@ -20,12 +20,14 @@ pub enum TextPlace {
     Tcp(String),
     /// `udp://:PORT`: datagrams that arrive at a port of this computer.
     Udp(String),
+    /// `ws://HOST:PORT`: messages of a WebSocket's server, each a line.
+    WebSocket(String),
     /// `-`: standard input.
     Stdin,
 }
 
 /// The forms, for messages.
-const FORMS: &str = "text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or text:-";
+const FORMS: &str = "text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT, ws://HOST:PORT or text:-";
 
 impl FromStr for TextPlace {
     type Err = Error;
@@ -36,6 +38,10 @@ impl FromStr for TextPlace {
             return Ok(Self::Stdin);
         }
         if let Some((scheme, address)) = text.split_once("://") {
+            let (address, page) = match scheme {
+                "ws" => address.split_once('/').map_or((address, ""), |(address, page)| (address, page)),
+                _ => (address, ""),
+            };
             let number = address.rsplit_once(':').and_then(|(host, port)| Some((host, port.parse::<u16>().ok()?)));
             return match (scheme, number) {
                 ("tcp", Some((host, port))) if !host.is_empty() && port > 0 => Ok(Self::Tcp(address.to_owned())),
@@ -43,7 +49,10 @@ impl FromStr for TextPlace {
                     let host = if host.is_empty() { "0.0.0.0" } else { host };
                     Ok(Self::Udp(format!("{host}:{port}")))
                 }
-                ("tcp" | "udp", _) => bad(format!("`{address}` is not an address with a port")),
+                ("ws", Some((host, port))) if !host.is_empty() && port > 0 => {
+                    Ok(Self::WebSocket(format!("{address}/{page}")))
+                }
+                ("tcp" | "udp" | "ws", _) => bad(format!("`{address}` is not an address with a port")),
                 _ => bad(format!("lines do not come by `{scheme}://`")),
             };
         }
@@ -65,6 +74,7 @@ impl fmt::Display for TextPlace {
             Self::Port { port, baud: Some(baud) } => write!(f, "text:{port}@{baud}"),
             Self::Tcp(address) => write!(f, "text:tcp://{address}"),
             Self::Udp(address) => write!(f, "text:udp://{}", address.strip_prefix("0.0.0.0").unwrap_or(address)),
+            Self::WebSocket(address) => write!(f, "text:ws://{}", address.trim_end_matches('/')),
             Self::Stdin => f.write_str("text:-"),
         }
     }
@@ -82,6 +92,8 @@ mod tests {
             ("/dev/ttyUSB0@115200", port(Some(115_200))),
             ("tcp://esp.local:3333", TextPlace::Tcp("esp.local:3333".to_owned())),
             ("udp://:9000", TextPlace::Udp("0.0.0.0:9000".to_owned())),
+            ("ws://robot:9090", TextPlace::WebSocket("robot:9090/".to_owned())),
+            ("ws://robot:9090/a/b", TextPlace::WebSocket("robot:9090/a/b".to_owned())),
             ("-", TextPlace::Stdin),
         ] {
             let parsed: TextPlace = text.parse().unwrap();
@@ -94,6 +106,8 @@ mod tests {
             ("tcp://:3", "not an address"),
             ("udp://9000", "not an address"),
             ("udp://:0", "not an address"),
+            ("ws://robot", "not an address"),
+            ("wss://robot:1", "do not come by"),
             ("http://a:1", "do not come by"),
         ] {
             let error = wrong.parse::<TextPlace>().unwrap_err();

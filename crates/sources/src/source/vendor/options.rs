@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use super::super::map::ArrayMap;
+use super::super::sizes;
 use super::super::text::TextOptions;
 use super::format::VendorFormat;
 use crate::error::{Error, Result};
-use crate::length::Length;
 use crate::signal::UnitOfP;
 
 /// Options of a recording, besides what its file says.
@@ -27,6 +28,8 @@ pub struct VendorOptions {
     pub skip_bad: bool,
     /// How lines of text are written, where that is not to be found out.
     pub text: TextOptions,
+    /// Which arrays of messages are sensors, where messages hold them.
+    pub map: Option<ArrayMap>,
 }
 
 impl VendorOptions {
@@ -35,11 +38,8 @@ impl VendorOptions {
     /// # Errors
     /// A usage error.
     pub fn grid_of(text: &str) -> Result<[u32; 2]> {
-        let counts: Option<Vec<u32>> = text.split(['x', 'X', '×']).map(|word| word.trim().parse().ok()).collect();
-        match counts.as_deref() {
-            Some(&[rows, columns]) if rows > 0 && columns > 0 => Ok([rows, columns]),
-            _ => Err(Error::usage(format!("--grid {text} is not rows and columns; write them as 31x11"))),
-        }
+        sizes::grid_of(text)
+            .ok_or_else(|| Error::usage(format!("--grid {text} is not rows and columns; write them as 31x11")))
     }
 
     /// The pitch of rows and columns as people write it: `8.6mm`, or `8.6mm,5mm`.
@@ -47,18 +47,9 @@ impl VendorOptions {
     /// # Errors
     /// A usage error.
     pub fn pitch_of(text: &str) -> Result<[f64; 2]> {
-        let metres = |word: &str| {
-            let length = Length::parse(word.trim()).ok()??;
-            Some(length.number * length.unit_m?).filter(|pitch| pitch.is_finite() && *pitch > 0.0)
-        };
-        let lengths: Option<Vec<f64>> = text.split(',').map(metres).collect();
-        match lengths.as_deref() {
-            Some(&[pitch]) => Ok([pitch; 2]),
-            Some(&[rows, columns]) => Ok([rows, columns]),
-            _ => Err(Error::usage(format!(
-                "--pitch {text} is not a length; write it with its unit, as 8.6mm or 8.6mm,5mm"
-            ))),
-        }
+        sizes::pitch_of(text).ok_or_else(|| {
+            Error::usage(format!("--pitch {text} is not a length; write it with its unit, as 8.6mm or 8.6mm,5mm"))
+        })
     }
 
     /// Refuses what is only for exports; of lines of text what these do not have either.

@@ -1,0 +1,318 @@
+//! Maps: which values of a message are sensors, and which taxels these are.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::super::bag_name::type_of;
+use super::super::sizes::{USUAL_PITCH_M, grid_of, pitch_of};
+use super::super::text::TextIds;
+use super::super::time_column::{TimeUnit, unit_at_end, unit_in_head};
+use super::decoder::Decoder;
+use super::path::ArrayPath;
+use super::presets;
+use crate::error::{Error, Result, failed, parse_toml, suggestion};
+use crate::limits::{self, MAX_TOML_BYTES};
+use crate::signal::RawValue;
+
+/// A file of a map, as people write it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    message: Option<String>,
+    r#type: Option<String>,
+    values: OneOrMany,
+    ids: Option<String>,
+    grid: Option<String>,
+    pitch: Option<String>,
+    #[serde(default)]
+    missing: Vec<f64>,
+    scale: Option<f64>,
+    time: Option<String>,
+    decoder: Option<String>,
+    definition: Option<PathBuf>,
+    #[serde(default)]
+    pads: Vec<PadKeys>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum OneOrMany {
+    One(String),
+    Many(Vec<String>),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PadKeys {
+    name: String,
+    grid: String,
+    pitch: Option<String>,
+    #[serde(default)]
+    at_mm: [f64; 2],
+}
+
+/// A sheet of sensors: rows and columns of values that follow each other.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::source) struct Pad {
+    pub(in crate::source) name: String,
+    pub(in crate::source) grid: [u32; 2],
+    /// From one row, and from one column, to the next, m.
+    pub(in crate::source) pitch_m: [f64; 2],
+    /// Its middle in the plane that pads lie in, m.
+    pub(in crate::source) at_m: [f64; 2],
+}
+
+impl Pad {
+    pub(in crate::source) fn cells(&self) -> usize {
+        self.grid[0] as usize * self.grid[1] as usize
+    }
+}
+
+/// Where the time of a message is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MapTime {
+    /// In its header's stamp, where it has one, or in a member called `t`, `time` or `timestamp`; else when it came.
+    Usual,
+    /// When it came.
+    Arrival,
+    /// A number or a stamp at this path; numbers are divided by the second value to get seconds.
+    At(ArrayPath, f64),
+}
+
+/// Which values of a message are sensors, and which taxels these are: a file, or a preset by its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArrayMap {
+    /// How it is called: a file or a preset.
+    pub name: String,
+    /// The topic of the messages, if it is named.
+    pub message: Option<String>,
+    /// The type of the messages in ROS 2's spelling, if it is named.
+    pub kind: Option<String>,
+    /// Where the values are; those of one path follow those of the one before.
+    pub values: Vec<ArrayPath>,
+    /// The taxels of the values, in their order.
+    pub ids: Option<Vec<u32>>,
+    /// Where the time is.
+    pub time: MapTime,
+    /// How numbers in text or bytes are written.
+    pub decoder: Option<Decoder>,
+    /// The definition of the messages, as a bag's schema `ros2msg` has it, where the map has one.
+    pub definition: Option<String>,
+    /// What people should know of a preset, a line each.
+    pub notes: Vec<String>,
+    pub(in crate::source) pads: Vec<Pad>,
+    pub(in crate::source) grid: Option<[u32; 2]>,
+    pub(in crate::source) pitch_m: Option<[f64; 2]>,
+    missing: Vec<f64>,
+    scale: f64,
+}
+
+impl ArrayMap {
+    /// Whether `name` is a preset.
+    #[must_use]
+    pub fn is_preset(name: &str) -> bool {
+        presets::find(name).is_some()
+    }
+
+    /// The map in the file `name`, or the preset of that name.
+    ///
+    /// # Errors
+    /// A usage error: there is no such file or preset, or the file is not a map.
+    pub fn named(name: &str) -> Result<Self> {
+        if let Some(preset) = presets::find(name).filter(|_| !Path::new(name).is_file()) {
+            let mut map = Self::parse(preset.map)?;
+            map.notes = preset.notes.iter().map(|&note| note.to_owned()).collect();
+            if preset.is_untested {
+                map.notes.push("untested: nobody has run it on this hardware, so check each pad by a press".to_owned());
+            }
+            map.definition = preset.definition.map(str::to_owned);
+            return Ok(Self { name: name.to_owned(), ..map });
+        }
+        let path = Path::new(name);
+        if !path.exists() && path.extension().is_none() {
+            let near = suggestion(name, presets::names());
+            return Err(Error::usage(format!("`{name}` is neither a file nor a preset; {near}")));
+        }
+        let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
+        let mut map = Self::parse(&text).map_err(|e| e.into_usage().at(path.display()))?;
+        name.clone_into(&mut map.name);
+        if let Some(file) = map.definition.take() {
+            let file = path.parent().unwrap_or(Path::new("")).join(file);
+            let text = limits::read_to_string(&file, MAX_TOML_BYTES).map_err(|e| Error::io(&file, &e))?;
+            map.definition = Some(text);
+        }
+        Ok(map)
+    }
+
+    /// The map in `text`; `definition` is still the name of a file.
+    ///
+    /// # Errors
+    /// It is not a map.
+    pub fn parse(text: &str) -> Result<Self> {
+        let keys: Keys = parse_toml(text)?;
+        let at = |key: &'static str| move |e: Error| failed!("{key}: {e}");
+        let values = match keys.values {
+            OneOrMany::One(path) => vec![path],
+            OneOrMany::Many(paths) => paths,
+        };
+        if values.is_empty() {
+            return Err(Error::failed("values: name the array of the values, such as data or pads[*].pressure"));
+        }
+        let scale = keys.scale.unwrap_or(1.0);
+        if !(scale.is_finite() && scale != 0.0) {
+            return Err(failed!("scale: {scale} is not a factor; give a number other than 0"));
+        }
+        let ids = match keys.ids.as_deref().map(str::parse::<TextIds>).transpose().map_err(at("ids"))? {
+            Some(TextIds::Names) => return Err(Error::failed("ids: list the taxels, such as 0-15")),
+            Some(TextIds::Listed(ids)) => Some(ids),
+            None => None,
+        };
+        let whole = |kind: String| {
+            type_of(&kind).ok_or_else(|| failed!("type: `{kind}` is not a type; write it as package/msg/Name"))
+        };
+        Ok(Self {
+            name: "map".to_owned(),
+            message: keys.message,
+            kind: keys.r#type.map(whole).transpose()?,
+            values: values.iter().map(|path| path.parse()).collect::<Result<_>>().map_err(at("values"))?,
+            ids,
+            time: keys.time.map_or(Ok(MapTime::Usual), |time| time_of(&time)).map_err(at("time"))?,
+            decoder: keys.decoder.as_deref().map(str::parse).transpose().map_err(at("decoder"))?,
+            definition: keys.definition.map(|file| file.display().to_string()),
+            notes: Vec::new(),
+            pads: keys.pads.iter().map(pad).collect::<Result<_>>().map_err(at("pads"))?,
+            grid: keys.grid.as_deref().map(grid).transpose().map_err(at("grid"))?,
+            pitch_m: keys.pitch.as_deref().map(pitch).transpose().map_err(at("pitch"))?,
+            missing: keys.missing,
+            scale,
+        })
+    }
+
+    /// The value of a taxel for the number `number` of a message.
+    #[must_use]
+    pub fn value(&self, number: f64) -> RawValue {
+        if self.missing.contains(&number) { RawValue::MISSING } else { RawValue::new(number * self.scale) }
+    }
+
+    /// Its paths in words.
+    #[must_use]
+    pub fn paths(&self) -> String {
+        match &self.values[..] {
+            [first, .., last] => format!("{first} to {last}"),
+            [one] => one.to_string(),
+            [] => String::new(),
+        }
+    }
+
+    /// What is done to numbers, in words that follow others.
+    #[must_use]
+    pub fn treatment(&self) -> String {
+        let mut words = String::new();
+        if !self.missing.is_empty() {
+            let codes: Vec<String> = self.missing.iter().map(f64::to_string).collect();
+            words += &format!("; {} counts as missing", codes.join(" or "));
+        }
+        if self.scale != 1.0 {
+            words += &format!("; numbers are multiplied by {}", self.scale);
+        }
+        words
+    }
+}
+
+fn time_of(text: &str) -> Result<MapTime> {
+    if text == "arrival" {
+        return Ok(MapTime::Arrival);
+    }
+    let (path, unit) = match text.rsplit_once(':').filter(|(_, unit)| !unit.contains(']')) {
+        Some((path, unit)) => (path, Some(unit)),
+        None => (text, None),
+    };
+    let path: ArrayPath = path.parse()?;
+    let unit = match unit {
+        None => {
+            let name = path.last_field();
+            unit_in_head(name).ok().flatten().flatten().or_else(|| unit_at_end(name)).unwrap_or(TimeUnit::Seconds)
+        }
+        Some("s") => TimeUnit::Seconds,
+        Some("ms") => TimeUnit::Milliseconds,
+        Some("us" | "µs") => TimeUnit::Microseconds,
+        Some("ns") => TimeUnit::Nanoseconds,
+        Some(other) => return Err(failed!("`{other}` is not a unit of time; write s, ms, us or ns")),
+    };
+    Ok(MapTime::At(path, unit.seconds()))
+}
+
+fn grid(text: &str) -> Result<[u32; 2]> {
+    grid_of(text).ok_or_else(|| failed!("`{text}` is not rows and columns; write them as 3x4"))
+}
+
+fn pitch(text: &str) -> Result<[f64; 2]> {
+    pitch_of(text).ok_or_else(|| failed!("`{text}` is not a length; write it with its unit, as 4mm or 4mm,5mm"))
+}
+
+fn pad(keys: &PadKeys) -> Result<Pad> {
+    let pitch = keys.pitch.as_deref().map(pitch).transpose()?;
+    Ok(Pad {
+        name: keys.name.clone(),
+        grid: grid(&keys.grid)?,
+        pitch_m: pitch.unwrap_or([USUAL_PITCH_M; 2]),
+        at_m: keys.at_mm.map(|mm| mm * 1e-3),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_says_what_is_what() {
+        let map = ArrayMap::parse(
+            "message = '/dex3/left/state'\ntype = 'unitree_hg/HandState'\nvalues = 'press_sensor_state[*].pressure'\n\
+             ids = '4-5'\nmissing = [30000]\nscale = 1e-4\ntime = 'stamp_ms'\ndecoder = 'i16le'\n",
+        )
+        .unwrap();
+        assert_eq!(map.kind.as_deref(), Some("unitree_hg/msg/HandState"));
+        assert_eq!((map.value(30000.0), map.value(100_000.0)), (RawValue::MISSING, RawValue::new(10.0)));
+        assert_eq!(map.ids, Some(vec![4, 5]));
+        assert_eq!(map.time, MapTime::At("stamp_ms".parse().unwrap(), 1e3));
+        assert_eq!(map.treatment(), "; 30000 counts as missing; numbers are multiplied by 0.0001");
+        let many = ArrayMap::parse("values = ['a', 'b[*].c', 'd']\ntime = 'a.t:us'").unwrap();
+        assert_eq!((many.paths().as_str(), many.values.len()), ("a to d", 3));
+        assert_eq!(many.time, MapTime::At("a.t".parse().unwrap(), 1e6));
+    }
+
+    #[test]
+    fn a_map_that_is_wrong_says_where_in_a_line() {
+        for (text, says) in [
+            ("", "values"),
+            ("values = []", "values: name the array"),
+            ("values = 'a..b'", "values: `a..b` is not a path"),
+            ("values = 'a'\nvalue = 'b'", "value"),
+            ("values = 'a'\nids = 'x'", "ids: "),
+            ("values = 'a'\nids = 'names'", "ids: list the taxels"),
+            ("values = 'a'\ngrid = '3'", "grid: "),
+            ("values = 'a'\nscale = 0", "scale: "),
+            ("values = 'a'\ntype = 'x'", "type: `x` is not a type"),
+            ("values = 'a'\ntime = 't:h'", "time: `h` is not a unit"),
+            ("values = 'a'\ndecoder = 'x'", "decoder: `x` is not a decoder"),
+            ("values = 'a'\n[[pads]]\nname = 'p'\ngrid = 'a'", "pads: "),
+        ] {
+            let why = ArrayMap::parse(text).unwrap_err().to_string();
+            assert!(why.contains(says) && why.lines().count() == 1, "{text:?}: {why}");
+        }
+        let why = ArrayMap::named("dex4").unwrap_err();
+        assert!(why.is_usage() && why.to_string().contains("did you mean `dex3`?"), "{why}");
+    }
+
+    #[test]
+    fn every_preset_is_a_map_with_notes() {
+        for name in presets::names() {
+            let map = ArrayMap::named(name).unwrap();
+            assert_eq!(map.name, name);
+            let values: usize = map.pads.iter().map(Pad::cells).sum();
+            assert!(map.ids.as_ref().is_none_or(|ids| ids.len() == values), "{name}");
+            assert!(map.notes.iter().all(|note| note.lines().count() == 1), "{name}");
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! Frames from arrays within messages, wherever these come from.
+
+use std::time::Instant;
+
+use super::super::Source;
+use super::super::skipped_bad::SkippedBad;
+use super::array_map::ArrayMap;
+use super::body;
+use crate::error::{Error, Result, failed};
+use crate::signal::{Frame, FrameTime, RawValue};
+
+/// What was read of a message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Came {
+    /// A message with this time.
+    Message(FrameTime),
+    /// One that was not whole, which the reader counts.
+    Damaged,
+    /// There is no other one.
+    End,
+}
+
+/// Messages with arrays of values.
+pub trait Messages {
+    /// Puts the values of the next message at the end of `values`.
+    ///
+    /// # Errors
+    /// It cannot be read, or has not what the map says.
+    fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came>;
+
+    /// How messages call it: a file or a topic.
+    fn name(&self) -> String;
+
+    /// What was taken for what, on a line, for the place before ": 9 values".
+    fn taken(&self) -> String;
+
+    /// The share of the input that has been read, 0..=1, if known.
+    fn progress(&self) -> Option<f64> {
+        None
+    }
+
+    /// Messages about what came since the last call, a line each.
+    fn notices(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What was not read, a line each.
+    fn losses(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// When the last message was read, where it comes live.
+    fn read_at(&mut self) -> Option<Instant> {
+        None
+    }
+}
+
+/// Frames from arrays within messages.
+pub struct MappedSource {
+    messages: Box<dyn Messages + Send>,
+    map: ArrayMap,
+    ids: Vec<u32>,
+    /// The first message, until it is given.
+    first: Option<(FrameTime, Vec<RawValue>)>,
+    values: Vec<RawValue>,
+    skipped: SkippedBad,
+    notices: Vec<String>,
+}
+
+somatic_skin::debug_by_name!(MappedSource);
+
+impl MappedSource {
+    /// Reads the first of `messages`, which says how many values there are. Wrong ones are skipped and counted with `skip_bad`.
+    ///
+    /// # Errors
+    /// There is no message; it has not what the map says, or not as many values as the map has taxels.
+    pub fn new(messages: Box<dyn Messages + Send>, map: &ArrayMap, skip_bad: bool) -> Result<Self> {
+        let mut source = Self {
+            messages,
+            map: map.clone(),
+            ids: Vec::new(),
+            first: None,
+            values: Vec::new(),
+            skipped: SkippedBad::new(skip_bad),
+            notices: Vec::new(),
+        };
+        let Some(time) = source.read()? else {
+            return Err(
+                Error::failed("no message has values; is it the right file and map?").at(source.messages.name())
+            );
+        };
+        let count = source.values.len();
+        if count == 0 {
+            return Err(
+                failed!("{}: the array has no values in the first message", map.paths()).at(source.messages.name())
+            );
+        }
+        source.first = Some((time, source.values.clone()));
+        source.ids = match &map.ids {
+            Some(ids) if ids.len() != count => {
+                let what = failed!("{}: ids names {} taxels, and a message has {count} values", map.name, ids.len());
+                return Err(what.at(source.messages.name()));
+            }
+            Some(ids) => ids.clone(),
+            None => (0..u32::try_from(count).unwrap_or(u32::MAX)).collect(),
+        };
+        let taken = source.messages.taken();
+        source.notices.push(format!("{taken}: {count} values a message{}", map.treatment()));
+        let own = map.notes.iter().map(|note| format!("{}: {note}", map.name));
+        source.notices.extend(own);
+        Ok(source)
+    }
+
+    /// The next message's time, with its values in `self.values`. `None` at the end.
+    fn read(&mut self) -> Result<Option<FrameTime>> {
+        loop {
+            self.values.clear();
+            let wrong = match self.messages.next(&mut self.values) {
+                Ok(Came::End) => return Ok(None),
+                Ok(Came::Damaged) => continue,
+                Ok(Came::Message(time)) if self.ids.is_empty() || self.values.len() == self.ids.len() => {
+                    return Ok(Some(time));
+                }
+                Ok(Came::Message(time)) => {
+                    let what = failed!("it has {} values, the first one {}", self.values.len(), self.ids.len());
+                    let error = what.at(format!("{}: the message of {} s", self.messages.name(), time.s));
+                    ("another number of values", error)
+                }
+                Err(e) => ("not what the map says", e),
+            };
+            self.skipped.skip("message", wrong.0, wrong.1)?;
+        }
+    }
+
+    /// A body for its values, a `.glb`: the map's pads, a grid, or a row.
+    ///
+    /// # Errors
+    /// The map has pads or a grid for another number of values.
+    pub fn body(&self) -> Result<Vec<u8>> {
+        body::glb(&self.map, &self.ids).map_err(|e| e.at(&self.map.name))
+    }
+
+    /// What is to be said of [`MappedSource::body`].
+    #[must_use]
+    pub fn about_body(&self) -> String {
+        body::about(&self.map, self.ids.len())
+    }
+
+    /// Makes its taxels those of a body that has `taxels`: where the map does not name them, they are the body's in ascending order.
+    ///
+    /// # Errors
+    /// There are more or fewer values than taxels, or the body lacks a taxel.
+    pub fn for_body(mut self, taxels: &[u32]) -> Result<Self> {
+        if self.map.ids.is_none() {
+            let mut ids = taxels.to_vec();
+            ids.sort_unstable();
+            if ids.len() != self.ids.len() {
+                let what = failed!(
+                    "a message has {} values, and the body {} taxels; name the values' taxels in the map: ids = \"0-15\"",
+                    self.ids.len(),
+                    ids.len()
+                );
+                return Err(what.at(self.messages.name()));
+            }
+            self.ids = ids;
+        }
+        match self.ids.iter().find(|id| !taxels.contains(id)) {
+            Some(id) => {
+                let what = failed!(
+                    "the body has no taxel {id}; is it the right body? ids in the map names the values' taxels"
+                );
+                Err(what.at(self.messages.name()))
+            }
+            None => Ok(self),
+        }
+    }
+
+    /// What was taken for what, a line each, once.
+    pub fn take_notices(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notices)
+    }
+}
+
+impl Source for MappedSource {
+    fn taxels(&self) -> &[u32] {
+        &self.ids
+    }
+
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
+        let time = match self.first.take() {
+            Some((time, values)) => {
+                self.values = values;
+                time
+            }
+            None => match self.read()? {
+                Some(time) => time,
+                None => return Ok(false),
+            },
+        };
+        frame.clear();
+        frame.values.clone_from(&self.values);
+        frame.set_time(time);
+        Ok(true)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.messages.progress()
+    }
+
+    fn read_at(&mut self) -> Option<Instant> {
+        self.messages.read_at()
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        let mut notices = self.take_notices();
+        notices.extend(self.messages.notices());
+        notices.extend(self.skipped.take_notices());
+        notices
+    }
+
+    fn losses(&self) -> Vec<String> {
+        self.messages.losses().into_iter().chain(self.skipped.losses()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Given(Vec<Result<Vec<f64>>>);
+
+    impl Messages for Given {
+        fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came> {
+            if self.0.is_empty() {
+                return Ok(Came::End);
+            }
+            values.extend(self.0.remove(0)?.into_iter().map(RawValue::new));
+            Ok(Came::Message(FrameTime::from_ns(5)))
+        }
+
+        fn name(&self) -> String {
+            "given".to_owned()
+        }
+
+        fn taken(&self) -> String {
+            "given: a".to_owned()
+        }
+    }
+
+    fn frames(given: Vec<Result<Vec<f64>>>, map: &str, skip_bad: bool) -> Result<(Vec<Vec<RawValue>>, Vec<String>)> {
+        let map = ArrayMap::parse(map)?;
+        let mut source = MappedSource::new(Box::new(Given(given)), &map, skip_bad)?;
+        let (mut frame, mut all) = (Frame::default(), Vec::new());
+        while source.next_frame(&mut frame)? {
+            assert_eq!(frame.values.len(), source.taxels().len());
+            all.push(frame.values.clone());
+        }
+        Ok((all, source.losses()))
+    }
+
+    #[test]
+    fn a_message_that_does_not_fit_is_an_error_or_skipped() {
+        let given = || vec![Ok(vec![1.0, 2.0]), Ok(vec![1.0]), Err(Error::failed("odd")), Ok(vec![3.0, 4.0])];
+        let why = frames(given(), "values = 'a'", false).unwrap_err().to_string();
+        assert!(why.contains("given: the message of") && why.contains("it has 1 values, the first one 2"), "{why}");
+        let (all, losses) = frames(given(), "values = 'a'", true).unwrap();
+        assert_eq!((all.len(), losses.len()), (2, 2), "{losses:?}");
+        let why = frames(vec![], "values = 'a'", false).unwrap_err().to_string();
+        assert!(why.contains("no message has values"), "{why}");
+        let why = frames(given(), "values = 'a'\nids = '1-3'", false).unwrap_err().to_string();
+        assert!(why.contains("ids names 3 taxels, and a message has 2 values"), "{why}");
+    }
+
+    #[test]
+    fn taxels_are_the_maps_or_the_bodys() {
+        let source = |map: &str| {
+            let map = ArrayMap::parse(map).unwrap();
+            MappedSource::new(Box::new(Given(vec![Ok(vec![1.0, 2.0])])), &map, false).unwrap()
+        };
+        assert_eq!(source("values = 'a'").for_body(&[9, 4]).unwrap().taxels(), [4, 9]);
+        assert_eq!(source("values = 'a'\nids = '9,4'").for_body(&[4, 5, 9]).unwrap().taxels(), [9, 4]);
+        assert!(
+            source("values = 'a'").for_body(&[4]).unwrap_err().to_string().contains("2 values, and the body 1 taxels")
+        );
+        assert!(source("values = 'a'\nids = '9,4'").for_body(&[4]).unwrap_err().to_string().contains("no taxel 9"));
+    }
+}

@@ -1,0 +1,18 @@
+//! Arrays within messages: which values of a message are sensors, and frames from these.
+
+mod array_map;
+pub(in crate::source) mod body;
+mod decoder;
+mod json;
+mod json_lines;
+mod layout;
+mod mapped;
+pub(in crate::source) mod path;
+mod presets;
+
+pub use self::array_map::{ArrayMap, MapTime};
+pub use self::decoder::Decoder;
+pub use self::json_lines::JsonLines;
+pub use self::layout::{Dimension, Lies, order};
+pub use self::mapped::{Came, MappedSource, Messages};
+pub use self::path::{ArrayPath, Step};

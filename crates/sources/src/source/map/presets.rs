@@ -1,0 +1,153 @@
+//! Maps by name, for hands and programs whose messages are described in public.
+
+/// A map that comes with the program.
+pub(super) struct Preset {
+    name: &'static str,
+    pub(super) map: &'static str,
+    /// The definition of its messages, for bags that have none.
+    pub(super) definition: Option<&'static str>,
+    /// What people should know when they use it.
+    pub(super) notes: &'static [&'static str],
+    /// Whether its format is public, but no bytes of the hardware are.
+    pub(super) is_untested: bool,
+}
+
+const DEX3: &str = r#"
+type = "unitree_hg/msg/HandState"
+values = "press_sensor_state[*].pressure"
+missing = [30000]
+pads = [
+  { name = "pad_0", grid = "3x4", pitch = "4mm", at_mm = [-24, 20] },
+  { name = "pad_1", grid = "3x4", pitch = "4mm", at_mm = [0, 20] },
+  { name = "pad_2", grid = "3x4", pitch = "4mm", at_mm = [24, 20] },
+  { name = "pad_3", grid = "3x4", pitch = "4mm", at_mm = [-24, 0] },
+  { name = "pad_4", grid = "3x4", pitch = "4mm", at_mm = [0, 0] },
+  { name = "pad_5", grid = "3x4", pitch = "4mm", at_mm = [24, 0] },
+  { name = "pad_6", grid = "3x4", pitch = "4mm", at_mm = [-24, -20] },
+  { name = "pad_7", grid = "3x4", pitch = "4mm", at_mm = [0, -20] },
+  { name = "pad_8", grid = "3x4", pitch = "4mm", at_mm = [24, -20] },
+]
+"#;
+
+/// What the values are behind comes first in a message; what follows them is not read, and is left out.
+const HAND_STATE: &str = "\
+MotorState[] motor_state
+PressSensorState[] press_sensor_state
+================================================================================
+MSG: unitree_hg/MotorState
+uint8 mode
+float32 q
+float32 dq
+float32 ddq
+float32 tau_est
+int16[2] temperature
+float32 vol
+uint32[2] sensor
+uint32 motorstate
+uint32[4] reserve
+================================================================================
+MSG: unitree_hg/PressSensorState
+float32[12] pressure
+float32[12] temperature
+uint32 lost
+uint32 reserve
+";
+
+const TACTILE_STATE: &str = r#"
+type = "tactile_msgs/msg/TactileState"
+values = "sensors[*].values"
+time = "header.stamp"
+"#;
+
+const TACTILE_STATE_DEFINITION: &str = "\
+std_msgs/Header header
+sensor_msgs/ChannelFloat32[] sensors
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: sensor_msgs/ChannelFloat32
+string name
+float32[] values
+";
+
+const MUJOCO: &str = r#"
+values = "sensordata"
+time = "time:s"
+"#;
+
+const INSPIRE: &str = r#"
+values = [
+  "fingerone_tip_touch", "fingerone_top_touch", "fingerone_palm_touch",
+  "fingertwo_tip_touch", "fingertwo_top_touch", "fingertwo_palm_touch",
+  "fingerthree_tip_touch", "fingerthree_top_touch", "fingerthree_palm_touch",
+  "fingerfour_tip_touch", "fingerfour_top_touch", "fingerfour_palm_touch",
+  "fingerfive_tip_touch", "fingerfive_top_touch", "fingerfive_middle_touch", "fingerfive_palm_touch",
+  "palm_touch",
+]
+pads = [
+  { name = "little_tip", grid = "3x3", pitch = "2mm", at_mm = [40, 100] },
+  { name = "little_nail", grid = "12x8", pitch = "2mm", at_mm = [40, 80] },
+  { name = "little_pad", grid = "10x8", pitch = "2mm", at_mm = [40, 50] },
+  { name = "ring_tip", grid = "3x3", pitch = "2mm", at_mm = [20, 100] },
+  { name = "ring_nail", grid = "12x8", pitch = "2mm", at_mm = [20, 80] },
+  { name = "ring_pad", grid = "10x8", pitch = "2mm", at_mm = [20, 50] },
+  { name = "middle_tip", grid = "3x3", pitch = "2mm", at_mm = [0, 100] },
+  { name = "middle_nail", grid = "12x8", pitch = "2mm", at_mm = [0, 80] },
+  { name = "middle_pad", grid = "10x8", pitch = "2mm", at_mm = [0, 50] },
+  { name = "index_tip", grid = "3x3", pitch = "2mm", at_mm = [-20, 100] },
+  { name = "index_nail", grid = "12x8", pitch = "2mm", at_mm = [-20, 80] },
+  { name = "index_pad", grid = "10x8", pitch = "2mm", at_mm = [-20, 50] },
+  { name = "thumb_tip", grid = "3x3", pitch = "2mm", at_mm = [-50, 50] },
+  { name = "thumb_nail", grid = "12x8", pitch = "2mm", at_mm = [-50, 30] },
+  { name = "thumb_middle", grid = "3x3", pitch = "2mm", at_mm = [-50, 10] },
+  { name = "thumb_pad", grid = "12x8", pitch = "2mm", at_mm = [-50, -15] },
+  { name = "palm", grid = "14x8", pitch = "4mm", at_mm = [10, 10] },
+]
+"#;
+
+const PRESETS: [Preset; 4] = [
+    Preset {
+        name: "dex3",
+        map: DEX3,
+        definition: Some(HAND_STATE),
+        notes: &[
+            "the pads of a Dex3-1 are drawn in a 3 × 3 arrangement, not measured",
+            "public sources differ about the Dex3-1: its manual has 6 pads of 3 × 4, its SDK 9; none lists their order",
+        ],
+        is_untested: true,
+    },
+    Preset {
+        name: "tactile-state",
+        map: TACTILE_STATE,
+        definition: Some(TACTILE_STATE_DEFINITION),
+        notes: &[],
+        is_untested: false,
+    },
+    Preset { name: "mujoco", map: MUJOCO, definition: None, notes: &[], is_untested: false },
+    Preset {
+        name: "inspire",
+        map: INSPIRE,
+        definition: None,
+        notes: &[
+            "the pads of an Inspire RH56 are drawn side by side, not measured",
+            "public sources differ about the palm of an Inspire RH56: 14 × 8 here, 8 × 14 in others; none lists how its pads lie",
+        ],
+        is_untested: true,
+    },
+];
+
+/// The preset called `name`.
+pub(super) fn find(name: &str) -> Option<&'static Preset> {
+    PRESETS.iter().find(|preset| preset.name == name)
+}
+
+/// The names of all presets.
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    PRESETS.iter().map(|preset| preset.name)
+}
