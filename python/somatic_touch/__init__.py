@@ -13,7 +13,7 @@ np.float32(360.0)
 
 from ._accuracy import Calibrated, Tradeoff, calibrate, tradeoff
 from ._columns import Table
-from ._commands import bench, compare, info, inspect, outputs, plan, plot
+from ._commands import Compared, bench, compare, info, inspect, outputs, plan, plot
 from ._errors import InputError, SomaticError, UnknownNameError, UsageError
 from ._flags import Flags, TouchFlags
 from ._live import live
@@ -50,6 +50,7 @@ __all__ = [
     "Body",
     "Calibrated",
     "Calibration",
+    "Compared",
     "Engine",
     "EngineState",
     "Field",

@@ -33,6 +33,7 @@ __all__ = [
     "_outputs",
     "_plot",
     "_tradeoff",
+    "_write_pick",
     "author",
     "convert",
     "metadata",
@@ -191,6 +192,8 @@ class Scene:
     def __new__(cls, text: str | dict[str, Any] | None = None, **keys: Any) -> Scene: ...
     @staticmethod
     def load(path: _Path) -> Scene: ...
+    @staticmethod
+    def _load_without_wish(path: _Path) -> Scene: ...
     @property
     def text(self) -> str: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -515,6 +518,7 @@ def read(
     pitch: str | None = None,
     unit: str | None = None,
     layout: _Path | None = None,
+    skip_bad: bool = False,
 ) -> Recording: ...
 def open(
     source: _Path,
@@ -529,6 +533,7 @@ def open(
     pitch: str | None = None,
     unit: str | None = None,
     layout: _Path | None = None,
+    skip_bad: bool = False,
     progress: _Progress | None = None,
 ) -> Parts: ...
 def render(
@@ -569,7 +574,18 @@ def run(
     backend: _Backend | None = None,
     force: bool = False,
     all_fields: bool = False,
+    header: bool = False,
+    wide: bool = False,
     label: str | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    rate_hz: float | None = None,
+    format: str | None = None,
+    grid: str | None = None,
+    pitch: str | None = None,
+    unit: str | None = None,
+    layout: _Path | None = None,
+    skip_bad: bool = False,
     progress: _Progress | None = None,
 ) -> _Ran: ...
 def metadata(path: _Path) -> dict[str, str]: ...
@@ -622,6 +638,7 @@ def _tradeoff(
     budget: str | None,
     progress: bool | Callable[[float], object] | None,
 ) -> str: ...
+def _write_pick(path: _Path, pick: str, asked_by: str, within: str | None, budget: str | None) -> None: ...
 def _calibrate(
     body: Body, source: Recording | _Path | Sequence[str], asked: dict[str, Any], say: Callable[[str], object]
 ) -> tuple[str, str]: ...
@@ -643,7 +660,9 @@ def _info(
     unit: str | None,
     layout: _Path | None,
 ) -> str: ...
-def _inspect(body: Body, contact_tolerance_m: float | None, errors: bool) -> str: ...
+def _inspect(
+    body: Body, contact_tolerance_m: float | None, errors: bool, joints: _Path | None, up: str | None
+) -> str: ...
 def _compare(first: Body, second: Body, touches: int) -> str: ...
 def _outputs() -> str: ...
 def _plot(

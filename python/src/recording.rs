@@ -333,7 +333,8 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 ///
 /// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' is the bundled touch. `body` is the robot, for
 /// recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
-/// after its start. The other keywords are those of docs/reference/exports.md.
+/// after its start. With `skip_bad` bad rows of a CSV, an export or a bag are skipped and counted in `losses`; else the first is an
+/// error. The other keywords are those of docs/reference/exports.md.
 ///
 /// >>> import somatic_touch as st
 /// >>> st.read("no-such.csv")
@@ -341,7 +342,7 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 ///     ...
 /// somatic_touch.InputError: no-such.csv: no such file or directory
 #[pyfunction]
-#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None))]
+#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, skip_bad = false))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn read(
     py: Python<'_>,
@@ -355,8 +356,9 @@ pub(crate) fn read(
     pitch: Option<&str>,
     unit: Option<&str>,
     layout: Option<PathBuf>,
+    skip_bad: bool,
 ) -> PyResult<PyRecording> {
-    let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout };
+    let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout, skip_bad };
     let mut opened = Opening::new(py, source, keys)?;
     let frames = gather(py, &mut *opened.source, &opened.file)?;
     opened.recording(py, frames)
