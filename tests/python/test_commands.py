@@ -167,7 +167,8 @@ def test_bad_rows_are_skipped_where_that_is_asked_for(tmp_path: pathlib.Path) ->
 
 @pytest.mark.once
 def test_percepts_in_lines_of_json_are_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
-    st.convert(touch, tmp_path / "touch.csv")
+    with pytest.warns(UserWarning, match="no place for what is attached"):
+        st.convert(touch, tmp_path / "touch.csv")
     somatic(
         "run", "--quiet", "--source", tmp_path / "touch.csv", "--outputs", "total,touches", "--backend", "cpu", "--from", 2, "--to", 3, "--sink",
         f"ndjson:{tmp_path / 'theirs.ndjson'}",
@@ -184,7 +185,8 @@ def test_percepts_in_lines_of_json_are_the_commands(somatic, touch: st.Recording
 def test_plots_are_drawn(touch: st.Recording, tmp_path: pathlib.Path) -> None:
     st.plot([touch, "hand"], tmp_path / "two.png", fields="hand/palm*")
     assert (tmp_path / "two.png").read_bytes()[:4] == b"\x89PNG"
-    st.convert(touch, tmp_path / "touch.csv")
+    with pytest.warns(UserWarning, match="no place for what is attached"):
+        st.convert(touch, tmp_path / "touch.csv")
     st.plot(tmp_path / "touch.csv", tmp_path / "part.svg", body="hand", from_s=2, to_s=3)
     assert (tmp_path / "part.svg").read_text()[:4] == "<svg"
     for wrong in (tmp_path / "two.png", tmp_path / "two.pdf"):

@@ -103,5 +103,5 @@ def test_a_bag_of_ten_minutes_takes_little_memory(somatic, tmp_path: pathlib.Pat
     assert done.returncode == 0, done.stderr
     read, most = map(int, done.stdout.split())
     assert read == frames
-    # All values at once are 96 MB, and a recording of them 216 MB beside what Python takes by itself.
-    assert most <= 300e6, f"{most / 1e6:.0f} MB"
+    # 300 MB are promised. A reader that keeps all has 120 MB of values and masks beside the 60 MB that Python and an engine take.
+    assert most <= 150e6, f"{most / 1e6:.0f} MB"
