@@ -211,7 +211,7 @@ class Engine:
         calibration: Calibration | None = None,
         backend: _Backend | None = None,
         *,
-        taxels: Sequence[int] | None = None,
+        taxels: Sequence[int] | npt.NDArray[np.integer[Any]] | None = None,
         batch: int = 256,
     ) -> Engine: ...
     def process(

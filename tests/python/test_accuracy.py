@@ -14,7 +14,7 @@ from conftest import ROOT
 import somatic_touch as st
 
 
-def session(path: pathlib.Path, ids: Sequence[int] = range(4), at_once: bool = False) -> pathlib.Path:
+def session(path: pathlib.Path, ids: Sequence[int] | np.ndarray = range(4), at_once: bool = False) -> pathlib.Path:
     """Nothing for three seconds, then each sensor in its turn, or all at once, as a 10-bit converter gives it."""
     random = np.random.default_rng(2)
     t, sensors = np.arange(900) / 100, len(ids)

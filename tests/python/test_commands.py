@@ -81,9 +81,11 @@ def test_info_is_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Pa
 
 @pytest.mark.once
 def test_frames_come_through_bit_for_bit(touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    assert touch.body is not None
     st.convert(touch, tmp_path / "touch.mcap", calibration=st.Calibration("[all]\ngain = 2", touch.body))
     again = st.read(tmp_path / "touch.mcap")
-    assert again.values.tobytes() == touch.values.tobytes() and again.calibration.text == "[all]\ngain = 2"
+    assert again.values.tobytes() == touch.values.tobytes() and again.calibration is not None
+    assert again.calibration.text == "[all]\ngain = 2"
     with pytest.raises(st.SomaticError, match="exists"):
         st.convert(touch, tmp_path / "touch.mcap")
     with pytest.warns(UserWarning, match="no place for fields"):

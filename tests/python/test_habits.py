@@ -276,7 +276,7 @@ def test_one_date_and_spans_of_time() -> None:
     frame = [0.0] * 40
     assert engine.step(MIDNIGHT, frame).t.tolist() == [1767312000.0]
     assert engine.step(np.datetime64("2026-01-02T00:00:01"), frame).t.tolist() == [1767312001.0]
-    assert engine.step(pd.Timestamp("2026-01-02T00:00:02", tz="UTC"), frame).t.tolist() == [1767312002.0]
+    assert engine.step(pd.Timestamp("2026-01-02T00:00:02", tz="UTC"), frame).t.tolist() == [1767312002.0]  # type: ignore[arg-type]
     spans = np.array([0, 1500], "timedelta64[ms]")
     assert engine.process(spans, np.zeros((2, 40))).t.tolist() == [0, 1.5]
     for t in ([MIDNIGHT, pd.NaT], np.array(["2026", "NaT"], "M8[s]")):
