@@ -31,7 +31,7 @@ def compared(told: dict[str, Any], quantity: str, ax: Any) -> Any:
     """See `Compared.plot`."""
     _one_of(quantity, _OFF_BY)
     unit, factor = _OFF_BY[quantity]
-    ax, is_own = _axes(ax, (6, 4))
+    ax, _ = _axes(ax, (6, 4))
     bars: list[tuple[str, dict[str, float] | None, str]] = []
     for number, layout in enumerate(told["layouts"]):
         bars += [(layout["body"], layout[quantity], f"C{number}"), ("ideal skin", layout["ideal"][quantity], "0.5")]
@@ -129,4 +129,6 @@ def _name_methods(ax: Any, best: list[dict[str, Any]], column: str) -> None:
         if row["orientation_by"] not in named:
             named.add(row["orientation_by"])
             at = [values[0] for values in _points([row], column)]
-            ax.annotate(row["orientation_by"], at, xytext=(6, 6), textcoords="offset points", fontsize="small")
+            # By turns above and below, as several may be as accurate.
+            aside = (6, 6) if len(named) % 2 else (6, -14)
+            ax.annotate(row["orientation_by"], at, xytext=aside, textcoords="offset points", fontsize="small")
