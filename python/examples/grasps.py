@@ -100,7 +100,7 @@ def main() -> None:
     body, taxels = hand(layout.sort_values("taxel"))
     grasps = [features(percepts(asked.folder / "csv" / name, body, taxels)) for name in labels["file"]]
     objects = labels["object"].to_numpy()
-    size = labels.groupby("object")["file"].transform("count")
+    size = np.asarray(labels.groupby("object")["file"].transform("count"))
     earlier = (labels["order_in_block"] < size // 2).to_numpy()
 
     classifier = make_pipeline(StandardScaler(), LogisticRegression(C=0.3, max_iter=5000))
@@ -116,9 +116,10 @@ def main() -> None:
     guessed = classifier.predict(table(later, chosen))
     right = int((guessed == objects[~earlier]).sum())
     print(f"the later half, scored once: {right} of {len(later)}, {100 * right / len(later):.1f} %")
+    felt = dict(zip(labels["file"], labels["touched"], strict=True))
     for name, wanted, got in zip(labels["file"][~earlier], objects[~earlier], guessed, strict=True):
         if wanted != got:
-            print(f"  {name}: {got}" + ("" if labels.set_index("file")["touched"][name] else " (the pads never felt it)"))
+            print(f"  {name}: {got}" + ("" if felt[name] else " (the pads never felt it)"))
 
     names = sorted(set(objects))
     counts = confusion_matrix(objects[~earlier], guessed, labels=names)

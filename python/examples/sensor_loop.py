@@ -20,6 +20,7 @@ def sensor(t: float) -> np.ndarray:
 
 
 took = []
+frame = sensor(0.0)
 for step in range(400):
     t = 0.005 * step
     frame = sensor(t)

@@ -11,9 +11,11 @@
 np.float32(360.0)
 """
 
+from typing import TYPE_CHECKING, Any
+
 from ._accuracy import Calibrated, Tradeoff, calibrate, tradeoff
 from ._columns import Table
-from ._commands import bench, compare, info, inspect, outputs, plan, plot
+from ._commands import Compared, bench, compare, info, inspect, outputs, plan, plot
 from ._errors import InputError, SomaticError, UnknownNameError, UsageError
 from ._flags import Flags, TouchFlags
 from ._live import live
@@ -46,10 +48,24 @@ from ._native import (
 )
 from ._view import Shown, view
 
+if TYPE_CHECKING:
+    from . import batch as batch
+else:
+
+    def __getattr__(name: str) -> Any:
+        """`batch`, which is imported by its first use: few need it, and it takes time."""
+        if name == "batch":
+            import importlib
+
+            return importlib.import_module(".batch", __name__)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
 __all__ = [
     "Body",
     "Calibrated",
     "Calibration",
+    "Compared",
     "Engine",
     "EngineState",
     "Field",

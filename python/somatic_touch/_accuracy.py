@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import pathlib
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias
 
@@ -52,8 +54,8 @@ class Tradeoff(Table):
     missed: list[str]
     """What of these the pick misses, a line each."""
 
-    def __init__(self, report: dict[str, Any]) -> None:
-        super().__init__([_flat(row) for row in report.pop("rows")])
+    def __init__(self, report: dict[str, Any], all: bool = True) -> None:
+        super().__init__([_flat(row) for row in report.pop("rows") if all or row["front"]])
         picked = report.pop("pick", None)
         self.pick = None if picked is None else _flat(picked)
         self.missed = report.pop("missed", [])
@@ -71,6 +73,20 @@ class Tradeoff(Table):
             knobs.pop("orientation_by", None)
         return {"backend": self.pick["backend"], **({"accuracy": knobs} if knobs else {})}
 
+    def plot(self, quantity: Literal["place", "orientation"] = "place", *, way: Literal["live", "batch"] = "live", ax: Any = None) -> Any:
+        """Draws the time of a frame against its error, a dot for each combination, with matplotlib; gives the axes.
+
+        The errors are those of `quantity` against the truth where that is known, else against the reference.
+
+        >>> import somatic_touch as st
+        >>> found = st.tradeoff(scene={"outputs": ["centroid"]}, source="hand", backend="cpu", seconds=0.05, frames=50)
+        >>> found.plot().get_ylabel()
+        'place off by, 95th percentile [mm]'
+        """
+        from . import _figures
+
+        return _figures.tradeoff(self, quantity, way, ax)
+
 
 def tradeoff(
     body: _native.Body | _Path | None = None,
@@ -83,6 +99,8 @@ def tradeoff(
     frames: int | None = None,
     within: str | None = None,
     budget: str | None = None,
+    all: bool = True,
+    write: _Path | None = None,
     progress: _Progress | None = None,
 ) -> Tradeoff:
     """Measures speed against accuracy on a body and this machine, as `somatic tradeoff` does.
@@ -104,6 +122,11 @@ def tradeoff(
     within, budget : str, optional
         A tolerance such as '3 mm, 5 deg', and a time of a frame such as '100us', for which a row is picked: the fastest within the tolerance, or
         the most accurate within a budget alone.
+    all : bool
+        Whether the table has every combination, or only those in front, which no other beats.
+    write : path, optional
+        A scene file, whose comments stay: the pick is written into it, and nothing if the pick misses something, which is a warning. It is also
+        the `scene` and the wish, where these are not given.
     progress : bool or callable, optional
         True shows a bar of tqdm, a function is called with the share that is done, 0 to 1.
 
@@ -119,8 +142,35 @@ def tradeoff(
     >>> found.pick["backend"] in ("cpu", "reference"), found.missed, "p50_us" in found
     (True, [], True)
     """
+    if write is not None:
+        # Before the measurement: it takes long, and this may not be a scene.
+        there = _native.Scene._load_without_wish(write)
+        scene = there if scene is None else scene
+        if within is None and budget is None:
+            within, budget = _wish(write)
     text = _native._tradeoff(body, scene, source, calibration, backend, seconds, frames, within, budget, progress)
-    return Tradeoff(json.loads(text))
+    found = Tradeoff(json.loads(text), all)
+    if write is not None:
+        if found.pick is None or found.missed:
+            why = "; ".join(found.missed) or "there is nothing to pick from"
+            warnings.warn(f"{os.fspath(write)}: it stays as it was: no options meet within= and budget=: {why}", stacklevel=2)
+        else:
+            words = {name: found.pick[name] for name in ("backend", *_KNOBS)}
+            _native._write_pick(write, json.dumps(words), found.report["asked_by"], within, budget)
+    return found
+
+
+def _wish(path: _Path) -> tuple[str | None, str | None]:
+    """The tolerance and the budget that the scene file at `path` has."""
+    import tomllib
+
+    with pathlib.Path(path).open("rb") as file:
+        asked = tomllib.load(file).get("accuracy", {})
+    within = ", ".join(asked[key] for key in ("centroid", "orientation") if key in asked)
+    budget = asked.get("budget")
+    if not within and budget is None:
+        raise UsageError("write= needs within= or budget=, which pick what to write")
+    return within or None, budget
 
 
 class Calibrated(Table):
@@ -139,6 +189,20 @@ class Calibrated(Table):
         super().__init__(report.pop("rows"))
         self.report = report
         self.calibration = calibration
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draws where each sensor rests, its dead band, and how far presses went, with matplotlib; of `gains_from` the gains. Gives the axes.
+
+        >>> import somatic_touch as st
+        >>> grid = st.Body.grid(1, 2, 0.01)
+        >>> rows = [{"taxel": 0, "baseline": 100.0, "dead_band": 3.0, "travel": 200.0}, {"taxel": 1, "baseline": 98.0, "dead_band": 3.0, "travel": None}]
+        >>> found = st.Calibrated({"rows": rows, "invert": False, "raw_range": [0, 1023]}, st.Calibration("", grid))
+        >>> [text.get_text() for text in found.plot().get_legend().get_texts()]
+        ['pressed', 'dead band', 'at rest', 'never pressed, or lost']
+        """
+        from . import _figures
+
+        return _figures.calibrated(self, ax)
 
 
 def _say(text: str) -> None:

@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Sequence
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, TypedDict, Unpack
 
 import numpy as np
 
@@ -16,6 +16,21 @@ from ._columns import Table
 _Path: TypeAlias = str | os.PathLike[str]
 _Backend: TypeAlias = Literal["auto", "reference", "cpu", "gpu"]
 _Asked: TypeAlias = _native.Scene | dict[str, Any] | str | None
+
+
+class _Reading(TypedDict, total=False):
+    """The keywords of `read`."""
+
+    body: _native.Body | _Path | None
+    from_s: float | None
+    to_s: float | None
+    rate_hz: float | None
+    format: str | None
+    grid: str | None
+    pitch: str | None
+    unit: str | None
+    layout: _Path | None
+    skip_bad: bool
 
 
 def _of(body: _native.Body | _Path) -> _native.Body:
@@ -32,10 +47,12 @@ def info(
     unit: str | None = None,
     layout: _Path | None = None,
 ) -> dict[str, Any]:
-    """What is in the recording at `source`, as `somatic info` tells it, but for contacts.
+    """What is in the recording at `source`, as `somatic info` tells it.
 
     Of a recording `kind`, `bytes`, `taxels`, `frames`, `start` and `duration` in seconds, `rate_hz`, `gaps`, `longest_gap`, `backwards`, `losses`; of an MCAP
-    `topics` and `attached` too, of an export `unit` and `panels`; of a ROS 2 bag its `topics`. The keywords are those of `read`.
+    `topics` and `attached` too, of an export `unit` and `panels`; of a ROS 2 bag its `topics`. Where the body comes with it, `fields` has those
+    that are touched, a dict each: `contacts`, the `longest` and the mean one, `stance` (s), `load_mean` and `load_peak` in `load_unit`. The keywords
+    are those of `read`.
 
     >>> import pathlib, tempfile
     >>> import somatic_touch as st
@@ -49,23 +66,47 @@ def info(
     return known
 
 
-def inspect(body: _native.Body | _Path, *, contact_tolerance_m: float | None = None, errors: bool = False) -> dict[str, Any]:
+def inspect(
+    body: _native.Body | _Path,
+    *,
+    contact_tolerance_m: float | None = None,
+    errors: bool = False,
+    joints: _Path | None = None,
+    up: Literal["y", "z"] | None = None,
+) -> dict[str, Any]:
     """What `body` holds, and what is odd about it, as `somatic inspect` tells it: `links`, `fields`, `skin`, `holes`, `islands` and `findings`.
 
     Areas are in m²; `covered` is how much of them is near a taxel. `near_at_rest` counts pairs of links whose taxels are closer at rest than
     `contact_tolerance_m`. With `errors` touches are simulated on it: `errors` then has the median and the 95th percentile of how far off their
-    place is (m), their axis (rad) and their force (a share of it), and the same of an `ideal` skin.
+    place is (m), their axis (rad) and their force (a share of it), and the same of an `ideal` skin. `joints` is a URDF, in whose poses taxels that
+    are covered at rest are looked at too, and `up` its axis that points up; a body that was made from a URDF needs none.
 
     >>> import somatic_touch as st
     >>> seen = st.inspect("hand")
     >>> seen["taxels"], len(seen["fields"]), seen["islands"]
     (40, 13, 5)
     """
-    seen: dict[str, Any] = json.loads(_native._inspect(_of(body), contact_tolerance_m, errors))
+    seen: dict[str, Any] = json.loads(_native._inspect(_of(body), contact_tolerance_m, errors, joints, up))
     return seen
 
 
-def compare(first: _native.Body | _Path, second: _native.Body | _Path, *, touches: int = 400) -> dict[str, Any]:
+class Compared(dict[str, Any]):
+    """How two layouts differ, see `compare`: a dict of `layouts`, `same_places` and `second_is_nearer`."""
+
+    def plot(self, quantity: Literal["place", "axis", "force"] = "place", *, ax: Any = None) -> Any:
+        """Draws how far off `quantity` is on both layouts and on ideal skins, with matplotlib; gives the axes.
+
+        >>> import somatic_touch as st
+        >>> told = st.compare(st.Body.grid(4, 4, 0.01), st.Body.grid(8, 8, 0.005), touches=60)
+        >>> told.plot().get_ylabel()
+        'place off by [mm]'
+        """
+        from . import _figures
+
+        return _figures.compared(self, quantity, ax)
+
+
+def compare(first: _native.Body | _Path, second: _native.Body | _Path, *, touches: int = 400) -> Compared:
     """How far off so many simulated touches are on two layouts, as `somatic author --compare` tells it.
 
     `layouts` has for each what `inspect(errors=True)` has as `errors`, and `frame_s`, the time of a live frame. `second_is_nearer` is the share of
@@ -78,8 +119,7 @@ def compare(first: _native.Body | _Path, second: _native.Body | _Path, *, touche
     >>> told["layouts"][0]["place"]["median"] > told["layouts"][1]["place"]["median"]
     True
     """
-    told: dict[str, Any] = json.loads(_native._compare(_of(first), _of(second), touches))
-    return told
+    return Compared(json.loads(_native._compare(_of(first), _of(second), touches)))
 
 
 def outputs() -> Table:
@@ -153,10 +193,12 @@ def plot(
     outputs: Sequence[str] = (),
     fields: str | Sequence[str] = (),
     force: bool = False,
+    **reading: Unpack[_Reading],
 ) -> None:
     """Draws recordings side by side into `path`, a .svg or .png, as `somatic plot` does: quantities over time, and the highest pressures.
 
-    `outputs` are drawn over time in the place of load and area; `fields` are globs. `Percepts.plot` draws on matplotlib's axes.
+    `outputs` are drawn over time in the place of load and area; `fields` are globs. Other keywords, such as `body`, `from_s` and `to_s`, are those
+    of `read`, for recordings that are paths. `Percepts.plot` draws on matplotlib's axes.
 
     >>> import pathlib, tempfile
     >>> import somatic_touch as st
@@ -166,9 +208,9 @@ def plot(
     '<svg'
     """
     several = [recordings] if isinstance(recordings, str | os.PathLike | _native.Recording) else recordings
-    read = [one if isinstance(one, _native.Recording) else _native.read(one) for one in several]
+    read = [one if isinstance(one, _native.Recording) else _native.read(one, **reading) for one in several]
     _native._plot(read, path, list(outputs), [fields] if isinstance(fields, str) else list(fields), force)
 
 
-for _public in (info, inspect, compare, outputs, plan, bench, plot):
+for _public in (Compared, info, inspect, compare, outputs, plan, bench, plot):
     _public.__module__ = "somatic_touch"

@@ -99,7 +99,7 @@ def recording(read: _native.Recording) -> str:
         ["body", read.body if read.body is not None else "none; read it with body="],
         ["calibration", read.calibration if read.calibration is not None else "none"],
     ]
-    rows += [["lost", loss] for loss in read.losses[:_MOST_ROWS]]
+    rows.extend(["lost", loss] for loss in read.losses[:_MOST_ROWS])
     return _table(repr(read), ["", ""], rows, max(0, len(read.losses) - _MOST_ROWS))
 
 

@@ -33,6 +33,7 @@ __all__ = [
     "_outputs",
     "_plot",
     "_tradeoff",
+    "_write_pick",
     "author",
     "convert",
     "metadata",
@@ -191,6 +192,8 @@ class Scene:
     def __new__(cls, text: str | dict[str, Any] | None = None, **keys: Any) -> Scene: ...
     @staticmethod
     def load(path: _Path) -> Scene: ...
+    @staticmethod
+    def _load_without_wish(path: _Path) -> Scene: ...
     @property
     def text(self) -> str: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -208,7 +211,7 @@ class Engine:
         calibration: Calibration | None = None,
         backend: _Backend | None = None,
         *,
-        taxels: Sequence[int] | None = None,
+        taxels: Sequence[int] | npt.NDArray[np.integer[Any]] | None = None,
         batch: int = 256,
     ) -> Engine: ...
     def process(
@@ -515,6 +518,7 @@ def read(
     pitch: str | None = None,
     unit: str | None = None,
     layout: _Path | None = None,
+    skip_bad: bool = False,
     dataset: str | None = None,
     time: str | None = None,
 ) -> Recording: ...
@@ -531,6 +535,7 @@ def open(
     pitch: str | None = None,
     unit: str | None = None,
     layout: _Path | None = None,
+    skip_bad: bool = False,
     progress: _Progress | None = None,
 ) -> Parts: ...
 def render(
@@ -571,7 +576,18 @@ def run(
     backend: _Backend | None = None,
     force: bool = False,
     all_fields: bool = False,
+    header: bool = False,
+    wide: bool = False,
     label: str | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    rate_hz: float | None = None,
+    format: str | None = None,
+    grid: str | None = None,
+    pitch: str | None = None,
+    unit: str | None = None,
+    layout: _Path | None = None,
+    skip_bad: bool = False,
     progress: _Progress | None = None,
 ) -> _Ran: ...
 def metadata(path: _Path) -> dict[str, str]: ...
@@ -624,6 +640,7 @@ def _tradeoff(
     budget: str | None,
     progress: bool | Callable[[float], object] | None,
 ) -> str: ...
+def _write_pick(path: _Path, pick: str, asked_by: str, within: str | None, budget: str | None) -> None: ...
 def _calibrate(
     body: Body, source: Recording | _Path | Sequence[str], asked: dict[str, Any], say: Callable[[str], object]
 ) -> tuple[str, str]: ...
@@ -645,7 +662,9 @@ def _info(
     unit: str | None,
     layout: _Path | None,
 ) -> str: ...
-def _inspect(body: Body, contact_tolerance_m: float | None, errors: bool) -> str: ...
+def _inspect(
+    body: Body, contact_tolerance_m: float | None, errors: bool, joints: _Path | None, up: str | None
+) -> str: ...
 def _compare(first: Body, second: Body, touches: int) -> str: ...
 def _outputs() -> str: ...
 def _plot(

@@ -16,7 +16,7 @@ class Bar:
         except ImportError as error:
             what = "progress=True draws with tqdm; run `pip install tqdm`, or give a function, which is called with what is done"
             raise UsageError(what) from error
-        shown = {"unit": f" {unit}", "unit_scale": True} if unit else {"bar_format": "{l_bar}{bar}| {elapsed}<{remaining}"}
+        shown: dict[str, Any] = {"unit": f" {unit}", "unit_scale": True} if unit else {"bar_format": "{l_bar}{bar}| {elapsed}<{remaining}"}
         self._bar: Any = tqdm(total=total, **shown)
 
     def __call__(self, done: float) -> None:

@@ -10,15 +10,17 @@ _CALLED = {
     "from": "from_s",
     "to": "to_s",
     "at": "at_s",
+    "contact-tolerance": "contact_tolerance_m",
 }
 _KEYWORDS = {
     *("rate", "from", "to", "at", "format", "grid", "pitch", "unit", "layout", "body", "calibration", "backend"),
     *("force", "all-fields", "header", "wide", "taxels", "spacing", "regions", "seed", "even", "hidden", "clear"),
     *("up", "package", "geometry", "mirror", "rest", "press", "bits", "missing", "equalise", "known", "on", "mask-moved", "stamp"),
+    *("joints", "contact-tolerance", "skip-bad"),
     *("gains-from", "wiring", "columns", "ids", "frame-end", "time", "within", "budget", "seconds", "frames"),
 }
 _TEXTS = {"format", "grid", "pitch", "unit", "layout", "spacing", "clear", "backend", "geometry", "up", "columns", "ids", "time", "within"}
-_SWITCHES = {"force", "all-fields", "header", "wide", "equalise", "mask-moved"}
+_SWITCHES = {"force", "all-fields", "header", "wide", "equalise", "mask-moved", "skip-bad"}
 
 # A flag with its value, if it has one: a number, what begins like one, a place for one, or what is wrong.
 _FLAG = re.compile(r"--([a-z][a-z-]*)(?: (HZ\b|FILE\b|[^\s;)`]+(?= (?:is|are) (?:no|not)\b)|-?[0-9][^\s;)`]*[^\s;)`,:?.]|-?[0-9]))?")

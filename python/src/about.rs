@@ -5,18 +5,22 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use somatic::Result;
 use somatic::author::coverage;
+use somatic::body::Up;
 use somatic::field::FieldSet;
 use somatic::internal::author::{DrawnPoses, lint_with_progress};
-use somatic::internal::contents::{Contents, Quantity, bag_as_json, of_fields, of_touches};
+use somatic::internal::contents::{Contacts, Contents, Quantity, bag_as_json, of_fields, of_touches};
 use somatic::internal::expected::{TestTouches, compare_layouts, expected_and_ideal_errors};
 use somatic::internal::field::{ContactTolerance, TaxelGraph, rest_overlaps};
 use somatic::internal::recording::BagSurvey;
-use somatic::internal::setup::source_of;
+use somatic::internal::robot::drawn_poses;
+use somatic::internal::setup::{Tell, source_of};
 use somatic::recording::Reader;
+use somatic::robot::Kinematics;
 use somatic::source::{CsvSource, Source, SourceSpec, VendorOptions, VendorSource};
+use somatic::{Body, Calibration, Result};
 
+use crate::author::up_of;
 use crate::body::PyBody;
 use crate::error::{OrRaise, interrupted, usage};
 use crate::opening::Keys;
@@ -25,23 +29,44 @@ use crate::threads::{free, goes_on};
 /// Frames that are read until Ctrl-C is heard.
 const FRAMES_BETWEEN: u64 = 1 << 10;
 
-/// What a recording of nothing but frames has, which is read to its end; None where Ctrl-C ended it.
+/// What a recording of nothing but frames has, which is read to its end, and what `contacts` sees there; None where Ctrl-C ended it.
 fn of_frames(
     kind: &'static str,
     path: &Path,
     source: &mut dyn Source,
+    mut contacts: Option<&mut Contacts>,
     raised: &mut Option<PyErr>,
 ) -> Result<Option<Contents>> {
     let mut frames = 0_u64;
-    Contents::of_frames(kind, path, source, |_, _| {
+    let known = Contents::of_frames(kind, path, source, |frame, _| {
+        if let Some(contacts) = &mut contacts {
+            contacts.see(frame)?;
+        }
         frames += 1;
         Ok(!frames.is_multiple_of(FRAMES_BETWEEN) || goes_on(raised))
+    })?;
+    if let Some(contacts) = contacts {
+        contacts.finish()?;
+    }
+    Ok(known)
+}
+
+/// The contacts in the MCAP at `path`, if it has its body; what is damaged is a loss of `known`.
+fn of_mcap(path: &Path, known: &mut Contents, raised: &mut Option<PyErr>) -> Option<Contacts> {
+    let goes_on = |frames: u64| !frames.is_multiple_of(FRAMES_BETWEEN) || goes_on(raised);
+    Contacts::of_mcap(path, &Tell::default(), goes_on).unwrap_or_else(|e| {
+        known.losses.push(e.to_string());
+        None
     })
 }
 
 fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Result<Value> {
-    let known = match &source_of(text, &["csv", "mcap", "ros2-mcap", "export"], options)? {
-        SourceSpec::Mcap(path) => Some(Contents::of_mcap(path, &mut Reader::open(path)?, |_| {})?),
+    let (known, contacts) = match &source_of(text, &["csv", "mcap", "ros2-mcap", "export"], options)? {
+        SourceSpec::Mcap(path) => {
+            let mut known = Contents::of_mcap(path, &mut Reader::open(path)?, |_| {})?;
+            let contacts = of_mcap(path, &mut known, raised);
+            (Some(known), contacts)
+        }
         SourceSpec::Ros2Mcap(bag) => {
             let mut survey = BagSurvey::read(&bag.path, |_| {})?;
             survey.topics.retain(|topic| bag.topics.is_empty() || bag.topics.contains(&topic.name));
@@ -50,14 +75,23 @@ fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Res
         SourceSpec::Vendor(path) => {
             let mut source = VendorSource::open(path, options)?;
             let (kind, layout) = (source.format().title(), Some(source.layout().clone()));
-            of_frames(kind, path, &mut source, raised)?.map(|known| Contents { layout, ..known })
+            let body = Body::from_bytes(&source.body_name(), &source.body()?)?;
+            let ids = source.taxels().to_vec();
+            let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids)).transpose()?;
+            let mut contacts = Contacts::new(&body, calibration, &source)?;
+            let known = of_frames(kind, path, &mut source, Some(&mut contacts), raised)?;
+            (known.map(|known| Contents { layout, ..known }), Some(contacts))
         }
         spec => {
             let path = spec.file().unwrap_or(Path::new(""));
-            of_frames("CSV", path, &mut CsvSource::open(path, options.rate_hz)?, raised)?
+            (of_frames("CSV", path, &mut CsvSource::open(path, options.rate_hz)?, None, raised)?, None)
         }
     };
-    Ok(known.map_or(Value::Null, |known| known.as_json()))
+    Ok(known.map_or(Value::Null, |known| {
+        let mut json = known.as_json();
+        json["fields"] = contacts.map_or(Value::Null, |contacts| contacts.as_json().into());
+        json
+    }))
 }
 
 #[pyfunction]
@@ -87,9 +121,26 @@ pub(crate) fn inspect(
     body: &PyBody,
     contact_tolerance_m: Option<f64>,
     errors: bool,
+    joints: Option<PathBuf>,
+    up: Option<&str>,
 ) -> PyResult<String> {
+    if let Some(tolerance) = contact_tolerance_m.filter(|it| !(it.is_finite() && *it > 0.0)) {
+        return Err(usage(py, format!("contact_tolerance_m should be over 0; this is {tolerance}")));
+    }
+    if up.is_some() && joints.is_none() {
+        return Err(usage(py, "up: it is for the URDF of joints=; leave it out, or give both"));
+    }
+    let up = up_of(up).or_raise(py)?;
     let seen = free(py, || -> Result<Value> {
         let body = &*body.inner;
+        let poses = match &joints {
+            None => DrawnPoses::of_own_joints(body),
+            Some(urdf) => {
+                let up = up.or_else(|| body.urdf_up()).unwrap_or(Up::Z);
+                let drawn = |robot: Kinematics| drawn_poses(&robot, body, up).map_err(|e| e.at(urdf.display()));
+                Some(Kinematics::load(urdf).and_then(drawn)?)
+            }
+        };
         let mut findings = body.findings.clone();
         let fields = FieldSet::new(body).map_or_else(
             |error| {
@@ -98,7 +149,7 @@ pub(crate) fn inspect(
             },
             |set| set.fields,
         );
-        let odd = lint_with_progress(body, &fields, DrawnPoses::of_own_joints(body).as_ref(), &mut |_| {});
+        let odd = lint_with_progress(body, &fields, poses.as_ref(), &mut |_| {});
         let (graph, outdated) = TaxelGraph::from_body(body);
         findings.extend(outdated);
         findings.extend(odd.iter().map(ToString::to_string));

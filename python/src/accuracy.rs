@@ -13,10 +13,10 @@ use somatic::internal::signal::UnitOfP;
 use somatic::internal::survey::gains::{layer_under, with_gains};
 use somatic::internal::survey::known::{KnownForce, PressedOn};
 use somatic::internal::survey::{Findings, Survey, Wishes};
-use somatic::internal::tradeoff::{CallMode, MeasureOptions, Target, Tested, software, time, usual_frames};
+use somatic::internal::tradeoff::{CallMode, MeasureOptions, Target, Tested, Words, software, time, usual_frames};
 use somatic::scene::file::{LineKeys, TextKeys};
 use somatic::source::{SourceSpec, VendorOptions, VendorSource};
-use somatic::{BackendKind, Body, Calibration, Error, Frame, RawValue};
+use somatic::{BackendKind, Body, Calibration, Error, Frame, OutputPath, RawValue};
 
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
@@ -43,6 +43,13 @@ fn tell(progress: Option<&Progress>, raised: &mut Option<PyErr>, share: f64) -> 
     raised.is_none()
 }
 
+/// What a pick should meet.
+fn target_of(within: Option<&str>, budget: Option<&str>) -> somatic::Result<Target> {
+    let within = within.map(Target::within).transpose().map_err(|e| e.at("within"))?.unwrap_or_default();
+    let budget_s = budget.map(time).transpose().map_err(|e| e.at("budget"))?;
+    Ok(within.or(Target { budget_s, ..Target::default() }))
+}
+
 #[pyfunction]
 #[pyo3(name = "_tradeoff")]
 #[expect(clippy::too_many_arguments, reason = "they are the keywords of `tradeoff`")]
@@ -65,12 +72,7 @@ pub(crate) fn tradeoff(
     let scene = PyScene::of_any(scene, py)?;
     let scene = scene.get();
     let backend = backend.map(str::parse::<BackendKind>).transpose().or_raise(py)?;
-    let asked = || -> somatic::Result<Target> {
-        let within = within.map(Target::within).transpose().map_err(|e| e.at("within"))?.unwrap_or_default();
-        let budget_s = budget.map(time).transpose().map_err(|e| e.at("budget"))?;
-        Ok(within.or(Target { budget_s, ..Target::default() }))
-    };
-    let target = asked().or_raise(py)?;
+    let target = target_of(within, budget).or_raise(py)?;
     let most = |taxels: usize| frames.unwrap_or_else(|| usual_frames(taxels));
     let Given { body, calibration, played } = Given::new(py, body, source, calibration, most)?;
     let (body, calibration) = (body.get(), calibration.as_ref().map(Py::get));
@@ -103,6 +105,25 @@ pub(crate) fn tradeoff(
         Some(text) => Ok(text),
         None => Err(interrupted(raised)),
     }
+}
+
+/// Writes the options that `pick` names, JSON of a row's words, into the scene file `path`.
+#[pyfunction]
+#[pyo3(name = "_write_pick")]
+pub(crate) fn write_pick(
+    py: Python<'_>,
+    path: PathBuf,
+    pick: &str,
+    asked_by: &str,
+    within: Option<&str>,
+    budget: Option<&str>,
+) -> PyResult<()> {
+    let written = || -> somatic::Result<()> {
+        let words: Words = serde_json::from_str(pick).map_err(|e| Error::failed(e.to_string()))?;
+        let edit = OutputPath::edit(&path)?;
+        somatic::internal::tradeoff::write_pick(edit, &words.in_scene(asked_by)?, &target_of(within, budget)?)
+    };
+    written().or_raise_of(py, &path)
 }
 
 /// The keywords of `calibrate`.

@@ -24,14 +24,19 @@ struct Reading {
     geometry: Option<Geometry>,
 }
 
+/// The axis that is called so.
+pub(crate) fn up_of(up: Option<&str>) -> Result<Option<Up>> {
+    match up {
+        None => Ok(None),
+        Some("y") => Ok(Some(Up::Y)),
+        Some("z") => Ok(Some(Up::Z)),
+        Some(other) => Err(Error::usage(format!("up: there is no '{other}'; it is 'y' or 'z'"))),
+    }
+}
+
 impl Reading {
     fn new(up: Option<&str>, package: Option<BTreeMap<String, PathBuf>>, geometry: Option<&str>) -> Result<Self> {
-        let up = match up {
-            None => None,
-            Some("y") => Some(Up::Y),
-            Some("z") => Some(Up::Z),
-            Some(other) => return Err(Error::usage(format!("up: there is no '{other}'; it is 'y' or 'z'"))),
-        };
+        let up = up_of(up)?;
         let geometry = match geometry {
             None => None,
             Some("visual") => Some(Geometry::Visual),

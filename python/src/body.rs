@@ -15,7 +15,7 @@ use somatic::{Body, OutputPath, bundled};
 use crate::array_body::{ArrayBody, LinkNames};
 use crate::arrays::{array, pose_frames, poses, structured};
 use crate::error::{OrRaise, unknown_name, usage};
-use crate::field::{PitchOfGrid, PyField};
+use crate::field::{PitchOfGrid, PyField, pitch_of};
 use crate::kinematics::{Positions, joints};
 use crate::same::{hash_of, same};
 use crate::sheet::Sheet;
@@ -113,7 +113,7 @@ impl PyBody {
         py: Python<'_>,
         rows: u32,
         columns: u32,
-        pitch_m: PitchOfGrid,
+        #[pyo3(from_py_with = pitch_of)] pitch_m: PitchOfGrid,
         name: &str,
         order: &str,
         regions: Option<(u32, u32)>,

@@ -5,6 +5,7 @@ use somatic::Body;
 use somatic::field::{Field, FieldSet};
 
 use crate::arrays::array;
+use crate::error::usage;
 
 /// A field of a body: which taxels it has, and where these are in its chart.
 ///
@@ -116,4 +117,11 @@ impl PyField {
 pub(crate) enum PitchOfGrid {
     Both(f64),
     Each(f64, f64),
+}
+
+/// The pitch that `any` is.
+pub(crate) fn pitch_of(any: &Bound<'_, PyAny>) -> PyResult<PitchOfGrid> {
+    let what =
+        "pitch_m should be a number of metres, such as 0.005, or one from row to row and one from column to column";
+    any.extract().map_err(|_| usage(any.py(), what))
 }

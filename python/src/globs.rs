@@ -1,6 +1,7 @@
 //! Globs over the names of fields, as scenes have them.
 
 use globset::GlobBuilder;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use somatic::internal::error::suggestion;
 
@@ -40,4 +41,13 @@ impl Globs {
         }
         Ok((0..fields.len()).filter(|&field| chosen[field]).collect())
     }
+}
+
+/// The name of a column between brackets: `p[0]` says what to write instead.
+pub(crate) fn by_name(name: &Bound<'_, PyAny>) -> PyResult<String> {
+    name.extract().map_err(|_| {
+        PyTypeError::new_err(
+            "columns are read by name, such as [\"total\"]; frames are cut by `between` and `by_frame`, and a loop has rows",
+        )
+    })
 }

@@ -50,7 +50,7 @@ mod native {
     #[pymodule_export]
     use about::{compare, info, inspect, outputs};
     #[pymodule_export]
-    use accuracy::{calibrate, gains, tradeoff};
+    use accuracy::{calibrate, gains, tradeoff, write_pick};
     #[pymodule_export]
     use author::author;
     #[pymodule_export]

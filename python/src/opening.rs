@@ -60,6 +60,10 @@ pub(crate) fn open(
     cut: Cut,
 ) -> somatic::Result<Opened> {
     let (own, calibration) = match spec {
+        SourceSpec::Mcap(path) if options.skip_bad => {
+            let what = "skip_bad is for CSV, exports and ROS 2 bags; leave it out here";
+            return Err(Error::usage(what).at(path.display()));
+        }
         SourceSpec::Mcap(path) => attached(path)?,
         SourceSpec::Vendor(path) => {
             let export = VendorSource::open(path, options)?;
@@ -78,8 +82,10 @@ pub(crate) fn open(
                 return Err(Error::usage("a bag has frames of a robot; give its body=").at(bag));
             };
             spec.check_options(options)?;
-            let (bag, body) = (bag.clone(), body.inner.clone());
-            let open = move || Ok::<Box<dyn Source + Send>, Error>(Box::new(BagSource::open(&bag, &body)?));
+            let (bag, body, skip_bad) = (bag.clone(), body.inner.clone(), options.skip_bad);
+            let open = move || -> somatic::Result<Box<dyn Source + Send>> {
+                Ok(Box::new(BagSource::open(&bag, &body)?.skip_bad(skip_bad)))
+            };
             let source = if cut == Cut::WHOLE { open()? } else { Box::new(Replay::new(open, cut)?) };
             return Ok((source, None, None));
         }
@@ -111,12 +117,19 @@ pub(crate) struct Keys<'a, 'py> {
     pub(crate) pitch: Option<&'a str>,
     pub(crate) unit: Option<&'a str>,
     pub(crate) layout: Option<PathBuf>,
+    pub(crate) skip_bad: bool,
 }
 
 impl Keys<'_, '_> {
+    /// The part that is read.
+    pub(crate) fn cut(&self) -> Cut {
+        let Self { from_s, to_s, .. } = self;
+        Cut { from_s: from_s.unwrap_or(Cut::WHOLE.from_s), to_s: to_s.unwrap_or(Cut::WHOLE.to_s), times: 1 }
+    }
+
     /// How tables and exports are read.
     pub(crate) fn options(&self) -> somatic::Result<VendorOptions> {
-        let Self { rate_hz, format, grid, pitch, unit, layout, .. } = self;
+        let Self { rate_hz, format, grid, pitch, unit, layout, skip_bad, .. } = self;
         Ok(VendorOptions {
             format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
             rate_hz: *rate_hz,
@@ -124,6 +137,7 @@ impl Keys<'_, '_> {
             pitch_m: pitch.map(VendorOptions::pitch_of).transpose().map_err(|e| e.at("pitch"))?,
             unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
             layout: layout.clone(),
+            skip_bad: *skip_bad,
             ..VendorOptions::default()
         })
     }
@@ -147,10 +161,9 @@ impl Opening {
     }
 
     pub(crate) fn new(py: Python<'_>, source: &Bound<'_, PyAny>, keys: Keys<'_, '_>) -> PyResult<Self> {
-        let Keys { body, from_s, to_s, .. } = keys;
         let text = text_of(source)?;
-        let body = body.map(|body| body_of(py, body)).transpose()?;
-        let cut = Cut { from_s: from_s.unwrap_or(Cut::WHOLE.from_s), to_s: to_s.unwrap_or(Cut::WHOLE.to_s), times: 1 };
+        let body = keys.body.map(|body| body_of(py, body)).transpose()?;
+        let cut = keys.cut();
         let made = || -> somatic::Result<(VendorOptions, SourceSpec)> {
             let options = keys.options()?;
             let spec = text.parse::<SourceSpec>()?.with_content(&options);

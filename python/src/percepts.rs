@@ -12,17 +12,15 @@ use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
 use somatic::internal::error::suggestion;
 use somatic::internal::renamed::new_name;
-use somatic::percept::ColumnValues;
 use somatic::sink::TableKind;
 use somatic::{Flags, Outputs, Percepts};
 
 use crate::arrays::{array, time_s};
 use crate::error::{stays_here, unknown_name, usage};
-use crate::globs::Globs;
+use crate::globs::{Globs, by_name};
 use crate::self_contacts::PySelfContacts;
 use crate::session::Run;
 use crate::stream::{Part, in_python, stream, to_arrow, to_pandas, to_polars};
-use crate::threads::free;
 use crate::touches::PyTouches;
 
 /// What the fields reported in some frames.
@@ -90,19 +88,8 @@ impl PyPercepts {
 
 #[pymethods]
 impl PyPercepts {
-    fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
-        let column = self.column(py, name)?;
-        self.once(py, name, || {
-            let [frames, fields] = self.shape();
-            let shape = [frames, fields, column.components];
-            let shape = if column.components == 1 { &shape[..2] } else { &shape[..] };
-            match free(py, || self.inner.column(column)) {
-                Some(ColumnValues::F32(values)) => array(py, values, shape),
-                Some(ColumnValues::F64(values)) => array(py, values, shape),
-                Some(ColumnValues::U32(values)) => array(py, values, shape),
-                None => Err(unknown_name(py, format!("`{name}` was not asked for; add it to the scene's outputs"))),
-            }
-        })
+    fn __getitem__(&self, py: Python<'_>, #[pyo3(from_py_with = by_name)] name: String) -> PyResult<Py<PyAny>> {
+        self.named(py, &name)
     }
 
     fn __contains__(&self, name: &str) -> bool {
@@ -117,12 +104,12 @@ impl PyPercepts {
     /// ((1, 13), None)
     #[pyo3(signature = (name, default = None))]
     fn get(&self, py: Python<'_>, name: &str, default: Option<Py<PyAny>>) -> PyResult<Option<Py<PyAny>>> {
-        if self.__contains__(name) { self.__getitem__(py, name).map(Some) } else { Ok(default) }
+        if self.__contains__(name) { self.named(py, name).map(Some) } else { Ok(default) }
     }
 
     /// Its columns, in the order of `keys`.
     fn values(&self, py: Python<'_>) -> PyResult<Vec<Py<PyAny>>> {
-        self.keys().iter().map(|name| self.__getitem__(py, name)).collect()
+        self.keys().iter().map(|name| self.named(py, name)).collect()
     }
 
     /// The names of its columns, each with the column.
@@ -132,7 +119,7 @@ impl PyPercepts {
     /// >>> {name: column.shape for name, column in p.items()}
     /// {'total': (1, 13), 'centroid': (1, 13, 2)}
     fn items(&self, py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>)>> {
-        self.keys().into_iter().map(|name| Ok((name, self.__getitem__(py, name)?))).collect()
+        self.keys().into_iter().map(|name| Ok((name, self.named(py, name)?))).collect()
     }
 
     /// The part of it from time `t0` on and before `t1`: seconds, or dates. What is not given has no end.

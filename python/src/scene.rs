@@ -1,5 +1,7 @@
 //! `Scene`: what is asked for, with the keys of scene files.
 
+use std::path::Path;
+
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyDictMethods, PyFloat, PyInt, PyString};
 use somatic::internal::error::parse_toml;
@@ -86,6 +88,12 @@ pub(crate) fn check_keys(py: Python<'_>, table: &toml::Table) -> PyResult<()> {
 impl PyScene {
     /// The scene in `text`, or an error that has the line.
     pub(crate) fn of_text(py: Python<'_>, text: &str) -> PyResult<Self> {
+        if text.ends_with(".toml") && !text.contains(['=', '\n']) {
+            return Err(usage(
+                py,
+                format!("`{text}` is a file's name, and this should be a scene: give Scene.load({text:?})"),
+            ));
+        }
         let table: toml::Table = parse_toml(text).or_raise(py)?;
         if let Some(why) = table.iter().find_map(|(key, value)| why_not(key, value)) {
             return Err(usage(py, why));
@@ -142,6 +150,14 @@ impl PyScene {
     }
 }
 
+/// What the scene file at `path` says of what is computed.
+fn table_of_file(py: Python<'_>, path: &Path) -> PyResult<toml::Table> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e)).or_raise_of(py, path)?;
+    let mut table: toml::Table = parse_toml(&text).map_err(|e| e.at(path.display())).or_raise_of(py, path)?;
+    table.retain(|key, value| key == "accuracy" || why_not(key, value).is_none());
+    Ok(table)
+}
+
 /// A scene with this key alone.
 fn alone(key: &str, value: &toml::Value) -> somatic::Result<SceneFile> {
     let table = toml::Table::from_iter([(key.to_owned(), value.clone())]);
@@ -190,9 +206,16 @@ impl PyScene {
     /// somatic_touch.InputError: no.scene.toml: no such file or directory
     #[staticmethod]
     fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
-        let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, &e)).or_raise_of(py, &path)?;
-        let mut table: toml::Table = parse_toml(&text).map_err(|e| e.at(path.display())).or_raise_of(py, &path)?;
-        table.retain(|key, value| key == "accuracy" || why_not(key, value).is_none());
+        Self::of_table(py, &table_of_file(py, &path)?)
+    }
+
+    /// The same without a wish, which `tradeoff` is about to replace.
+    #[staticmethod]
+    fn _load_without_wish(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
+        let mut table = table_of_file(py, &path)?;
+        if let Some(accuracy) = table.get_mut("accuracy").and_then(toml::Value::as_table_mut) {
+            accuracy.retain(|key, _| !["centroid", "orientation", "budget"].contains(&key));
+        }
         Self::of_table(py, &table)
     }
 

@@ -11,6 +11,7 @@ use somatic::{Percepts, SelfContact};
 
 use crate::arrays::array;
 use crate::error::{stays_here, unknown_name};
+use crate::globs::by_name;
 use crate::session::Run;
 use crate::stream::{Part, in_python, stream, to_arrow, to_pandas, to_polars};
 
@@ -54,6 +55,25 @@ impl PySelfContacts {
         self.rows().for_each(|row| of(row, &mut values));
         let shape = [values.len() / width, width];
         array(py, values, if width == 1 { &shape[..1] } else { &shape })
+    }
+
+    /// The column called `name`.
+    fn named(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
+        match name {
+            "frame" => self.frame(py),
+            "t" => self.t(py),
+            "id" => self.id(py),
+            "link" => self.link(py),
+            "touch" => self.touch(py),
+            "total" => self.total(py),
+            "position" => self.position(py),
+            "distance" => self.distance(py),
+            "angle" => self.angle(py),
+            _ => {
+                let near = suggestion(name, COLUMNS);
+                Err(unknown_name(py, format!("self-contacts have no column `{name}`; {near}")))
+            }
+        }
     }
 }
 
@@ -127,22 +147,8 @@ impl PySelfContacts {
     }
 
     /// A column by its name, such as `contacts["distance"]`.
-    fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
-        match name {
-            "frame" => self.frame(py),
-            "t" => self.t(py),
-            "id" => self.id(py),
-            "link" => self.link(py),
-            "touch" => self.touch(py),
-            "total" => self.total(py),
-            "position" => self.position(py),
-            "distance" => self.distance(py),
-            "angle" => self.angle(py),
-            _ => {
-                let near = suggestion(name, COLUMNS);
-                Err(unknown_name(py, format!("self-contacts have no column `{name}`; {near}")))
-            }
-        }
+    fn __getitem__(&self, py: Python<'_>, #[pyo3(from_py_with = by_name)] name: String) -> PyResult<Py<PyAny>> {
+        self.named(py, &name)
     }
 
     /// The names of its columns.
@@ -158,12 +164,12 @@ impl PySelfContacts {
     /// The column called `name`; `default` where there is none.
     #[pyo3(signature = (name, default = None))]
     fn get(&self, py: Python<'_>, name: &str, default: Option<Py<PyAny>>) -> PyResult<Option<Py<PyAny>>> {
-        if self.__contains__(name) { self.__getitem__(py, name).map(Some) } else { Ok(default) }
+        if self.__contains__(name) { self.named(py, name).map(Some) } else { Ok(default) }
     }
 
     /// The names of its columns, each with the column.
     fn items(&self, py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>)>> {
-        self.keys().into_iter().map(|name| Ok((name, self.__getitem__(py, name)?))).collect()
+        self.keys().into_iter().map(|name| Ok((name, self.named(py, name)?))).collect()
     }
 
     fn __iter__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

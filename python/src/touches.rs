@@ -13,6 +13,7 @@ use somatic::{Percepts, TOUCH_COLUMNS, Touch, TouchColumn};
 
 use crate::arrays::array;
 use crate::error::{stays_here, unknown_name, usage};
+use crate::globs::by_name;
 use crate::session::Run;
 use crate::stream::{Part, in_python, stream, to_arrow, to_pandas, to_polars};
 use crate::touch_parts::{taxels, wrenches};
@@ -74,6 +75,43 @@ impl PyTouches {
         let rows = values.len() / width;
         let shape = [rows, width];
         array(py, values, if width == 1 { &shape[..1] } else { &shape })
+    }
+
+    /// The column called `name`.
+    fn named(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
+        match name {
+            "frame" => return self.frame(py),
+            "t" => return self.t(py),
+            "link" => return Ok(self.link().into_pyobject(py)?.into_any().unbind()),
+            "id" => return self.id(py),
+            "age" => return self.age(py),
+            "total" => return self.total(py),
+            "active" => return self.active(py),
+            "position" => return self.position(py),
+            "flags" => return self.flags(py),
+            _ => {}
+        }
+        let outputs = self.run.plan.touch_outputs().unwrap_or_default();
+        let Some(column) = outputs.columns().find(|column| column.name == name) else {
+            let asked = match TOUCH_COLUMNS.iter().find(|column| column.name == name) {
+                Some(column) => format!(
+                    "was not asked for; add `touches.{}` to the outputs",
+                    column.output.names().collect::<String>()
+                ),
+                None => match new_name(name, TOUCH_COLUMNS.iter().map(|column| column.name)) {
+                    Some(new) => return Err(unknown_name(py, format!("`{name}` is `{new}` now"))),
+                    None => {
+                        let near = nearest(name, TOUCH_COLUMNS.iter().map(|column| column.name));
+                        let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+                        format!("does not exist; there are: {}{near}", self.keys()[5..].join(", "))
+                    }
+                },
+            };
+            return Err(unknown_name(py, format!("the quantity `{name}` of touches {asked}")));
+        };
+        self.column(py, column.components, |(_, touch), to| {
+            to.extend_from_slice(&column.value(touch).unwrap_or([f64::NAN; 3])[..column.components]);
+        })
     }
 }
 
@@ -169,40 +207,8 @@ impl PyTouches {
     /// A quantity of each touch by its name, such as `touches["principal_axis"]` or `touches["fit_place"]`, float64 [touches] or
     /// [touches, components]; NaN where it is absent. `fit_kind` is 0 for a point, 1 for a line, 2 for a segment and 3 for a blob.
     /// What is an attribute, such as `id`, is there by its name, too.
-    fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
-        match name {
-            "frame" => return self.frame(py),
-            "t" => return self.t(py),
-            "link" => return Ok(self.link().into_pyobject(py)?.into_any().unbind()),
-            "id" => return self.id(py),
-            "age" => return self.age(py),
-            "total" => return self.total(py),
-            "active" => return self.active(py),
-            "position" => return self.position(py),
-            "flags" => return self.flags(py),
-            _ => {}
-        }
-        let outputs = self.run.plan.touch_outputs().unwrap_or_default();
-        let Some(column) = outputs.columns().find(|column| column.name == name) else {
-            let asked = match TOUCH_COLUMNS.iter().find(|column| column.name == name) {
-                Some(column) => format!(
-                    "was not asked for; add `touches.{}` to the outputs",
-                    column.output.names().collect::<String>()
-                ),
-                None => match new_name(name, TOUCH_COLUMNS.iter().map(|column| column.name)) {
-                    Some(new) => return Err(unknown_name(py, format!("`{name}` is `{new}` now"))),
-                    None => {
-                        let near = nearest(name, TOUCH_COLUMNS.iter().map(|column| column.name));
-                        let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-                        format!("does not exist; there are: {}{near}", self.keys()[5..].join(", "))
-                    }
-                },
-            };
-            return Err(unknown_name(py, format!("the quantity `{name}` of touches {asked}")));
-        };
-        self.column(py, column.components, |(_, touch), to| {
-            to.extend_from_slice(&column.value(touch).unwrap_or([f64::NAN; 3])[..column.components]);
-        })
+    fn __getitem__(&self, py: Python<'_>, #[pyo3(from_py_with = by_name)] name: String) -> PyResult<Py<PyAny>> {
+        self.named(py, &name)
     }
 
     /// Arrow's C stream of the table that docs/how-to/tables.md describes.
@@ -234,12 +240,12 @@ impl PyTouches {
     /// The quantity called `name`; `default` where there is none.
     #[pyo3(signature = (name, default = None))]
     fn get(&self, py: Python<'_>, name: &str, default: Option<Py<PyAny>>) -> PyResult<Option<Py<PyAny>>> {
-        if self.__contains__(name) { self.__getitem__(py, name).map(Some) } else { Ok(default) }
+        if self.__contains__(name) { self.named(py, name).map(Some) } else { Ok(default) }
     }
 
     /// The names of its quantities, each with its values.
     fn items(&self, py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>)>> {
-        self.keys().into_iter().map(|name| Ok((name, self.__getitem__(py, name)?))).collect()
+        self.keys().into_iter().map(|name| Ok((name, self.named(py, name)?))).collect()
     }
 
     /// The unit of the quantity called `name`, such as 'm' or 'Pa'; '1' where it has none.

@@ -7,16 +7,15 @@ use std::path::Path;
 
 use clap::Args;
 use serde_json::Value;
-use somatic::internal::contents::{Contents, bag_as_json};
+use somatic::internal::contents::{Contacts, Contents, bag_as_json};
 use somatic::internal::recording::BagSurvey;
 use somatic::internal::setup::attached;
 use somatic::internal::setup::{open_mapped, source_of};
 use somatic::internal::source::Layout;
 use somatic::recording::Reader;
 use somatic::source::{CsvSource, Source, SourceSpec, VendorSource};
-use somatic::{Body, Calibration, Error, Frame, Result};
+use somatic::{Body, Calibration, Error, Result};
 
-use self::contacts::Contacts;
 use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::scene::{in_flags, said};
@@ -65,7 +64,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
             }
             let mut known = Contents::of_mcap(&path, &mut Reader::open(&path)?, |share| bar.show(share))?;
             // What is attached may be damaged, and the rest is described all the same.
-            let contacts = recorded(&path).unwrap_or_else(|e| {
+            let contacts = Contacts::of_mcap(&path, &said(), |_| true).unwrap_or_else(|e| {
                 known.losses.push(e.to_string());
                 None
             });
@@ -136,25 +135,6 @@ fn of_frames(
     Ok(known.expect("it goes on to the end"))
 }
 
-/// The contacts in the recording at `path`, if it has its body.
-fn recorded(path: &Path) -> Result<Option<Contacts>> {
-    let Some((name, bytes)) = attached::body(path)? else { return Ok(None) };
-    let Ok(body) = Body::from_bytes(&name, &bytes) else { return Ok(None) };
-    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let calibration = attached::calibration(path, &said())?.map(|text| Calibration::parse(&text, &ids)).transpose();
-    let mut reader = Reader::open(path)?;
-    // What cannot be run is described all the same.
-    let Ok(Ok(mut contacts)) = calibration.map(|calibration| Contacts::new(&body, calibration, &reader)) else {
-        return Ok(None);
-    };
-    let mut frame = Frame::missing(0.0, reader.taxels().len());
-    while reader.next_frame(&mut frame)? {
-        contacts.see(&frame)?;
-    }
-    contacts.finish()?;
-    Ok(Some(contacts))
-}
-
 /// The panels of an export, in words.
 fn panels(layout: &Layout) -> String {
     let words = layout.panels.iter().map(|panel| format!("{} {}", panel.name, panel.cells.len()));
@@ -203,7 +183,7 @@ fn text(name: &str, known: &Contents, contacts: Option<&Contacts>) -> String {
     for file in attached {
         line("attached", format!("{} ({}, {})", file.name, file.media_type, size_words(file.bytes)));
     }
-    text += &contacts.map_or(String::new(), Contacts::text);
+    text += &contacts.map_or(String::new(), contacts::text);
     if !survey.topics.is_empty() {
         let mut table = plain(["topic", "encoding", "messages", "size"], 2..4);
         for topic in &survey.topics {

@@ -2,7 +2,6 @@
 
 mod measured;
 mod settled;
-mod write_scene;
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -14,6 +13,7 @@ use somatic::internal::setup::bodies::load_body;
 use somatic::internal::setup::{FilesRead, Setup};
 use somatic::internal::tradeoff::{
     CallMode, Errors, Measurement, Pick, Report, Store, Tested, TrueErrors, plot_png, plot_svg, software, usual_frames,
+    write_pick,
 };
 use somatic::{BackendKind, Engine, Error, OutputPath, Result};
 
@@ -157,7 +157,7 @@ fn tradeoff_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     let words = in_words(pick.row);
     say(&format!("{} for {}: {combination}; {words}", picked(way), target.words()));
     if let Some((path, edit)) = scene {
-        write_scene::write(edit, &settled::of_row(pick.row, &report)?, &target)?;
+        write_pick(edit, &pick.row.words.in_scene(&report.asked_by)?, &target)?;
         say(&format!("written into {}", path.display()));
     }
     Ok(DONE)

@@ -1,10 +1,12 @@
 //! What is in a recording, and which quantities a run can give: for `somatic info` and `somatic outputs`, and for Python.
 
 mod bag;
+mod contacts;
 mod quantities;
 mod recording;
 
 pub use self::bag::{bag_as_json, read_as, seconds_of};
+pub use self::contacts::{Contacts, FieldContacts};
 pub use self::quantities::{Quantity, of_fields, of_touches};
 pub use self::recording::Contents;
 

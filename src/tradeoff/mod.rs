@@ -15,6 +15,7 @@ mod target;
 mod tested;
 mod touches;
 mod truth;
+mod write_scene;
 
 use std::fmt;
 
@@ -30,6 +31,7 @@ pub use target::Pick;
 #[doc(hidden)]
 pub use tested::{Tested, software, usual_frames};
 pub use touches::SimulatedTouches;
+pub use write_scene::write_pick;
 
 use crate::backend::BackendKind;
 use crate::percept::Outputs;
@@ -190,6 +192,35 @@ pub struct Words {
     pub cadence: String,
 }
 
+impl Words {
+    /// The combination.
+    ///
+    /// # Errors
+    /// The words are of another version.
+    pub fn combination(&self) -> crate::Result<Combination> {
+        let Self { backend, arithmetic, charts, orientation_by, coverage, cadence } = self;
+        let knobs = Knobs::default()
+            .arithmetic((backend != "reference").then(|| arithmetic.parse()).transpose()?)
+            .charts(charts.parse()?)
+            .orientation_by(orientation_by.parse()?)
+            .coverage(coverage.parse()?)
+            .cadence(cadence.parse()?);
+        Ok(Combination { backend: backend.parse()?, knobs })
+    }
+
+    /// The combination as a scene would say it: an orientation that is asked for by name, `asked_by`, stays as it was asked for.
+    ///
+    /// # Errors
+    /// The words are of another version.
+    pub fn in_scene(&self, asked_by: &str) -> crate::Result<Combination> {
+        let mut combination = self.combination()?;
+        if self.orientation_by == asked_by {
+            combination.knobs.orientation_by = OrientationBy::AsAsked;
+        }
+        Ok(combination)
+    }
+}
+
 /// Time and errors of a combination.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
@@ -220,14 +251,7 @@ impl Measurement {
     /// # Errors
     /// Its words are of another version.
     pub fn combination(&self) -> crate::Result<Combination> {
-        let Words { backend, arithmetic, charts, orientation_by, coverage, cadence } = &self.words;
-        let knobs = Knobs::default()
-            .arithmetic((backend != "reference").then(|| arithmetic.parse()).transpose()?)
-            .charts(charts.parse()?)
-            .orientation_by(orientation_by.parse()?)
-            .coverage(coverage.parse()?)
-            .cadence(cadence.parse()?);
-        Ok(Combination { backend: backend.parse()?, knobs })
+        self.words.combination()
     }
 
     /// How far it is off, in one number: a degree counts like a millimetre; at a distance of 57 mm they are equal.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pathlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from conftest import ROOT
 import somatic_touch as st
 
 
-def session(path: pathlib.Path, ids: Sequence[int] = range(4), at_once: bool = False) -> pathlib.Path:
+def session(path: pathlib.Path, ids: Sequence[int] | np.ndarray = range(4), at_once: bool = False) -> pathlib.Path:
     """Nothing for three seconds, then each sensor in its turn, or all at once, as a 10-bit converter gives it."""
     random = np.random.default_rng(2)
     t, sensors = np.arange(900) / 100, len(ids)
@@ -92,11 +93,35 @@ def test_a_trade_has_the_commands_rows(somatic, touch: st.Recording) -> None:
     assert table["centroid_mm_p95"].notna().all()
     # What was picked is a scene.
     st.Engine(st.Body.bundled("hand"), {**scene, **found.scene}).step(0.0, touch.values[0])
+    front = st.tradeoff(scene=scene, source=touch, backend="cpu", seconds=0.02, frames=160, all=False)
+    assert front["front"].all() and 0 < len(front) < len(found)
     impossible = st.tradeoff(scene=scene, source=touch, backend="cpu", seconds=0.05, frames=160, budget="1 ns")
     assert impossible.missed and "times" in impossible.missed[0]
     for wrong in ({"seconds": 0}, {"within": "3 kg"}, {"backend": "reference"}):
         with pytest.raises(st.UsageError):
             st.tradeoff(**{"seconds": 0.05, "frames": 160, **wrong})  # type: ignore[arg-type]
+
+
+@pytest.mark.once
+def test_a_pick_is_written_into_a_scene_file(touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    path = tmp_path / "hand.scene.toml"
+    text = "# Mine.\noutputs = [\"centroid\"] # where\n\n[accuracy]\ncentroid = \"3 mm\"\n"
+    path.write_text(text)
+    small: dict[str, Any] = {"source": touch, "backend": "cpu", "seconds": 0.02, "frames": 40, "write": path}
+    with pytest.warns(UserWarning, match="hand.scene.toml: it stays as it was: no options meet"):
+        st.tradeoff(**small, budget="1 ns")
+    assert path.read_text() == text
+    found = st.tradeoff(**small)
+    assert found.pick is not None and not found.missed
+    written = path.read_text()
+    assert written.startswith("# Mine.\noutputs = [\"centroid\"] # where\n") and "centroid = " not in written
+    assert f'backend = "{found.pick["backend"]}"' in written
+    assert st.Scene.load(path) == st.Scene({"outputs": ["centroid"], **found.scene})
+    # The wish has gone with the first pick.
+    with pytest.raises(st.UsageError, match="write= needs within= or budget="):
+        st.tradeoff(**small)
+    with pytest.raises(st.InputError, match="no such file"):
+        st.tradeoff(**{**small, "write": tmp_path / "none.toml"}, within="3 mm")
 
 
 def test_a_table_of_columns() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pathlib
 import re
@@ -24,6 +25,42 @@ def test_all_that_the_command_lists_is_callable(somatic) -> None:
     assert listed - ALONE - callables == set()
 
 
+ELSEWHERE = {
+    "info": "json",
+    "convert": "output",
+    "plot": "output calibration",
+    "author": "output force json errors compare grid pitch ids cells",
+    "inspect": "json strict",
+    "render": "output force source",
+    "calibrate": "output force json plot",
+    "plan": "json schema",
+    "tradeoff": "json plot",
+    "simulate": "output force truth",
+    "bench": "sensors fields members wide local outputs calls seed dump force json",
+    "outputs": "json",
+    "run": "describe for summary table",
+    "view": "beside for",
+}
+"""Flags without a keyword: what Python gives back instead of writing it, has as a function, a method or a type of its own, or leaves to the command."""
+
+
+@pytest.mark.once
+def test_flags_of_a_command_are_keywords(somatic) -> None:
+    schema = json.loads((ROOT / "docs" / "scene.schema.json").read_text())
+    of_scene = {key for part in (schema, *schema["$defs"].values()) for key in part.get("properties", {})} | {"force", "speed", "within"}
+    reading = inspect.signature(st.read).parameters
+    for command, others in ELSEWHERE.items():
+        flags = set(re.findall(r"^ {2,6}(?:-\w, )?--([a-z-]+)", somatic(command, "--help"), re.MULTILINE)) - {"help"}
+        keywords = set(inspect.signature(getattr(st, command)).parameters)
+        keywords |= set(reading) if "reading" in keywords else set()
+        # A run's flags are keys of its scene.
+        keywords |= of_scene if {"letters", "tare"} <= flags else set()
+        words = {flag: flag.replace("-", "_") for flag in flags}
+        missing = {flag for flag, word in words.items() if not keywords & {word + end for end in ("", "s", "_s", "_hz", "_m")}}
+        assert missing - set(others.split()) == set(), command
+        assert set(others.split()) <= flags, f"{command} has lost a flag"
+
+
 @pytest.mark.once
 def test_info_is_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
     assert st.convert(touch, tmp_path / "touch.mcap") == 280
@@ -34,16 +71,21 @@ def test_info_is_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Pa
         known = st.info(tmp_path / name)
         for key in ("kind", "bytes", "taxels", "frames", "start", "duration", "rate_hz", "gaps", "backwards", "losses"):
             assert known[key] == pytest.approx(told[key]), key
-    assert known["frames"] == 280
+        assert known["fields"] == told["fields"]
+    assert known["frames"] == 280 and known["fields"] is None
+    (palm,) = [field for field in st.info(tmp_path / "touch.mcap")["fields"] if field["field"] == "hand/palm"]
+    assert palm["contacts"] > 0 and palm["load_peak"] >= palm["load_mean"] > 0 and palm["load_unit"] == "count"
     with pytest.raises(st.InputError, match="no-such"):
         st.info("no-such.csv")
 
 
 @pytest.mark.once
 def test_frames_come_through_bit_for_bit(touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    assert touch.body is not None
     st.convert(touch, tmp_path / "touch.mcap", calibration=st.Calibration("[all]\ngain = 2", touch.body))
     again = st.read(tmp_path / "touch.mcap")
-    assert again.values.tobytes() == touch.values.tobytes() and again.calibration.text == "[all]\ngain = 2"
+    assert again.values.tobytes() == touch.values.tobytes() and again.calibration is not None
+    assert again.calibration.text == "[all]\ngain = 2"
     with pytest.raises(st.SomaticError, match="exists"):
         st.convert(touch, tmp_path / "touch.mcap")
     with pytest.warns(UserWarning, match="no place for fields"):
@@ -85,7 +127,7 @@ def test_exports_are_described_and_converted(somatic, tmp_path: pathlib.Path) ->
     keys = {"grid": "4x3", "pitch": "10mm", "rate_hz": 50, "format": "matrix", "unit": "kPa"}
     flags = ("--grid", "4x3", "--pitch", "10mm", "--rate", 50, "--format", "matrix", "--unit", "kPa")
     told, known = json.loads(somatic("info", plain, *flags, "--json")), st.info(plain, **keys)
-    assert known == {key: value for key, value in told.items() if key != "fields"}
+    assert known == told
     assert (known["frames"], known["unit"], known["panels"][0]["taxels"]) == (2, "kPa", 12)
     somatic("convert", plain, tmp_path / "theirs.csv", *flags)
     with pytest.warns(UserWarning, match="what is attached"):
@@ -94,9 +136,61 @@ def test_exports_are_described_and_converted(somatic, tmp_path: pathlib.Path) ->
 
 
 @pytest.mark.once
+def test_poses_of_a_urdf_are_looked_at(somatic, tmp_path: pathlib.Path) -> None:
+    robot = ROOT / "examples" / "robots" / "arm.urdf"
+    body = st.author(robot, taxels=60, seed=1)
+    body.save(tmp_path / "arm.glb")
+    for keys, flags in (({}, ()), ({"joints": robot}, ("--joints", robot)), ({"joints": robot, "up": "z"}, ("--joints", robot, "--up", "z"))):
+        told = json.loads(somatic("inspect", tmp_path / "arm.glb", *flags, "--json"))
+        assert st.inspect(body, **keys)["findings"] == told["findings"]  # type: ignore[arg-type]
+    with pytest.raises(st.SomaticError, match="arm.urdf"):
+        st.inspect("hand", joints=robot)
+    with pytest.raises(st.UsageError, match="give both"):
+        st.inspect(body, up="z")
+    with pytest.raises(st.UsageError, match="contact_tolerance_m should be over 0"):
+        st.inspect(body, contact_tolerance_m=0)
+
+
+@pytest.mark.once
+def test_bad_rows_are_skipped_where_that_is_asked_for(tmp_path: pathlib.Path) -> None:
+    path, body = tmp_path / "bad.csv", st.Body.grid(1, 2, 0.01)
+    path.write_text("t,0,1\n0,1,2\n0.1,x,4\n0.2,5,6\n")
+    with pytest.raises(st.InputError, match="bad.csv"):
+        st.read(path, body=body)
+    kept = st.read(path, body=body, skip_bad=True)
+    assert kept.t.tolist() == [0.0, 0.2] and len(kept.losses) == 1
+    with st.open(path, body=body, skip_bad=True) as parts:
+        assert [len(part) for part in parts] == [2] and len(parts.losses) == 1
+    assert st.run(path, tmp_path / "skipped.csv", body=body, skip_bad=True)["frames"] == 2
+    st.convert(kept, tmp_path / "kept.mcap")
+    with pytest.raises(st.UsageError, match="skip_bad is for"):
+        st.read(tmp_path / "kept.mcap", skip_bad=True)
+
+
+@pytest.mark.once
+def test_percepts_in_lines_of_json_are_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    with pytest.warns(UserWarning, match="no place for what is attached"):
+        st.convert(touch, tmp_path / "touch.csv")
+    somatic(
+        "run", "--quiet", "--source", tmp_path / "touch.csv", "--outputs", "total,touches", "--backend", "cpu", "--from", 2, "--to", 3, "--sink",
+        f"ndjson:{tmp_path / 'theirs.ndjson'}",
+    )
+    scene = {"outputs": ["total", "touches"], "backend": "cpu"}
+    part = st.read(tmp_path / "touch.csv", body="hand", from_s=2, to_s=3)
+    st.write(part.engine(scene).process(part.t, part.values), f"ndjson:{tmp_path / 'mine.ndjson'}")
+    st.run(tmp_path / "touch.csv", f"ndjson:{tmp_path / 'run.ndjson'}", body=touch.body, scene=scene, from_s=2, to_s=3)
+    theirs = (tmp_path / "theirs.ndjson").read_bytes()
+    assert theirs.count(b"\n") > 10 and (tmp_path / "mine.ndjson").read_bytes() == theirs == (tmp_path / "run.ndjson").read_bytes()
+
+
+@pytest.mark.once
 def test_plots_are_drawn(touch: st.Recording, tmp_path: pathlib.Path) -> None:
     st.plot([touch, "hand"], tmp_path / "two.png", fields="hand/palm*")
     assert (tmp_path / "two.png").read_bytes()[:4] == b"\x89PNG"
+    with pytest.warns(UserWarning, match="no place for what is attached"):
+        st.convert(touch, tmp_path / "touch.csv")
+    st.plot(tmp_path / "touch.csv", tmp_path / "part.svg", body="hand", from_s=2, to_s=3)
+    assert (tmp_path / "part.svg").read_text()[:4] == "<svg"
     for wrong in (tmp_path / "two.png", tmp_path / "two.pdf"):
         with pytest.raises(st.SomaticError):
             st.plot(touch, wrong)

@@ -49,6 +49,17 @@ def test_an_unknown_name_is_a_key_error_that_names_the_nearest(p: st.Percepts, a
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
+def test_what_is_given_in_the_wrong_form_is_told_the_right_one(p: st.Percepts, hand: st.Body) -> None:
+    for columns in (p, p.touches):
+        with pytest.raises(TypeError, match=r'columns are read by name, such as \["total"\]'):
+            columns[0]  # type: ignore[index,call-overload]
+    with pytest.raises(st.UsageError, match="pitch_m should be a number of metres"):
+        st.Body.grid(3, 4, "10 mm")  # type: ignore[arg-type]
+    assert len(st.Body.grid(3, 4, (0.01, 0.02)).taxels) == len(st.Body.grid(3, 4, 1).taxels) == 12
+    with pytest.raises(st.UsageError, match=r'is a file\'s name.*Scene.load\("robot.scene.toml"\)'):
+        st.Engine(hand, "robot.scene.toml")
+
+
 def test_percepts_are_used_as_a_dict(p: st.Percepts) -> None:
     assert list(p) == p.keys() == [name for name, _ in p.items()] and len(p.values()) == len(p)
     assert all(column is p[name] for name, column in p.items())
@@ -265,7 +276,7 @@ def test_one_date_and_spans_of_time() -> None:
     frame = [0.0] * 40
     assert engine.step(MIDNIGHT, frame).t.tolist() == [1767312000.0]
     assert engine.step(np.datetime64("2026-01-02T00:00:01"), frame).t.tolist() == [1767312001.0]
-    assert engine.step(pd.Timestamp("2026-01-02T00:00:02", tz="UTC"), frame).t.tolist() == [1767312002.0]
+    assert engine.step(pd.Timestamp("2026-01-02T00:00:02", tz="UTC"), frame).t.tolist() == [1767312002.0]  # type: ignore[arg-type]
     spans = np.array([0, 1500], "timedelta64[ms]")
     assert engine.process(spans, np.zeros((2, 40))).t.tolist() == [0, 1.5]
     for t in ([MIDNIGHT, pd.NaT], np.array(["2026", "NaT"], "M8[s]")):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -68,7 +70,7 @@ def test_other_masks_are_refused_with_the_shape(mask: object) -> None:
         ({"hnad": [0, 0, 0, 0, 0, 0, 1]}, "did you mean `hand`"),
     ],
 )
-def test_other_poses_are_refused_and_say_why(pose: object, why: str) -> None:
+def test_other_poses_are_refused_and_say_why(pose: Any, why: str) -> None:
     with pytest.raises(st.SomaticError, match=why):
         ENGINE.process([0.0, 0.1], np.zeros((2, 40), np.float32), pose=pose)
 

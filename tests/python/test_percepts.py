@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import pathlib
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def compare(p: st.Percepts, text: str) -> int:
         assert [field["field"] for field in line["fields"]] == p.fields
         for number, field in enumerate(line["fields"]):
             assert field["contact"] == p.contact[index, number]
-            flags = [flag.name.lower() for flag in st.Flags(p.flags[index, number])]
+            flags = [str(flag.name).lower() for flag in st.Flags(p.flags[index, number])]
             assert flags == field["flags"]
             for name in p.keys():
                 column, present = p[name], p.present(name)
@@ -46,7 +47,7 @@ def compare(p: st.Percepts, text: str) -> int:
             identity, total, active, link, position, row = next(touch_rows)
             assert (identity, active, link) == (touch["id"], touch["active"], touch["link"])
             assert total == touch["total"] and np.array_equal(position, touch["position"])
-            assert [flag.name.lower() for flag in st.TouchFlags(touches.flags[row])] == touch["flags"]
+            assert [str(flag.name).lower() for flag in st.TouchFlags(touches.flags[row])] == touch["flags"]
             for name in ("principal_axis", "velocity", "spread", "anisotropy"):
                 got = columns[name][row]
                 assert np.isnan(got).all() if name not in touch else np.array_equal(got, touch[name]), (index, name)
@@ -60,7 +61,7 @@ def backend(request) -> str:
     return request.getfixturevalue("gpu") if request.param == "gpu" else request.param
 
 
-def test_the_bundled_touch(somatic, touch: st.Recording, backend: str) -> None:
+def test_the_bundled_touch(somatic, touch: st.Recording, backend: Any) -> None:
     text = somatic("run", "--quiet", "--backend", backend, "--outputs", ",".join(ALL), "--all-fields", "--sink", "-")
     p = touch.engine({"outputs": ALL}, backend=backend).process(touch.t, touch.values)
     assert compare(p, text) > 10_000
@@ -83,7 +84,7 @@ def test_touches_have_fits(somatic) -> None:
     assert len(rows) == len(touches) > 150
     told = 0
     for index, row in enumerate(rows):
-        assert [flag.name.lower() for flag in st.TouchFlags(touches.flags[index])] == row["flags"]
+        assert [str(flag.name).lower() for flag in st.TouchFlags(touches.flags[index])] == row["flags"]
         for name in ["fit_place", "fit_direction", "fit_angle_sigma"]:
             got = touches[name][index]
             assert np.array_equal(got, row[name]) if name in row else np.isnan(got).all()
@@ -96,7 +97,7 @@ def test_touches_have_fits(somatic) -> None:
         percepts["fit_place"]
 
 
-def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:
+def test_a_grid(somatic, tmp_path: pathlib.Path, backend: Any) -> None:
     mat = st.Body.grid(13, 7, 0.01, name="sheet", regions=(3, 2))
     mat.save(tmp_path / "sheet.glb")
     t, values = pressed(mat, 90)
@@ -114,7 +115,7 @@ def test_a_grid(somatic, tmp_path: pathlib.Path, backend: str) -> None:
     assert np.array_equal(read.values, values) and np.array_equal(read.t, t)
 
 
-def test_a_grasp(somatic, tmp_path: pathlib.Path, backend: str) -> None:
+def test_a_grasp(somatic, tmp_path: pathlib.Path, backend: Any) -> None:
     grasps = sorted((DATA / "recordings" / "icub_grasp").glob("*.csv"))
     if not grasps:
         pytest.skip(f"no grasps in {DATA}")
@@ -134,7 +135,7 @@ def test_a_grasp(somatic, tmp_path: pathlib.Path, backend: str) -> None:
     assert compared > 500
 
 
-def test_percepts_do_not_depend_on_the_cut(touch: st.Recording, backend: str) -> None:
+def test_percepts_do_not_depend_on_the_cut(touch: st.Recording, backend: Any) -> None:
     whole = touch.engine({"outputs": ALL}, backend=backend).process(touch.t, touch.values)
     for cut in (1, 7, 64):
         engine = touch.engine({"outputs": ALL}, backend=backend)
@@ -158,7 +159,7 @@ def test_a_scene_file_gives_what_the_command_gives(somatic, touch: st.Recording)
     lines = [json.loads(line) for line in text.splitlines()]
     assert [field["field"] for field in lines[0]["fields"]] == p.fields
     got = [[field.get("centroid", [np.nan] * 2) for field in line["fields"]] for line in lines]
-    assert np.array_equal(np.float32(got), p["centroid"], equal_nan=True)
+    assert np.array_equal(np.array(got, np.float32), p["centroid"], equal_nan=True)
 
 
 def test_missing_and_faulty_values(hand: st.Body) -> None:
@@ -222,7 +223,7 @@ def test_an_old_name_gives_an_error_with_the_new_one(touch: st.Recording) -> Non
     with pytest.raises(st.UsageError, match="`axis` is `principal_axis` now"):
         p["axis"]
     with pytest.raises(AttributeError, match="`contacts` is `self_contacts` now"):
-        p.contacts
+        p.contacts  # type: ignore[attr-defined]
     with pytest.raises(AttributeError, match="no attribute 'banana'"):
-        p.banana
+        p.banana  # type: ignore[attr-defined]
     assert not hasattr(p, "__array__")

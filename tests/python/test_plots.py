@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import json
 import sys
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -105,8 +108,65 @@ def test_bodies_are_taxels_in_the_world(hand: st.Body) -> None:
         hand.plot(ax=plt.figure().add_subplot())
 
 
+def test_compared_layouts_are_bars(hand: st.Body) -> None:
+    told = st.compare(st.Body.grid(4, 4, 0.01, name="coarse"), st.Body.grid(8, 8, 0.005, name="fine"), touches=60)
+    ax = told.plot()
+    layouts = told["layouts"]
+    errors = [layout["place"] for layout in layouts] + [layout["ideal"]["place"] for layout in layouts]
+    drawn = sorted(bar.get_height() for bar in ax.patches)
+    assert drawn == pytest.approx(sorted(1e3 * each[name] for each in errors for name in ("median", "p95")))
+    assert [text.get_text() for text in ax.get_xticklabels()] == [layouts[0]["body"], "ideal skin", layouts[1]["body"], "ideal skin"]
+    assert told.plot("axis").get_ylabel() == "axis off by [degrees]" and json.loads(json.dumps(told)) == told
+    with pytest.raises(st.UsageError, match="plot one of place, axis, force"):
+        told.plot("plaice")  # type: ignore[arg-type]
+
+
+def test_calibrations_are_where_sensors_rest_and_how_far_they_go() -> None:
+    sensors = [
+        {"taxel": 3, "baseline": 100.0, "noise": 1.0, "dead_band": 4.0, "travel": 200.0},
+        {"taxel": 5, "baseline": 90.0, "noise": 1.0, "dead_band": 4.0, "travel": None},
+    ]
+    found = st.Calibrated({"rows": sensors, "invert": True, "raw_range": [0, 1023]}, st.Calibration("", st.Body.grid(1, 2, 0.01)))
+    ax = found.plot()
+    pressed, bands = ([segment.tolist() for segment in lines.get_segments()] for lines in ax.collections)
+    assert pressed == [[[3, 100], [3, -100]]] and bands == [[[3, 96], [3, 104]], [[5, 86], [5, 94]]]
+    drawn = lines(ax)
+    assert drawn["at rest"].tolist() == [100] and drawn["never pressed, or lost"].tolist() == [90]
+    gains = [{"taxel": 0, "gain": 1.25, "pressed": 4}, {"taxel": 1, "gain": None, "pressed": 0}]
+    ax = st.Calibrated({"rows": gains}, found.calibration).plot()
+    assert lines(ax)["found from touches"].tolist() == [1.25] and ax.get_ylabel() == "gain"
+
+
+def row(way: str, us: float, off: float, front: bool, by: str = "as-asked") -> dict[str, Any]:
+    errors = {"compared": 3, "rms": off, "median": off, "p95": off, "p99": off, "worst": off}
+    words = {"backend": "cpu", "arithmetic": "one-pass", "charts": "plane", "orientation_by": by, "coverage": "all", "cadence": "every-frame"}
+    return {"way": way, **words, "p50_us": us, "p99_us": us, "centroid_mm": errors, "orientation_deg": errors, "truth": None, "front": front}
+
+
+def test_a_trade_is_time_against_error() -> None:
+    rows = [row("live", 2.0, 1.0, True), row("live", 4.0, 0.0, True), row("live", 5.0, 1.0, False), row("batch", 1.0, 3.0, True)]
+    report = {"rows": rows, "truth": False, "asked_by": "as-asked", "pick": rows[1], "missed": []}
+    found = st.Tradeoff(copy.deepcopy(report))
+    ax = found.plot()
+    drawn = lines(ax)
+    assert drawn["cpu, one-pass"].tolist() == [1.0, 1e-9] and drawn["picked"].tolist() == [1e-9]
+    beaten = [line for line in ax.lines if line.get_fillstyle() == "none" and line.get_label().startswith("_")]
+    assert [line.get_xdata().tolist() for line in beaten] == [[5.0]]
+    assert "picked" not in lines(found.plot("orientation", way="batch"))
+    front = st.Tradeoff(copy.deepcopy(report), all=False)
+    assert front["p50_us"].tolist() == [2.0, 4.0, 1.0] and front.pick == found.pick and len(found) == 4
+    truth = {name: {**rows[0]["centroid_mm"], "p95": 7.0} for name in ("place_mm", "orientation_deg")}
+    true = st.Tradeoff({**report, "truth": True, "rows": [{**rows[0], "truth": truth}], "pick": None})
+    ax = true.plot("orientation")
+    assert lines(ax)["cpu, one-pass"].tolist() == [7.0] and [text.get_text() for text in ax.texts] == ["as-asked"]
+    assert true.plot(way="batch").texts[0].get_text() == "no place was compared"
+    with pytest.raises(st.UsageError, match="plot one of place, orientation"):
+        found.plot("axis")  # type: ignore[arg-type]
+
+
 def test_without_matplotlib_it_says_what_to_install(p: st.Percepts, hand: st.Body, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
-    for plot in (p.plot, p.touches.plot, hand.plot):
+    empty = st.Tradeoff({"rows": [], "truth": False, "asked_by": "as-asked"})
+    for plot in (p.plot, p.touches.plot, hand.plot, empty.plot):
         with pytest.raises(st.SomaticError, match="pip install matplotlib"):
             plot()

@@ -49,7 +49,7 @@ def test_a_picture_is_the_command_s(somatic, hand: st.Body, touch: st.Recording,
     pixels = picture.pixels if picture.pixels.ndim == 3 else picture.pixels[0]
     assert np.array_equal(pixels[..., :3], np.asarray(image.convert("RGB"))) and (pixels[..., 3] == 255).all()
     if "from_s" in keys:
-        assert picture.pixels.ndim == 4 and len(picture.pixels) == image.n_frames == 6
+        assert picture.pixels.ndim == 4 and len(picture.pixels) == image.n_frames == 6  # type: ignore[attr-defined]
         image.seek(3)
         assert np.array_equal(picture.pixels[3, ..., :3], np.asarray(image.convert("RGB")))
 

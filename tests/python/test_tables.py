@@ -39,7 +39,7 @@ def test_tables_have_the_rows_of_the_columns(p: st.Percepts) -> None:
     assert table["field"].to_pylist() == [p.fields[field] for field in fields]
     everything = p.to_arrow(all_fields=True)
     assert everything.num_rows == p.flags.size
-    assert everything["flags"].to_pylist()[0] == [flag.name.lower() for flag in st.Flags(p.flags[0, 0])]
+    assert everything["flags"].to_pylist()[0] == [str(flag.name).lower() for flag in st.Flags(p.flags[0, 0])]
 
 
 def test_pandas_and_polars_have_the_same(p: st.Percepts) -> None:
@@ -104,7 +104,7 @@ def test_a_file_is_written_as_it_is_computed(touch: st.Recording, tmp_path: path
     with pytest.raises(st.UsageError, match="no percepts"):
         st.write([], tmp_path / "none.csv")
     with pytest.raises(st.UsageError, match="should be a Percepts"):
-        st.write([1], tmp_path / "none.csv")
+        st.write([1], tmp_path / "none.csv")  # type: ignore[list-item]
 
 
 def test_sinks_that_need_frames_are_refused(touch: st.Recording, tmp_path: pathlib.Path) -> None:

@@ -37,6 +37,14 @@ with st.live(source="serial:/dev/ttyUSB0", body=body) as live:
     assert_type(live.stop(), None)
 assert_type(st.tradeoff(body, within="3 mm").pick, dict[str, Any] | None)
 assert_type(st.calibrate(body, "a.csv", rest=5).calibration, st.Calibration)
+assert_type(st.tradeoff(body, within="3 mm", all=False, write="a.toml").plot("orientation", way="batch"), Any)
+assert_type(st.compare(body, "hand"), st.Compared)
+assert_type(st.compare(body, "hand")["second_is_nearer"], Any)
+assert_type(st.read("a.csv", skip_bad=True), st.Recording)
+st.plot("a.csv", "a.svg", body=body, from_s=1)
+st.plot("a.csv", "a.svg", boddy=body)  # type: ignore[call-arg]
+st.inspect(body, joints="a.urdf", up="y")
+st.compare(body, body).plot("plaice")  # type: ignore[arg-type]
 assert_type(st.author(urdf_skin="a.urdf", package={"a": "b"}, geometry="none"), st.Body)
 assert_type(st.convert(body, "a.csv"), int)
 assert_type(st.outputs()["name"], npt.NDArray[Any])

@@ -7,10 +7,13 @@ use pyo3::types::PySlice;
 use somatic::internal::error::unknown;
 use somatic::internal::renamed::new_name;
 use somatic::internal::scene::AskedOutputs;
+use somatic::percept::ColumnValues;
 use somatic::{COLUMNS, Column};
 
 use super::PyPercepts;
+use crate::arrays::array;
 use crate::error::unknown_name;
+use crate::threads::free;
 
 impl PyPercepts {
     /// The column called `name`, if it was asked for.
@@ -36,6 +39,22 @@ impl PyPercepts {
                 }
             },
         ))
+    }
+
+    /// The column called `name`, as an array.
+    pub(super) fn named(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
+        let column = self.column(py, name)?;
+        self.once(py, name, || {
+            let [frames, fields] = self.shape();
+            let shape = [frames, fields, column.components];
+            let shape = if column.components == 1 { &shape[..2] } else { &shape[..] };
+            match free(py, || self.inner.column(column)) {
+                Some(ColumnValues::F32(values)) => array(py, values, shape),
+                Some(ColumnValues::F64(values)) => array(py, values, shape),
+                Some(ColumnValues::U32(values)) => array(py, values, shape),
+                None => Err(unknown_name(py, format!("`{name}` was not asked for; add it to the scene's outputs"))),
+            }
+        })
     }
 
     /// The array called `name`, made once.

@@ -5,7 +5,7 @@ use somatic::internal::setup::Setup;
 use somatic::internal::tradeoff::{
     CallMode, Combination, Found, Measurement, Pick, Report, Store, Tested, day, software,
 };
-use somatic::scene::{Coverage, OrientationBy};
+use somatic::scene::Coverage;
 use somatic::{BackendKind, Body, Error, Options, Result};
 
 use super::measured::{in_words, made_up, measure_options, missed, played};
@@ -100,7 +100,7 @@ pub(in crate::cli) fn settled(asked: &Setup, input: Option<&Input>, body: &Body,
 }
 
 fn granted(options: Options, report: &Report, pick: &Pick<'_>, when: &str, target: &str) -> Result<Settled> {
-    let Combination { backend, knobs } = of_row(pick.row, report)?;
+    let Combination { backend, knobs } = pick.row.words.in_scene(&report.asked_by)?;
     let scene = options.scene.clone().knobs(knobs);
     Ok(Settled {
         options: options.scene(scene).backend(backend),
@@ -109,20 +109,11 @@ fn granted(options: Options, report: &Report, pick: &Pick<'_>, when: &str, targe
     })
 }
 
-/// The combination of `row` as a scene would say it: an orientation that is asked for by name stays as it was asked for.
-pub(super) fn of_row(row: &Measurement, report: &Report) -> Result<Combination> {
-    let mut combination = row.combination()?;
-    if row.words.orientation_by == report.asked_by {
-        combination.knobs.orientation_by = OrientationBy::AsAsked;
-    }
-    Ok(combination)
-}
-
 /// `options` with the backend that `report` says is the fastest, where that is left open.
 fn without_wish(options: Options, report: &Report, way: CallMode, when: &str) -> Settled {
     let knobs = options.scene.knobs;
     let alike = |row: &&Measurement| {
-        let Ok(combination) = of_row(row, report) else { return false };
+        let Ok(combination) = row.words.in_scene(&report.asked_by) else { return false };
         let kind = options.backend;
         let other = combination.knobs;
         let arithmetic = knobs.arithmetic.or(other.arithmetic.filter(|_| is_usual(&combination)));

@@ -1,12 +1,19 @@
 //! Writes the selected combination into a scene file in place of the target; keeps everything else, comments too.
 
-use somatic::internal::limits::{self, MAX_TOML_BYTES};
-use somatic::internal::tradeoff::{Combination, Target, Words};
-use somatic::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
-use somatic::{BackendKind, Error, OutputPath, Result};
 use toml_edit::{DocumentMut, Item, Table, value};
 
-pub(super) fn write(scene: OutputPath, combination: &Combination, target: &Target) -> Result<()> {
+use super::{Combination, Target, Words};
+use crate::backend::BackendKind;
+use crate::error::{Error, Result};
+use crate::limits::{self, MAX_TOML_BYTES};
+use crate::output::OutputPath;
+use crate::scene::{Cadence, Charts, Coverage, Knobs, OrientationBy};
+
+/// Writes `combination`, which was selected for `target`, into the file `scene`.
+///
+/// # Errors
+/// The file cannot be read or written, or is not TOML.
+pub fn write_pick(scene: OutputPath, combination: &Combination, target: &Target) -> Result<()> {
     let path = scene.name();
     let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
     let text = with(&text, combination, target).map_err(|e| e.at(path.display()))?;
@@ -49,7 +56,7 @@ fn with(text: &str, combination: &Combination, target: &Target) -> Result<String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use somatic::scene::Arithmetic;
+    use crate::scene::Arithmetic;
 
     #[test]
     fn a_pick_takes_the_place_of_the_wish_and_comments_stay() {
