@@ -1,12 +1,16 @@
 //! The skin of a body as a table or a URDF.
 
 use std::path::Path;
+use std::slice;
 
 use somatic::internal::convert::SkinFormat;
 use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::attached;
 use somatic::internal::setup::bodies::load_body;
-use somatic::{Error, Result};
+use somatic::source::{SourceSpec, VendorSource};
+use somatic::{Body, Error, Result};
 
+use super::Arguments;
 use crate::cli::stdio::{DONE, say};
 use crate::cli::words::count;
 
@@ -28,5 +32,33 @@ pub(super) fn convert(from: &str, to: &str, force: bool) -> Result<u8> {
     output.write(text.as_bytes())?;
     say(&format!("{} in {name}", count(format.taxels(&body) as u64, "taxel")));
     notes.iter().chain(&format.without_fields(&body)).for_each(|note| say(note));
+    Ok(DONE)
+}
+
+/// Writes the body that the recording `from` has to `to`.
+pub(super) fn of_recording(from: &SourceSpec, to: &str, arguments: &Arguments) -> Result<u8> {
+    if arguments.body.is_some() || arguments.calibration.is_some() {
+        return Err(Error::usage("a body has no place for --body and --calibration; leave them out").at(to));
+    }
+    let read = FilesRead::default().named(slice::from_ref(&arguments.from)).files(&arguments.export.layout);
+    let output = read.outputs(arguments.force).add(to)?;
+    let (name, bytes) = match from {
+        SourceSpec::Vendor(path) => {
+            let export = VendorSource::open(path, &arguments.export.options()?)?;
+            if !export.layout().is_placed() {
+                let what = "the file does not say where its sensors are; give their places as --layout";
+                return Err(Error::failed(what).at(path.display()));
+            }
+            (export.body_name(), export.body()?)
+        }
+        SourceSpec::Mcap(path) => attached::body(path)?.ok_or_else(|| {
+            Error::failed("it has no body; record it with one: somatic run --body BODY").at(path.display())
+        })?,
+        _ => return Err(Error::failed("it has no body; make one: somatic author --help").at(&arguments.from)),
+    };
+    let body = Body::from_bytes(&name, &bytes)?;
+    let name = output.name().display().to_string();
+    output.write(&bytes)?;
+    say(&format!("{} in {name}", count(body.taxels.len() as u64, "taxel")));
     Ok(DONE)
 }
