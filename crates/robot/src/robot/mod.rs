@@ -16,6 +16,8 @@
 //! ```
 
 #[cfg(feature = "mcap")]
+mod bag_poses;
+#[cfg(feature = "mcap")]
 mod bag_source;
 #[cfg(feature = "mcap")]
 mod bag_states;
@@ -40,11 +42,15 @@ mod matching;
 pub mod messages;
 #[cfg(any(feature = "mcap", feature = "ros2"))]
 mod places;
+#[cfg(feature = "mcap")]
+mod posed_source;
 #[cfg(feature = "ros2")]
 mod ros2_source;
 #[cfg(feature = "ros2")]
 mod stamped_states;
 
+#[cfg(feature = "mcap")]
+pub use bag_poses::{BagPoses, poses_of_bag};
 #[cfg(feature = "mcap")]
 pub use bag_source::BagSource;
 #[cfg(feature = "mcap")]
@@ -61,5 +67,7 @@ pub use kinematics::Kinematics;
 pub use live_joints::{LiveJoints, StatesTime};
 #[cfg(feature = "meshes")]
 pub use matching::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M};
+#[cfg(feature = "mcap")]
+pub use posed_source::PosedSource;
 #[cfg(feature = "ros2")]
 pub use ros2_source::Ros2Source;
