@@ -5,10 +5,12 @@ use std::str::FromStr;
 use crate::error::{Error, Result};
 use crate::signal::{Quantity, UnitOfP};
 
-use super::{Findings, Press, median, rounded};
+use super::{Findings, median, rounded};
 
 /// Most forces of one calibration.
 const MOST: usize = 32;
+/// What presses less than that share of what the lightest force should is no press.
+const CLEAR_SHARE: f64 = 0.25;
 
 /// Forces of presses that follow each other, N; one of all presses.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,7 +120,7 @@ impl Findings {
                 ));
             }
             (PressedOn::Field, forces) => {
-                let wholes: Vec<f64> = self.presses.iter().map(|press| press.whole).collect();
+                let wholes: Vec<f64> = clear(self.presses.iter().map(|press| press.whole), forces).collect();
                 let (scale, remark) = scale_of(&wholes, forces)?;
                 (self.scale, self.known) = (Some(scale), Some(remark));
             }
@@ -133,7 +135,8 @@ impl Findings {
         order.sort_by(|&a, &b| forces[a].total_cmp(&forces[b]));
         let mut curves = Vec::new();
         for (sensor, found) in self.sensors.iter().enumerate() {
-            let own: Vec<&Press> = self.presses.iter().filter(|press| press.sensor == sensor).collect();
+            let travels = self.presses.iter().filter(|press| press.sensor == sensor).map(|press| press.travel);
+            let own: Vec<f64> = clear(travels, forces).collect();
             if own.is_empty() {
                 continue;
             }
@@ -145,7 +148,7 @@ impl Findings {
                     forces.len()
                 )));
             }
-            let knots = order.iter().map(|&at| [rounded(own[at].travel), forces[at]]);
+            let knots = order.iter().map(|&at| [rounded(own[at]), forces[at]]);
             let mut knots: Vec<[f64; 2]> = std::iter::once([0.0; 2]).chain(knots).collect();
             if let Some(pair) = knots.windows(2).find(|pair| pair[1][0] <= pair[0][0] || pair[1][1] <= pair[0][1]) {
                 let ([less, low], [more, high]) = (pair[0], pair[1]);
@@ -167,6 +170,15 @@ impl Findings {
         curves.push(KnownCurve { id: None, knots: usual });
         Ok(curves)
     }
+}
+
+/// Those of `presses`, by how much they pressed, that one of `forces` can be: what only flickers is none.
+pub(super) fn clear(presses: impl Iterator<Item = f64> + Clone, forces: &[f64]) -> impl Iterator<Item = f64> {
+    let most = presses.clone().fold(0.0, f64::max);
+    let lightest = forces.iter().copied().fold(f64::INFINITY, f64::min);
+    let heaviest = forces.iter().copied().fold(0.0, f64::max);
+    let least = CLEAR_SHARE * most * lightest / heaviest;
+    presses.filter(move |&pressed| pressed >= least)
 }
 
 /// Goes on after the last of `knots` as before it, to the end of the sensor's range or to twice as far.
@@ -232,6 +244,8 @@ mod tests {
         assert_eq!((scale, remark.as_str()), (0.01, "one scale for 3 presses; it is at most 10.0 % off"));
         assert_eq!(scale_of(&[50.0, 50.0], &[4.0]).unwrap().0, 0.08);
         assert!(scale_of(&[1.0], &[1.0, 2.0]).unwrap_err().to_string().contains("1 presses, and 2 forces"));
+        let pressed = [0.1, 0.2, 100.0, 24.0, 200.0];
+        assert_eq!(clear(pressed.into_iter(), &[1.0, 2.0]).collect::<Vec<_>>(), [100.0, 200.0]);
         assert!(scale_of(&[], &[1.0]).unwrap_err().to_string().contains("no sensor was pressed"));
     }
 }

@@ -8,7 +8,7 @@ use crate::signal::Quantity;
 use crate::{BackendKind, Body, Calibration, Engine, Frame, Options, Scene};
 
 use super::at_rest::middle;
-use super::known::{KnownForces, scale_of};
+use super::known::{KnownForces, clear, scale_of};
 use super::presses::{Divider, Part};
 use super::rounded;
 
@@ -93,9 +93,10 @@ impl ScaleSurvey {
         if self.divider.is_pressed() {
             self.wholes.push(self.most);
         }
-        let (scale, remark) = scale_of(&self.wholes, &forces.0)?;
+        let wholes: Vec<f64> = clear(self.wholes.iter().copied(), &forces.0).collect();
+        let (scale, remark) = scale_of(&wholes, &forces.0)?;
         let becomes_newton = self.quantity == Quantity::Count;
-        Ok(ScaleEstimate { scale, presses: self.wholes.len(), remark, becomes_newton })
+        Ok(ScaleEstimate { scale, presses: wholes.len(), remark, becomes_newton })
     }
 }
 
