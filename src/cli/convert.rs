@@ -94,7 +94,10 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let from = source_of(&arguments.from, &["csv", "mcap", "export", "sim"], &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
     if Path::new(to_name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("glb")) {
-        return skin::of_recording(&from, to_name, arguments);
+        if arguments.body.is_some() || arguments.calibration.is_some() {
+            return Err(Error::usage("a body has no place for --body and --calibration; leave them out").at(to_name));
+        }
+        return skin::of_recording((&arguments.from, &from), &options, to_name, arguments.force);
     }
     let to = match to_name {
         // As a source it is another kind.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::known::KnownCurve;
+use super::known_curve::KnownCurve;
 use super::{Findings, Found, median};
 
 impl Findings {

@@ -15,6 +15,7 @@ mod figure;
 mod file;
 pub mod gains;
 pub mod known;
+mod known_curve;
 mod presses;
 pub mod scale;
 pub mod tuning;
@@ -24,9 +25,9 @@ use crate::Body;
 use crate::error::{Error, Result};
 use crate::signal::{RawValue, UnitOfP};
 
-use self::at_rest::{chance_of, median, middle, movement_of, rest_of, sigma_of};
+use self::at_rest::{MIN_TRAVEL_BANDS, chance_of, median, middle, movement_of, rest_of, sigma_of};
 use self::crosstalk::{Crosstalk, Leaks};
-use self::known::KnownCurve;
+use self::known_curve::KnownCurve;
 pub use self::presses::Press;
 use self::presses::Presses;
 
@@ -36,8 +37,6 @@ const MAX_REST_VALUES: usize = 4096;
 const MIN_SIGMA_VALUES: usize = 32;
 /// Dead band over noise.
 const DEAD_BAND_MARGIN: f64 = 1.5;
-/// Minimum travel of a press, in dead bands.
-const MIN_TRAVEL_BANDS: f64 = 3.0;
 /// Maximum deviation by random noise, in standard deviations.
 const MAX_NOISE_SIGMAS: f64 = 12.0;
 /// A dead band is too wide above this share of the raw range where noise does not explain it,

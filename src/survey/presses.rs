@@ -1,7 +1,6 @@
 //! Presses one after the other: when each begins and ends, which sensor it pressed most, and how far.
 
-use super::MIN_TRAVEL_BANDS;
-use super::at_rest::middle;
+use super::at_rest::{MIN_TRAVEL_BANDS, middle};
 
 /// Most presses that are kept.
 const MOST: usize = 1 << 16;

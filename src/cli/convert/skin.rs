@@ -7,10 +7,9 @@ use somatic::internal::convert::SkinFormat;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::attached;
 use somatic::internal::setup::bodies::load_body;
-use somatic::source::{SourceSpec, VendorSource};
+use somatic::source::{SourceSpec, VendorOptions, VendorSource};
 use somatic::{Body, Error, Result};
 
-use super::Arguments;
 use crate::cli::stdio::{DONE, say};
 use crate::cli::words::count;
 
@@ -35,16 +34,18 @@ pub(super) fn convert(from: &str, to: &str, force: bool) -> Result<u8> {
     Ok(DONE)
 }
 
-/// Writes the body that the recording `from` has to `to`.
-pub(super) fn of_recording(from: &SourceSpec, to: &str, arguments: &Arguments) -> Result<u8> {
-    if arguments.body.is_some() || arguments.calibration.is_some() {
-        return Err(Error::usage("a body has no place for --body and --calibration; leave them out").at(to));
-    }
-    let read = FilesRead::default().named(slice::from_ref(&arguments.from)).files(&arguments.export.layout);
-    let output = read.outputs(arguments.force).add(to)?;
+/// Writes the body that the recording `from` has, which is called `name` and read with `options`, to `to`.
+pub(super) fn of_recording(
+    (name, from): (&String, &SourceSpec),
+    options: &VendorOptions,
+    to: &str,
+    force: bool,
+) -> Result<u8> {
+    let read = FilesRead::default().named(slice::from_ref(name)).files(&options.layout);
+    let output = read.outputs(force).add(to)?;
     let (name, bytes) = match from {
         SourceSpec::Vendor(path) => {
-            let export = VendorSource::open(path, &arguments.export.options()?)?;
+            let export = VendorSource::open(path, options)?;
             if !export.layout().is_placed() {
                 let what = "the file does not say where its sensors are; give their places as --layout";
                 return Err(Error::failed(what).at(path.display()));
@@ -54,7 +55,7 @@ pub(super) fn of_recording(from: &SourceSpec, to: &str, arguments: &Arguments) -
         SourceSpec::Mcap(path) => attached::body(path)?.ok_or_else(|| {
             Error::failed("it has no body; record it with one: somatic run --body BODY").at(path.display())
         })?,
-        _ => return Err(Error::failed("it has no body; make one: somatic author --help").at(&arguments.from)),
+        _ => return Err(Error::failed("it has no body; make one: somatic author --help").at(name)),
     };
     let body = Body::from_bytes(&name, &bytes)?;
     let name = output.name().display().to_string();
