@@ -248,7 +248,8 @@ def calibrate(
         The converter's bits; raw values that are no readings; gains with which all presses are equal, for sensors that were pressed alike;
         and whether sensors that moved at rest are masked, in the place of an error.
     known, on
-        The force of every press, such as '4.9N' or '500g', and what it pressed on: each 'taxel', or the 'field' of all together. P is in newtons then.
+        The force of every press, such as '4.9N' or '500g', or of presses that follow each other, such as '1N,2N,5N'; and what they pressed on: each
+        'taxel', or the 'field' of all together, which gives one scale. P is in newtons then. Several forces on taxels make curves.
     rate_hz, wiring, live_rate_hz, board_rate_hz, columns, ids, frame_end, time
         How the source is read: see docs/reference/scene.md.
     gains_from, calibration, stamp

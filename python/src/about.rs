@@ -9,7 +9,9 @@ use somatic::author::coverage;
 use somatic::body::Up;
 use somatic::field::FieldSet;
 use somatic::internal::author::{DrawnPoses, lint_with_progress};
-use somatic::internal::contents::{Contacts, Contents, Quantity, bag_as_json, of_fields, of_touches};
+use somatic::internal::contents::{
+    Contacts, Contents, FoundContacts, Quantity, Rule, bag_as_json, of_fields, of_touches,
+};
 use somatic::internal::expected::{TestTouches, compare_layouts, expected_and_ideal_errors};
 use somatic::internal::field::{ContactTolerance, TaxelGraph, rest_overlaps};
 use somatic::internal::recording::BagSurvey;
@@ -45,16 +47,13 @@ fn of_frames(
         frames += 1;
         Ok(!frames.is_multiple_of(FRAMES_BETWEEN) || goes_on(raised))
     })?;
-    if let Some(contacts) = contacts {
-        contacts.finish()?;
-    }
     Ok(known)
 }
 
 /// The contacts in the MCAP at `path`, if it has its body; what is damaged is a loss of `known`.
-fn of_mcap(path: &Path, known: &mut Contents, raised: &mut Option<PyErr>) -> Option<Contacts> {
+fn of_mcap(path: &Path, known: &mut Contents, raised: &mut Option<PyErr>) -> Option<FoundContacts> {
     let goes_on = |frames: u64| !frames.is_multiple_of(FRAMES_BETWEEN) || goes_on(raised);
-    Contacts::of_mcap(path, &Tell::default(), goes_on).unwrap_or_else(|e| {
+    Contacts::of_mcap(path, &Tell::default(), Rule::default(), goes_on).unwrap_or_else(|e| {
         known.losses.push(e.to_string());
         None
     })
@@ -80,7 +79,7 @@ fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Res
             let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids)).transpose()?;
             let mut contacts = Contacts::new(&body, calibration, &source)?;
             let known = of_frames(kind, path, &mut source, Some(&mut contacts), raised)?;
-            (known.map(|known| Contents { layout, ..known }), Some(contacts))
+            (known.map(|known| Contents { layout, ..known }), Some(contacts.finish(Rule::default())?))
         }
         spec => {
             let path = spec.file().unwrap_or(Path::new(""));

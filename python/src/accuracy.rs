@@ -11,7 +11,7 @@ use somatic::internal::run::{Arrival, Feed, ReadMode};
 use somatic::internal::setup::bodies::in_body;
 use somatic::internal::signal::UnitOfP;
 use somatic::internal::survey::gains::{layer_under, with_gains};
-use somatic::internal::survey::known::{KnownForce, PressedOn};
+use somatic::internal::survey::known::{KnownForces, PressedOn};
 use somatic::internal::survey::{Findings, Survey, Wishes};
 use somatic::internal::tradeoff::{CallMode, MeasureOptions, Target, Tested, Words, software, time, usual_frames};
 use somatic::scene::file::{LineKeys, TextKeys};
@@ -160,7 +160,7 @@ impl Asked {
         keys
     }
 
-    fn known(&self) -> somatic::Result<Option<(KnownForce, PressedOn)>> {
+    fn known(&self) -> somatic::Result<Option<(KnownForces, PressedOn)>> {
         match (&self.known, &self.on) {
             (Some(known), Some(on)) => {
                 Ok(Some((known.parse().map_err(|e: Error| e.at("known"))?, on.parse().map_err(|e: Error| e.at("on"))?)))
@@ -298,8 +298,8 @@ pub(crate) fn calibrate(
         let mut findings = taking.survey.finish(Wishes { bits, equalise, mask_moved })?;
         findings.missing.clone_from(&asked.missing);
         findings.unit = unit;
-        if let Some((force, on)) = known {
-            findings.know(force, on)?;
+        if let Some((forces, on)) = known {
+            findings.know(&forces, on)?;
         }
         let text = findings.calibration(&name_of(&body.inner));
         Ok((findings, text))

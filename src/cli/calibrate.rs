@@ -1,6 +1,7 @@
 //! `somatic calibrate`: from a rest and a press to a calibration file.
 
 mod gains;
+mod scale;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -12,7 +13,7 @@ use somatic::internal::scene_file::{hertz, length, seconds};
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::bodies::{in_body, load_body};
 use somatic::internal::signal::UnitOfP;
-use somatic::internal::survey::known::{KnownForce, PressedOn};
+use somatic::internal::survey::known::{KnownForces, PressedOn};
 use somatic::internal::survey::{Findings, Found, Survey, Wishes};
 use somatic::signal::RawValue;
 use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, VendorSource};
@@ -35,6 +36,7 @@ Examples:
   somatic calibrate --body robot.glb --source serial:/dev/ttyUSB0 --wiring hand.toml -o robot.toml
   somatic run --body robot.glb --source session.csv --calibration robot.toml
   somatic calibrate --body robot.glb --gains-from touches.csv --calibration robot.toml -o skin.toml
+  somatic calibrate --body mat.glb --source presses.csv --known 500g --on field --calibration robot.toml -o newton.toml
 
 First nothing touches the robot for the time --rest. Then press every sensor firmly, one after the
 other or many at once, until the recording ends, the time --press is over, or Ctrl-C.
@@ -70,8 +72,10 @@ pub(super) struct Arguments {
         conflicts_with_all = ["sources", "plot", "press", "bits", "missing", "equalise", "mask_moved"])]
     gains_from: Option<String>,
 
-    /// For --gains-from: the calibration with baselines and dead bands, which gains are added to.
-    #[arg(long, value_name = "FILE.toml", requires = "gains_from")]
+    /// For --gains-from and --known: the calibration that gains, or one scale for all of its gains, are added to.
+    ///
+    /// With --known there is no rest: presses begin with the first frame.
+    #[arg(long, value_name = "FILE.toml")]
     calibration: Option<PathBuf>,
 
     /// For --gains-from: all touches are by the flat end of a stamp of this radius, such as 6mm.
@@ -120,14 +124,14 @@ pub(super) struct Arguments {
     #[arg(long)]
     equalise: bool,
 
-    /// The force of every press, such as 4.9N, or as a weight 500g.
+    /// The force of every press, such as 4.9N, or as a weight 500g; or of presses that follow each other, such as 1N,2N,5N.
     ///
-    /// P is in newtons then.
-    #[arg(long, value_name = "FORCE", requires = "on", value_parser = str::parse::<KnownForce>,
-        conflicts_with_all = ["equalise", "gains_from"])]
-    known: Option<KnownForce>,
+    /// P is in newtons then. Several make a curve for each sensor: press it once with each, in their order.
+    #[arg(long, value_name = "FORCE,...", requires = "on", value_parser = str::parse::<KnownForces>,
+        conflicts_with = "gains_from")]
+    known: Option<KnownForces>,
 
-    /// What --known pressed on: each sensor by itself (taxel), or all of them together (field).
+    /// What --known pressed on: each sensor by itself (taxel), or all of them together (field), which gives one scale for all.
     #[arg(long, value_name = "WHAT", requires = "known", value_parser = one_of::<PressedOn>(&["taxel", "field"]))]
     on: Option<PressedOn>,
 
@@ -157,9 +161,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let read = read.files(&arguments.calibration);
     let mut outputs = read.outputs(arguments.force);
     let to = outputs.add(output)?;
-    if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
-        return Err(Error::usage("--rest and --press must be over 0; give times such as 5s"));
-    }
+    check(arguments)?;
     // What was found is printed there.
     outputs.add_standard_output()?;
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
@@ -171,18 +173,18 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     }
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let ports = arguments.lines.lines(&arguments.sources)?;
-    let (source, lines): (Box<dyn Source + Send>, _) = if ports.is_empty() {
-        (open(&first_of(&arguments.sources)?, &ids, arguments)?, None)
-    } else if arguments.rate.is_some() {
-        return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
-    } else {
-        let source = arguments.lines.keys().open(&ports, &ids, None)?;
-        let lines = source.lines();
-        (Box::new(source), Some(lines))
-    };
-    let mut survey = Survey::new(&in_body(&body, &*source)?).on(&body)?;
+    let (source, lines) = open_all(arguments, &ports, &ids)?;
+    let channels = in_body(&body, &*source)?;
     let first = first_of(&arguments.sources);
     let is_live = lines.is_some() || first.is_ok_and(|spec| spec.is_stdin() || matches!(spec, SourceSpec::Text(_)));
+    if let (Some(path), Some(forces)) = (&arguments.calibration, &arguments.known) {
+        let name = arguments.sources.first().map_or("", String::as_str);
+        let presses = scale::Presses { name, source, lines: lines.as_ref(), is_live, for_s: arguments.press };
+        let done = scale::calibrate(presses, &channels, (&body, path.as_path()), forces, to, arguments.json);
+        lines.iter().for_each(Lines::close);
+        return done;
+    }
+    let mut survey = Survey::new(&channels).on(&body)?;
     let gathered = gather(&mut survey, source, arguments, lines.as_ref(), is_live);
     if let Some(lines) = &lines {
         lines.close();
@@ -207,8 +209,8 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
 
     findings.missing.clone_from(&arguments.missing);
     findings.unit = if ports.is_empty() { unit_of(&arguments.sources, arguments.rate)? } else { UnitOfP::COUNT };
-    if let (Some(force), Some(on)) = (arguments.known, arguments.on) {
-        findings.know(force, on)?;
+    if let (Some(forces), Some(on)) = (&arguments.known, arguments.on) {
+        findings.know(forces, on)?;
     }
     let text = findings.calibration(&name_of(&body));
     // What is written must be what `run` takes; if it were not, nothing is written.
@@ -223,6 +225,52 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let code = tell_losses(&lost);
     say(&format!("wrote {}", output.display()));
     Ok(code)
+}
+
+/// Refuses flags that do not go together.
+fn check(arguments: &Arguments) -> Result<()> {
+    if !(arguments.rest > 0.0 && arguments.press.is_none_or(|press| press > 0.0)) {
+        return Err(Error::usage("--rest and --press must be over 0; give times such as 5s"));
+    }
+    if arguments.equalise && arguments.on == Some(PressedOn::Taxel) {
+        return Err(Error::usage("--known gives each sensor its gain with --on taxel; leave out --equalise"));
+    }
+    if arguments.calibration.is_none() || arguments.gains_from.is_some() {
+        return Ok(());
+    }
+    if arguments.known.is_none() {
+        return Err(Error::usage("--calibration is for --gains-from and --known; leave it out"));
+    }
+    let found_at_rest = [
+        ("--plot", arguments.plot.is_some()),
+        ("--bits", arguments.bits.is_some()),
+        ("--missing", !arguments.missing.is_empty()),
+        ("--equalise", arguments.equalise),
+        ("--mask-moved", arguments.mask_moved),
+    ];
+    match found_at_rest.into_iter().find(|(_, is_given)| *is_given) {
+        Some((flag, _)) => {
+            Err(Error::usage(format!("{flag} is for what is found at rest; leave it out with --calibration")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Opens the sources, which may be `ports`, for a body whose taxels have `ids`.
+fn open_all(
+    arguments: &Arguments,
+    ports: &[(String, Option<u32>)],
+    ids: &[u32],
+) -> Result<(Box<dyn Source + Send>, Option<Lines>)> {
+    if ports.is_empty() {
+        return Ok((open(&first_of(&arguments.sources)?, ids, arguments)?, None));
+    }
+    if arguments.rate.is_some() {
+        return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
+    }
+    let source = arguments.lines.keys().open(ports, ids, None)?;
+    let lines = source.lines();
+    Ok((Box::new(source), Some(lines)))
 }
 
 /// Makes those of `values` missing that are one of `codes`, as a calibration with these does.

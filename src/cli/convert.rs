@@ -2,7 +2,7 @@
 
 mod skin;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::slice;
 use std::sync::atomic::Ordering;
 
@@ -32,6 +32,7 @@ Examples:
   somatic convert touch.csv touch.mcap --body robot.glb --calibration robot.toml
   somatic convert touch.mcap touch.csv        or csv:- for standard output
   somatic convert insoles.lst insoles.mcap    a pressure system's export, with its sensors and unit
+  somatic convert insoles.lst -o body.glb     its sensors as a body, for zones and pictures
   somatic convert cut-off.mcap whole.mcap     what is whole in it, with an end
   somatic convert skin.glb -o skin.csv        the taxels of a body as a table
   somatic convert skin.glb -o skin.urdf       as tactile sensors of a robot
@@ -53,7 +54,7 @@ pub(super) struct Arguments {
     #[arg(value_name = "IN")]
     from: String,
 
-    /// The output: of a recording csv:FILE or mcap:FILE, or just a .csv or .mcap; of a body a .csv or a .urdf.
+    /// The output: of a recording csv:FILE or mcap:FILE, or just a .csv or .mcap, or its body as a .glb; of a body a .csv or a .urdf.
     #[arg(value_name = "OUT", required_unless_present = "output")]
     to: Option<String>,
 
@@ -97,6 +98,12 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     };
     let from = source_of(&arguments.from, kinds, &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
+    if Path::new(to_name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("glb")) {
+        if arguments.body.is_some() || arguments.calibration.is_some() {
+            return Err(Error::usage("a body has no place for --body and --calibration; leave them out").at(to_name));
+        }
+        return skin::of_recording((&arguments.from, &from), &options, to_name, arguments.force);
+    }
     let to = match to_name {
         // As a source it is another kind.
         "csv:-" => SourceSpec::Csv("-".into()),

@@ -3,25 +3,27 @@
 mod bag;
 mod contacts;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
-use somatic::internal::contents::{Contacts, Contents, bag_as_json};
+use somatic::internal::contents::{COLUMNS, Contacts, Contents, FoundContacts, Rule, Threshold, bag_as_json};
 use somatic::internal::recording::BagSurvey;
-use somatic::internal::setup::attached;
+use somatic::internal::scene_file::seconds;
+use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::{open_mapped, source_of};
 use somatic::internal::source::Layout;
 use somatic::recording::Reader;
 use somatic::source::{CsvSource, Source, SourceSpec, VendorSource};
 use somatic::{Body, Calibration, Error, Result};
 
+use self::contacts::text as contacts_text;
 use super::bar::Bar;
 use super::exports::ExportFlags;
 use super::scene::{in_flags, said};
 use super::stdio::{DONE, LOST, print, say};
 use super::table::{plain, shown};
-use super::words::{number, one_line, size_words, span, title};
+use super::words::{count, number, one_line, size_words, span, title};
 
 /// The kinds of recordings, and those that hold arrays within messages.
 const KINDS: &[&str] = &["csv", "mcap", "ros2-mcap", "export"];
@@ -32,6 +34,7 @@ Examples:
   somatic info touch.mcap
   somatic info touch.csv --json | jq .rate_hz
   somatic info insoles.csv                    a pressure system's export, by its content
+  somatic info a.csv b.csv --contacts steps.csv   a row for each contact of both
   somatic info ros2-mcap:bag                  the topics of a ROS 2 bag
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording could not be read.";
@@ -40,10 +43,32 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but some of the recording co
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The recording: mcap:FILE, csv:FILE, ros2-mcap:PATH for a ROS 2 bag, a pressure system's export, or just the
+    /// The recordings: mcap:FILE, csv:FILE, ros2-mcap:PATH for a ROS 2 bag, a pressure system's export, or just the
     /// file.
-    #[arg(value_name = "FILE")]
-    recording: String,
+    #[arg(value_name = "FILE", required = true)]
+    recordings: Vec<String>,
+
+    /// Write a table with a row for each contact of each field: onset, offset, peaks, impulse, area and path of the centre of pressure.
+    ///
+    /// It is for recordings that have their body: exports, and .mcap files. `recording` says which a row is of.
+    #[arg(long, value_name = "TABLE.csv")]
+    contacts: Option<PathBuf>,
+
+    /// Where contacts begin: a force, or a share of the field's peak [default: 20N if a force of any field reaches it, else 5%].
+    ///
+    /// They end at half of it.
+    #[arg(long, value_name = "20N|5%", value_parser = str::parse::<Threshold>)]
+    threshold: Option<Threshold>,
+
+    /// How long contacts last at least; shorter ones do not count.
+    ///
+    /// A bare number is in seconds.
+    #[arg(long, value_name = "TIME", default_value = "50ms", value_parser = time)]
+    shortest: f64,
+
+    /// Replace the table if it is there.
+    #[arg(long, requires = "contacts")]
+    force: bool,
 
     #[command(flatten)]
     export: ExportFlags,
@@ -53,39 +78,105 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// A time span, also 0 without a unit.
+fn time(text: &str) -> Result<f64> {
+    if text.trim() == "0" { Ok(0.0) } else { seconds(text) }
+}
+
+/// What is known of a recording.
+enum Known {
+    Bag(BagSurvey),
+    Frames(Box<Contents>, Option<FoundContacts>),
+}
+
 pub(super) fn info(arguments: &Arguments) -> Result<u8> {
+    let read = FilesRead::default().named(&arguments.recordings).files(&arguments.recordings);
+    let mut outputs = read.files(&arguments.export.layout).outputs(arguments.force);
+    let table = arguments.contacts.as_ref().map(|path| outputs.add(path)).transpose()?;
+    if table.is_some() {
+        // What is known is printed there.
+        outputs.add_standard_output()?;
+    }
+    let mut rows = String::from(COLUMNS);
+    let (mut jsons, mut losses) = (Vec::new(), Vec::new());
+    for (index, name) in arguments.recordings.iter().enumerate() {
+        let known = known_of(name, arguments)?;
+        let text = match &known {
+            Known::Bag(survey) if arguments.json => {
+                jsons.push(bag_as_json(survey));
+                String::new()
+            }
+            Known::Frames(known, contacts) if arguments.json => {
+                jsons.push(as_json(known, contacts.as_ref()));
+                String::new()
+            }
+            Known::Bag(survey) => bag::text(name, survey),
+            Known::Frames(known, contacts) => text(name, known, contacts.as_ref()),
+        };
+        print(&if index > 0 && !arguments.json { format!("\n{text}") } else { text })?;
+        if let Known::Frames(known, _) = &known {
+            known.notes.iter().for_each(|note| say(note));
+        }
+        if table.is_some() {
+            let Known::Frames(_, Some(contacts)) = &known else {
+                let what = "it has no body, which --contacts needs; convert it with one: somatic convert IN OUT.mcap --body BODY";
+                return Err(Error::failed(what).at(name));
+            };
+            rows += &contacts.rows(name);
+        }
+        losses.extend(match known {
+            Known::Bag(survey) => survey.losses,
+            Known::Frames(known, _) => known.losses,
+        });
+    }
+    if arguments.json {
+        let json = if jsons.len() == 1 { jsons.remove(0) } else { jsons.into() };
+        print(&format!("{json}\n"))?;
+    }
+    if let Some(table) = table {
+        let name = table.name().display().to_string();
+        table.write(rows.as_bytes())?;
+        say(&format!("{} in {name}", count(rows.lines().count() as u64 - 1, "contact")));
+    }
+    Ok(ended(&losses))
+}
+
+/// What is known of the recording called `name`.
+fn known_of(name: &str, arguments: &Arguments) -> Result<Known> {
     let mut bar = Bar::new("reading");
     let options = arguments.export.options()?;
-    let recording = source_of(&arguments.recording, if options.map.is_some() { MAPPED } else { KINDS }, &options);
-    let (known, contacts) = match recording.map_err(|e| e.at(format!("recording `{}`", arguments.recording)))? {
+    let rule = Rule { threshold: arguments.threshold, shortest_s: arguments.shortest };
+    let recording = source_of(name, if options.map.is_some() { MAPPED } else { KINDS }, &options);
+    match recording.map_err(|e| e.at(format!("recording `{name}`")))? {
         SourceSpec::Mcap(path) => {
             if arguments.export.rate.is_some() {
                 return Err(Error::usage("--rate is for CSV recordings without a column `t`; leave it out here"));
             }
             let mut known = Contents::of_mcap(&path, &mut Reader::open(&path)?, |share| bar.show(share))?;
             // What is attached may be damaged, and the rest is described all the same.
-            let contacts = Contacts::of_mcap(&path, &said(), |_| true).unwrap_or_else(|e| {
-                known.losses.push(e.to_string());
-                None
-            });
-            (known, contacts)
+            let contacts = match Contacts::of_mcap(&path, &said(), rule, |_| true) {
+                Err(e) if e.is_usage() => return Err(e),
+                Err(e) => {
+                    known.losses.push(e.to_string());
+                    None
+                }
+                Ok(contacts) => contacts,
+            };
+            Ok(Known::Frames(Box::new(known), contacts))
         }
         spec @ (SourceSpec::Ros2Mcap(_) | SourceSpec::Ndjson(_)) if options.map.is_some() => {
             let mut source = open_mapped(&spec, &options).map_err(in_flags)?;
             let path = spec.file().unwrap_or(Path::new("")).to_owned();
-            (of_frames("messages", &path, &mut source, None, &mut bar)?, None)
+            Ok(Known::Frames(Box::new(of_frames("messages", &path, &mut source, None, &mut bar)?), None))
         }
         SourceSpec::Ros2Mcap(bag) => {
             let mut survey = BagSurvey::read(&bag.path, |share| bar.show(share))?;
             survey.topics.retain(|topic| bag.topics.is_empty() || bag.topics.contains(&topic.name));
-            drop(bar);
-            let json = arguments.json.then(|| format!("{}\n", bag_as_json(&survey)));
-            print(&json.unwrap_or_else(|| bag::text(&arguments.recording, &survey)))?;
-            return Ok(ended(&survey.losses));
+            Ok(Known::Bag(survey))
         }
         SourceSpec::Csv(path) => {
             let mut source = CsvSource::open(&path, options.rate_hz)?;
-            (of_frames("CSV", &path, &mut source, None, &mut bar)?, None)
+            Ok(Known::Frames(Box::new(of_frames("CSV", &path, &mut source, None, &mut bar)?), None))
         }
         SourceSpec::Vendor(path) => {
             let mut source = VendorSource::open(&path, &options)?;
@@ -95,17 +186,11 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
             let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids)).transpose()?;
             let mut contacts = Contacts::new(&body, calibration, &source)?;
             let known = of_frames(source.format().title(), &path, &mut source, Some(&mut contacts), &mut bar)?;
-            (Contents { layout: Some(layout), ..known }, Some(contacts))
+            let contacts = contacts.finish(rule)?;
+            Ok(Known::Frames(Box::new(Contents { layout: Some(layout), ..known }), Some(contacts)))
         }
         _ => unreachable!("it is of one of these kinds"),
-    };
-    drop(bar);
-    print(&match arguments.json {
-        true => format!("{}\n", as_json(&known, contacts.as_ref())),
-        false => text(&arguments.recording, &known, contacts.as_ref()),
-    })?;
-    known.notes.iter().for_each(|note| say(note));
-    Ok(ended(&known.losses))
+    }
 }
 
 /// Says what was lost; gives the exit code.
@@ -129,9 +214,6 @@ fn of_frames(
         bar.show(share);
         Ok(true)
     })?;
-    if let Some(contacts) = contacts {
-        contacts.finish()?;
-    }
     Ok(known.expect("it goes on to the end"))
 }
 
@@ -143,13 +225,13 @@ fn panels(layout: &Layout) -> String {
 }
 
 /// What is known, with the contacts of each field.
-fn as_json(known: &Contents, contacts: Option<&Contacts>) -> Value {
+fn as_json(known: &Contents, contacts: Option<&FoundContacts>) -> Value {
     let mut json = known.as_json();
     json["fields"] = contacts.map_or(Value::Null, |contacts| contacts.as_json().into());
     json
 }
 
-fn text(name: &str, known: &Contents, contacts: Option<&Contacts>) -> String {
+fn text(name: &str, known: &Contents, contacts: Option<&FoundContacts>) -> String {
     let Contents { kind, bytes, taxels, survey, attached, has_end, losses, layout, .. } = known;
     let rhythm = &survey.rhythm;
     let mut text = format!("{}\n", title(name));
@@ -183,7 +265,7 @@ fn text(name: &str, known: &Contents, contacts: Option<&Contacts>) -> String {
     for file in attached {
         line("attached", format!("{} ({}, {})", file.name, file.media_type, size_words(file.bytes)));
     }
-    text += &contacts.map_or(String::new(), contacts::text);
+    text += &contacts.map_or(String::new(), contacts_text);
     if !survey.topics.is_empty() {
         let mut table = plain(["topic", "encoding", "messages", "size"], 2..4);
         for topic in &survey.topics {

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::recording::{BagSurvey, SurveyedTopic};
-use crate::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2};
+use crate::robot::messages::{Float32MultiArray, JointState, Message as _, PointCloud2, TfMessage};
 use crate::signal::FrameTime;
 
 /// What runs read messages of the type `kind` as, if they do.
@@ -11,6 +11,7 @@ pub fn read_as(kind: &str) -> Option<&'static str> {
     match kind {
         PointCloud2::TYPE | Float32MultiArray::TYPE => Some("frames"),
         JointState::TYPE => Some("joint states"),
+        TfMessage::TYPE | "nav_msgs/msg/Odometry" => Some("poses"),
         _ => None,
     }
 }

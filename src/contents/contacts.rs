@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::episodes::{Episode, Rule, Sample, episodes, summary};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
@@ -18,39 +19,48 @@ use crate::source::Source;
 /// Frames that are taken through the engine together.
 const BATCH: usize = 256;
 
-/// Follows the contacts of all fields.
+/// Follows how hard all fields are pressed.
 pub struct Contacts {
     engine: Engine,
     /// Those that wait for others, then room for more.
     frames: Vec<Frame>,
     waiting: usize,
-    fields: Vec<FieldContacts>,
-    last_s: f64,
+    times_s: Vec<f64>,
+    fields: Vec<FieldSamples>,
 }
 
-/// The contacts of one field.
+/// A field in the frames in which it is pressed.
+struct FieldSamples {
+    name: String,
+    quantity: Quantity,
+    samples: Vec<Sample>,
+}
+
+/// The contacts of all fields.
+pub struct FoundContacts {
+    rule: Rule,
+    times_s: Vec<f64>,
+    fields: Vec<FieldContacts>,
+}
+
+/// The contacts of a field that is pressed.
 pub struct FieldContacts {
     /// The field's name.
     pub name: String,
+    /// Of P.
     quantity: Quantity,
-    /// How many there are.
-    pub contacts: u64,
-    /// When the contact that lasts began, s.
-    since_s: Option<f64>,
-    /// How long the longest one is, s.
-    pub longest_s: f64,
-    /// Contacts that began and ended in the recording: how many, and how long all together.
-    whole: u64,
-    whole_s: f64,
-    /// Load while touched: force in N where it is known, else the total.
-    load_sum: f64,
-    load_frames: u64,
-    /// The highest load, in units of [`FieldContacts::load_quantity`].
-    pub load_peak: f64,
-    is_force: bool,
-    /// Whether the contact that lasts began before the recording.
-    began_touched: bool,
+    samples: Vec<Sample>,
+    /// Whether loads are forces, N; else they are the total of P.
+    pub is_force: bool,
+    /// The load where contacts begin.
+    pub over: f64,
+    /// The contacts.
+    pub contacts: Vec<Episode>,
 }
+
+/// The columns of a table of contacts.
+pub const COLUMNS: &str = "recording,field,contact,onset [s],offset [s],whole,force_peak [N],impulse [N s],total_peak,\
+    total_time,pressure_peak,pressure_time,unit,area [m²],path [m]\n";
 
 impl Contacts {
     /// For frames of `source` on `body`.
@@ -58,35 +68,32 @@ impl Contacts {
     /// # Errors
     /// No engine can be made for them.
     pub fn new(body: &Body, calibration: Option<Calibration>, source: &dyn Source) -> Result<Self> {
-        let scene = Scene::default().outputs(Outputs::TOTAL | Outputs::FORCE);
+        let outputs = Outputs::TOTAL | Outputs::FORCE | Outputs::PEAK | Outputs::AREA | Outputs::CENTROID;
+        let scene = Scene::default().outputs(outputs);
         let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(BATCH);
         let mut engine = Engine::new(body, options)?;
         engine.set_channels(source.taxels())?;
         let plan = engine.plan();
-        let field = |index: usize| FieldContacts {
+        let field = |index: usize| FieldSamples {
             name: plan.label(index),
             quantity: plan.quantity(index),
-            contacts: 0,
-            since_s: None,
-            longest_s: 0.0,
-            whole: 0,
-            whole_s: 0.0,
-            load_sum: 0.0,
-            load_frames: 0,
-            load_peak: 0.0,
-            is_force: false,
-            began_touched: false,
+            samples: Vec::new(),
         };
         let fields = (0..plan.fields().len()).map(field).collect();
-        Ok(Self { engine, frames: Vec::new(), waiting: 0, fields, last_s: 0.0 })
+        Ok(Self { engine, frames: Vec::new(), waiting: 0, times_s: Vec::new(), fields })
     }
 
     /// Those in the MCAP at `path`, if it has its body, and that can be run. `goes_on` is asked after each frame, with how many were
     /// read; None if it does not wish to.
     ///
     /// # Errors
-    /// The file, or what is attached to it, cannot be read.
-    pub fn of_mcap(path: &Path, tell: &Tell, mut goes_on: impl FnMut(u64) -> bool) -> Result<Option<Self>> {
+    /// The file, or what is attached to it, cannot be read; or the rule asks for a force where there is none.
+    pub fn of_mcap(
+        path: &Path,
+        tell: &Tell,
+        rule: Rule,
+        mut goes_on: impl FnMut(u64) -> bool,
+    ) -> Result<Option<FoundContacts>> {
         let Some((name, bytes)) = attached::body(path)? else { return Ok(None) };
         let Ok(body) = Body::from_bytes(&name, &bytes) else { return Ok(None) };
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
@@ -105,8 +112,7 @@ impl Contacts {
                 return Ok(None);
             }
         }
-        contacts.finish()?;
-        Ok(Some(contacts))
+        contacts.finish(rule).map(Some)
     }
 
     /// Takes the next frame.
@@ -127,10 +133,12 @@ impl Contacts {
         let waiting = std::mem::take(&mut self.waiting);
         let percepts = self.engine.process(&self.frames[..waiting])?;
         for frame in 0..percepts.frames() {
-            let (t_s, is_first) = (percepts.t_s(frame), percepts.frame_number(frame) == 0);
-            self.last_s = t_s;
+            let number = u32::try_from(self.times_s.len()).unwrap_or(u32::MAX);
+            self.times_s.push(percepts.t_s(frame));
             for (field, percept) in self.fields.iter_mut().zip(percepts.frame(frame)) {
-                field.see(t_s, is_first, &percept);
+                if percept.contact {
+                    field.samples.push(sample(number, &percept));
+                }
             }
         }
         Ok(())
@@ -139,71 +147,138 @@ impl Contacts {
     /// Ends the recording; a contact that lasts has lasted until its last frame.
     ///
     /// # Errors
-    /// The engine's.
-    pub fn finish(&mut self) -> Result<()> {
+    /// The engine's; or `rule` asks for a force where there is none.
+    pub fn finish(mut self, rule: Rule) -> Result<FoundContacts> {
         self.follow()?;
-        for field in &mut self.fields {
-            if let Some(since_s) = field.since_s.take() {
-                field.longest_s = field.longest_s.max(self.last_s - since_s);
-            }
-        }
-        Ok(())
+        let loads = |field: &FieldSamples| field.samples.iter().map(Sample::load).fold(0.0, f64::max);
+        let is_force = |field: &FieldSamples| field.samples.iter().all(|sample| !sample.force.is_nan());
+        let newtons = self.fields.iter().filter(|field| is_force(field)).map(loads).fold(0.0, f64::max);
+        let pressed = self.fields.into_iter().filter(|field| !field.samples.is_empty());
+        let fields = pressed.map(|field| -> Result<FieldContacts> {
+            let (is_force, peak) = (is_force(&field), loads(&field));
+            let over = rule.over(peak, is_force, newtons)?;
+            let contacts = episodes(&field.samples, &self.times_s, over, rule.shortest_s);
+            let FieldSamples { name, quantity, samples } = field;
+            Ok(FieldContacts { name, quantity, samples, is_force, over, contacts })
+        });
+        Ok(FoundContacts { rule, fields: fields.collect::<Result<_>>()?, times_s: self.times_s })
     }
+}
 
-    /// The fields that are touched.
-    pub fn touched(&self) -> impl Iterator<Item = &FieldContacts> {
-        self.fields.iter().filter(|field| field.contacts > 0)
+/// What is kept of `percept` in frame `frame`.
+fn sample(frame: u32, percept: &Percept) -> Sample {
+    let single = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
+    Sample {
+        frame,
+        total: percept.total.unwrap_or(0.0) as f32,
+        force: single(percept.force),
+        peak: single(percept.peak),
+        area: single(percept.area),
+        centroid: percept.centroid.map_or([f32::NAN; 2], |at| at.map(|part| part as f32)),
     }
+}
 
+impl FoundContacts {
     /// The fields that are touched: times in seconds, loads in the unit that is named.
     pub fn as_json(&self) -> Vec<Value> {
         let json_of = |field: &FieldContacts| {
             json!({
-                "field": field.name, "contacts": field.contacts, "longest": field.longest_s,
-                "stance": field.stance_s(), "load_mean": field.load_mean(), "load_peak": field.load_peak,
-                "load_unit": field.load_quantity().symbol(),
+                "field": field.name, "contacts": field.contacts.len(), "whole": field.whole().count(),
+                "longest": field.longest_s(), "stance": field.stance_s(),
+                "quantity": if field.is_force { "force" } else { "total" }, "unit": field.load_quantity().symbol(),
+                "threshold": field.over, "mean": field.mean(), "peak": field.peak(),
             })
         };
-        self.touched().map(json_of).collect()
+        self.fields.iter().map(json_of).collect()
+    }
+
+    /// The fields that are touched.
+    pub fn fields(&self) -> &[FieldContacts] {
+        &self.fields
+    }
+
+    /// How long a contact lasts at least, s.
+    pub fn shortest_s(&self) -> f64 {
+        self.rule.shortest_s
+    }
+
+    /// The rows of a table of contacts of `recording`.
+    pub fn rows(&self, recording: &str) -> String {
+        let mut text = String::new();
+        for field in &self.fields {
+            let unit = field.quantity.symbol();
+            for (index, contact) in field.contacts.iter().enumerate() {
+                let found = summary(&field.samples[contact.from..contact.to], &self.times_s);
+                let [force, peak] = [found.force, found.peak]
+                    .map(|pair| pair.map_or([String::new(), String::new()], |pair| pair.map(digits)));
+                let or_empty = |value: Option<f64>| value.map_or(String::new(), digits);
+                let row = [
+                    quoted(recording),
+                    quoted(&field.name),
+                    (index + 1).to_string(),
+                    contact.onset_s.to_string(),
+                    contact.offset_s.to_string(),
+                    contact.is_whole.to_string(),
+                    force[0].clone(),
+                    force[1].clone(),
+                    digits(found.total[0]),
+                    digits(found.total[1]),
+                    peak[0].clone(),
+                    peak[1].clone(),
+                    unit.to_owned(),
+                    or_empty(found.area_m2),
+                    or_empty(found.path_m),
+                ];
+                text += &row.join(",");
+                text += "\n";
+            }
+        }
+        text
     }
 }
 
+/// With seven digits, as many as single precision has.
+fn digits(value: f64) -> String {
+    format!("{value:.6e}").parse::<f64>().map_or_else(|_| value.to_string(), |value| value.to_string())
+}
+
+/// `text` as a cell of a table.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
 impl FieldContacts {
-    fn see(&mut self, t_s: f64, is_first: bool, percept: &Percept) {
-        if percept.contact {
-            if self.since_s.is_none() {
-                self.contacts += 1;
-                self.since_s = Some(t_s);
-                self.began_touched = is_first;
-            }
-            self.is_force = percept.force.is_some();
-            let load = percept.force.or(percept.total).unwrap_or(0.0);
-            self.load_sum += load;
-            self.load_frames += 1;
-            self.load_peak = self.load_peak.max(load);
-        } else if let Some(since_s) = self.since_s.take() {
-            // Where recorded time goes back, nothing is known of how long it lasted.
-            let lasted_s = (t_s - since_s).max(0.0);
-            self.longest_s = self.longest_s.max(lasted_s);
-            if !self.began_touched {
-                self.whole += 1;
-                self.whole_s += lasted_s;
-            }
-        }
+    /// Contacts that began and ended in the recording.
+    fn whole(&self) -> impl Iterator<Item = &Episode> {
+        self.contacts.iter().filter(|contact| contact.is_whole)
     }
 
-    /// What loads are: force where it is known, else the total of P.
-    pub fn load_quantity(&self) -> Quantity {
-        if self.is_force { Quantity::Newton } else { self.quantity }
+    /// How long the longest contact is, s.
+    pub fn longest_s(&self) -> f64 {
+        self.contacts.iter().map(Episode::lasts_s).fold(0.0, f64::max)
     }
 
     /// How long contacts lasted that began and ended in the recording, s.
     pub fn stance_s(&self) -> Option<f64> {
-        (self.whole > 0).then(|| self.whole_s / self.whole as f64)
+        let whole = self.whole().count();
+        (whole > 0).then(|| self.whole().map(Episode::lasts_s).sum::<f64>() / whole as f64)
     }
 
-    /// The mean load while it is touched, in units of [`FieldContacts::load_quantity`].
-    pub fn load_mean(&self) -> Option<f64> {
-        (self.load_frames > 0).then(|| self.load_sum / self.load_frames as f64)
+    /// Of force where it is known, else of the total.
+    pub fn load_quantity(&self) -> Quantity {
+        if self.is_force { Quantity::Newton } else { self.quantity }
+    }
+
+    /// The mean over contacts.
+    pub fn mean(&self) -> Option<f64> {
+        let loads =
+            || self.contacts.iter().flat_map(|contact| &self.samples[contact.from..contact.to]).map(Sample::load);
+        let frames = loads().count();
+        (frames > 0).then(|| loads().sum::<f64>() / frames as f64)
+    }
+
+    /// The largest load.
+    pub fn peak(&self) -> f64 {
+        self.samples.iter().map(Sample::load).fold(0.0, f64::max)
     }
 }

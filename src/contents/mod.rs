@@ -2,11 +2,13 @@
 
 mod bag;
 mod contacts;
+mod episodes;
 mod quantities;
 mod recording;
 
 pub use self::bag::{bag_as_json, read_as, seconds_of};
-pub use self::contacts::{Contacts, FieldContacts};
+pub use self::contacts::{COLUMNS, Contacts, FieldContacts, FoundContacts};
+pub use self::episodes::{Episode, Rule, Threshold};
 pub use self::quantities::{Quantity, of_fields, of_touches};
 pub use self::recording::Contents;
 

@@ -1,6 +1,6 @@
 //! What a scene asks of a robot's joints.
 
-use super::{JointsDelay, SceneFile, StatesSpec};
+use super::{JointsDelay, SceneFile, StatesSpec, bag_of};
 use crate::error::{Error, Result};
 use crate::source::{BagName, SourceSpec};
 
@@ -21,11 +21,12 @@ impl SceneFile {
     }
 
     pub(super) fn check_joints(&self) -> Result<()> {
+        self.check_poses()?;
         let given = [
             ("joint_states", self.joint_states.is_some()),
             ("up", self.up.is_some()),
             ("joints_delay_s", self.joints_delay_s.is_some()),
-            ("joints_max_age_s", self.joints_max_age_s.is_some()),
+            ("joints_max_age_s", self.joints_max_age_s.is_some() && self.poses.is_none()),
         ];
         if self.joints.is_none() {
             return match given.into_iter().find(|(_, given)| *given) {
@@ -52,6 +53,18 @@ impl SceneFile {
         self.check_delay(states.as_ref())?;
         if let Some(age) = self.joints_max_age_s.filter(|age| age.is_nan() || *age < 0.0) {
             return Err(Error::usage(format!("`joints_max_age_s = {age}` is not a time span; give seconds from 0")));
+        }
+        Ok(())
+    }
+
+    /// Whether poses can be had of the bag that is named.
+    fn check_poses(&self) -> Result<()> {
+        let Some(poses) = &self.poses else { return Ok(()) };
+        bag_of(poses)?;
+        if self.repeat.is_some() {
+            return Err(Error::usage(
+                "`loop` lets the time of frames go on, and the bag of `poses` ends; leave `loop` out",
+            ));
         }
         Ok(())
     }

@@ -25,7 +25,7 @@ use self::deserialize::{OneOrMany, output_names};
 use self::deserialize::{batch, outputs, window, word, words};
 pub use self::joints_delay::JointsDelay;
 pub use self::lines::LineKeys;
-pub use self::states::StatesSpec;
+pub use self::states::{StatesSpec, bag_of};
 pub use self::target::{Target, angle, hertz, length, metres, seconds, time};
 pub use self::text::TextKeys;
 pub use self::touches::TouchKeys;
@@ -266,6 +266,11 @@ pub struct SceneFile {
     /// A recording is a CSV under t,<joint>,..., NDJSON, or a ROS 2 bag: a .mcap, a .db3, a folder, or
     /// ros2-mcap:PATH:/TOPIC.
     pub joint_states: Option<PathBuf>,
+
+    /// A ROS 2 bag with poses of links: its /tf, /tf_static and odometry, or ros2-mcap:PATH:/TOPIC,...
+    ///
+    /// Links are matched by name. The root of the transforms is the world. With `joints`, they are where the robot is.
+    pub poses: Option<PathBuf>,
 
     /// The URDF's axis that points up: z, or y if its axes are glTF's [default: the axis used for the body, else z].
     #[serde(deserialize_with = "word")]

@@ -23,6 +23,7 @@ impl SceneFile {
             zenoh_config: self.zenoh_config.map(there),
             joints: self.joints.map(there),
             joint_states: self.joint_states.map(|states| states_within(folder, states)),
+            poses: self.poses.map(|poses| states_within(folder, poses)),
             // A bundled body, unless a file is called the same.
             body: self.body.map(|body| match there(body.clone().into()) {
                 file if file.exists() || bundled::body(&body).is_none() => file.display().to_string(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::body::Body;
 use crate::output::OutputPaths;
-use crate::scene_file::{SceneFile, StatesSpec};
+use crate::scene_file::{SceneFile, StatesSpec, bag_of};
 use crate::source::{BagName, SimulatedSource, SourceSpec};
 
 /// Files that a command reads, whether they are there or not.
@@ -18,6 +18,10 @@ impl FilesRead {
         let named = named.chain(asked.layout.as_deref()).chain(asked.map.as_deref().map(Path::new));
         let named = named.chain(asked.joints.as_deref()).chain(asked.zenoh_config.as_deref());
         let files = Self::default().files(named).bodies(&asked.body).sources(&asked.sources);
+        let files = match asked.poses.as_deref().map(bag_of) {
+            Some(Ok(bag)) => files.bag(&bag),
+            _ => files,
+        };
         match asked.joint_states.as_deref().map(StatesSpec::named) {
             Some(Ok(StatesSpec::File(file))) => files.files([file]),
             Some(Ok(StatesSpec::Bag(bag))) => files.bag(&bag),

@@ -3,8 +3,8 @@
 use super::Setup;
 use crate::body::{Body, Up};
 use crate::error::{Error, Result};
-use crate::robot::{DelayEstimate, JointOptions, JointedSource, Kinematics};
-use crate::scene_file::{JointsDelay, StatesSpec};
+use crate::robot::{DelayEstimate, JointOptions, JointedSource, Kinematics, PosedSource, poses_of_bag};
+use crate::scene_file::{JointsDelay, StatesSpec, bag_of};
 use crate::source::{JointStates, Source, SourceSpec};
 
 /// What is added where nothing says which axis points up in the URDF.
@@ -31,8 +31,18 @@ impl Setup {
         }
     }
 
+    /// `source`, with poses of the links of `body` from the transforms of a bag, where these are asked for.
+    fn posed(&self, source: Box<dyn Source + Send>, body: &Body) -> Result<Box<dyn Source + Send>> {
+        let Some(bag) = &self.poses else { return Ok(source) };
+        let poses = poses_of_bag(&bag_of(bag)?)?;
+        let posed = PosedSource::new(source, poses, body, self.joints_max_age_s)?;
+        self.tell.say(posed.summary());
+        Ok(Box::new(posed))
+    }
+
     /// `source`, with poses of the links of `body` where joints are asked for.
     pub fn jointed(&self, source: Box<dyn Source + Send>, body: &Body) -> Result<Box<dyn Source + Send>> {
+        let source = self.posed(source, body)?;
         let Some(urdf) = &self.joints else { return Ok(source) };
         let known_up = self.up.or_else(|| body.urdf_up());
         let robot = Kinematics::load(urdf)?;
@@ -52,7 +62,11 @@ impl Setup {
                         "{e}; or name another file with joint states (joint_states, --joint-states FILE)"
                     )),
                 };
-                options.states = Some(crate::robot::joint_states_of_bag(&bag, self.skip_bad).map_err(failed)?);
+                let states = crate::robot::joint_states_of_bag(&bag, self.skip_bad).map_err(failed)?;
+                if let Some((_, topics)) = states.name().rsplit_once(": ").filter(|(_, topics)| topics.contains(", ")) {
+                    self.tell.say(&format!("{}: joint states of {topics} are joined", bag.path.display()));
+                }
+                options.states = Some(states);
                 source
             }
             Some(StatesSpec::File(file)) => {

@@ -1,5 +1,7 @@
 //! Values of a sensor that nothing touches: its baseline, its noise, and how far it moved.
 
+/// Minimum travel of a press, in dead bands.
+pub(super) const MIN_TRAVEL_BANDS: f64 = 3.0;
 /// Share of rest values that may exceed the noise.
 const EXCEEDING_SHARE: f64 = 1e-3;
 

@@ -117,7 +117,7 @@ mod tests {
             raw_range: None,
             missing: Vec::new(),
             unit: UnitOfP::COUNT,
-            crosstalk: None,
+            ..Findings::default()
         };
         let svg = findings.svg().unwrap();
         assert!(svg.contains("never pressed") && svg.contains("2 sensors, raw values falling when pressed"));

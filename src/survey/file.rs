@@ -3,42 +3,19 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use crate::error::{Error, Result};
-use crate::signal::UnitOfP;
-
-use super::known::{KnownForce, PressedOn};
-use super::{Findings, Found, median, rounded};
+use super::known_curve::KnownCurve;
+use super::{Findings, Found, median};
 
 impl Findings {
-    /// Gives the sensors gains with which the presses of the survey were `force` on what it pressed on. A sensor that was not
-    /// pressed has the middle one of the others' gains.
-    ///
-    /// # Errors
-    /// No sensor was pressed.
-    pub fn know(&mut self, KnownForce(newtons): KnownForce, on: PressedOn) -> Result<()> {
-        let mut travels: Vec<f64> = self.sensors.iter().filter_map(|found| found.travel).collect();
-        let Some(usual) = median(&mut travels) else {
-            return Err(Error::failed("no sensor was pressed, so that nothing is known of the force"));
-        };
-        let whole: f64 = travels.iter().sum();
-        for found in &mut self.sensors {
-            found.gain = rounded(match on {
-                PressedOn::Taxel => newtons / found.travel.unwrap_or(usual),
-                PressedOn::Field => newtons / whole,
-            });
-        }
-        self.unit = "N".parse::<UnitOfP>()?;
-        Ok(())
-    }
-
     /// The calibration, as `docs/reference/calibration.md` describes it, for the body called `body`. What most sensors share stands
     /// under `[all]`, the rest under each taxel.
     #[must_use]
     pub fn calibration(&self, body: &str) -> String {
         let sound = || self.sensors.iter().filter(|found| !self.is_lost(found));
         let baseline = commonest(sound().filter_map(|found| found.baseline));
-        let dead_band = commonest(sound().map(|found| found.dead_band));
-        let p_max = commonest(sound().filter_map(p_max));
+        let dead_band = commonest(sound().map(|found| number(self.p_of(found, found.dead_band))));
+        let p_max_of = |found: &Found| found.full.map(|full| number(self.p_of(found, full)));
+        let p_max = commonest(sound().filter_map(p_max_of));
         let mut sigmas: Vec<f64> = sound().filter_map(|found| found.sigma).map(number).collect();
         let sigma = median(&mut sigmas);
         let mut text = format!(
@@ -52,6 +29,12 @@ impl Findings {
         let mut line = |name: &str, value: String| {
             let _ = writeln!(text, "{name} = {value}");
         };
+        if let Some(scale) = self.scale {
+            line("scale", scale.to_string());
+        }
+        if let Some(usual) = self.curves.last() {
+            line("curve", quoted(&usual.name()));
+        }
         if sound().any(|found| found.full.is_some()) {
             line("p_max", p_max.to_string());
         }
@@ -72,9 +55,12 @@ impl Findings {
                 let all = [
                     ("baseline", found.baseline.unwrap_or(baseline), baseline),
                     ("gain", found.gain, 1.0),
-                    ("dead_band", found.dead_band * found.gain, dead_band),
-                    ("p_max", self::p_max(found).unwrap_or(p_max), p_max),
+                    ("dead_band", number(self.p_of(found, found.dead_band)), dead_band),
+                    ("p_max", p_max_of(found).unwrap_or(p_max), p_max),
                 ];
+                if let Some(curve) = self.curves.iter().find(|curve| curve.id == Some(found.id)) {
+                    own.push(("curve", quoted(&curve.name())));
+                }
                 let differs = all.iter().filter(|(_, own, all)| own != all);
                 own.extend(differs.map(|(name, own, _)| (*name, number(*own).to_string())));
                 if let Some(noise) = found.sigma.map(number).filter(|own| Some(*own) != sigma) {
@@ -88,13 +74,20 @@ impl Findings {
                 }
             }
         }
+        for curve in &self.curves {
+            let column = |part: usize| curve.knots.iter().map(|knot| number(knot[part])).collect::<Vec<_>>();
+            let _ = write!(text, "\n[curve.{}]\nraw = {:?}\np = {:?}\n", curve.name(), column(0), column(1));
+        }
         text
     }
-}
 
-/// Above which P a sensor is at the end of its range.
-fn p_max(found: &Found) -> Option<f64> {
-    found.full.map(|full| full * found.gain)
+    /// The P of `found` where it went `raw` units.
+    fn p_of(&self, found: &Found, raw: f64) -> f64 {
+        let own = self.curves.iter().find(|curve| curve.id == Some(found.id));
+        let curve: Option<&KnownCurve> = own.or(self.curves.last());
+        let p = curve.map_or(raw, |curve| curve.at(raw));
+        p * found.gain * self.scale.unwrap_or(1.0)
+    }
 }
 
 /// With six significant digits: more than a converter has.
@@ -118,6 +111,8 @@ fn commonest(values: impl Iterator<Item = f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Press;
+    use super::super::known::PressedOn;
     use super::*;
     use crate::signal::{Calibration, UnitOfP};
 
@@ -149,7 +144,7 @@ mod tests {
             raw_range: Some([0.0, 255.0]),
             missing,
             unit: UnitOfP::COUNT,
-            crosstalk: None,
+            ..Findings::default()
         };
         let text = findings.calibration("the \"left\" hand");
         let read = Calibration::parse(&text, &[4, 5, 6, 7]).unwrap();
@@ -161,5 +156,47 @@ mod tests {
         assert_eq!([a, b, c].map(|taxel| taxel.noise), [Some(0.5), Some(0.5), Some(0.75)]);
         assert_eq!(read.missing[0], [-1.0, 30_000.0]);
         assert!(d.mask && !a.mask && !c.mask);
+    }
+
+    #[test]
+    fn known_forces_become_a_scale_or_curves_that_are_read_as_they_were_found() {
+        let mut findings = Findings {
+            sensors: vec![found(4, Some(250.0)), found(5, Some(250.0)), found(6, Some(250.0))],
+            invert: true,
+            raw_range: Some([0.0, 255.0]),
+            missing: Vec::new(),
+            unit: UnitOfP::COUNT,
+            ..Findings::default()
+        };
+        // One factor, beside gains that were found before.
+        findings.sensors[1].gain = 2.0;
+        let mut by_field = findings.clone();
+        by_field.know(&"8N".parse().unwrap(), PressedOn::Field).unwrap();
+        let text = by_field.calibration("mat");
+        assert!(text.contains("\nscale = 0.01\n") && text.contains("unit = \"N\""), "{text}");
+        let read = Calibration::parse(&text, &[4, 5, 6]).unwrap();
+        assert_eq!(read.taxels.iter().map(|taxel| taxel.gain).collect::<Vec<_>>(), [-0.01, -0.02, -0.01]);
+        assert_eq!(read.taxels.iter().map(|taxel| taxel.dead_band).collect::<Vec<_>>(), [0.02, 0.04, 0.02]);
+        // Curves of the two that were pressed, and the middle one of the third.
+        findings.sensors[1].gain = 1.0;
+        let press = |sensor, travel| Press { sensor, travel, whole: travel };
+        findings.presses = vec![press(0, 100.0), press(1, 120.0), press(1, 180.0), press(0, 150.0)];
+        findings.know(&"1N,3N".parse().unwrap(), PressedOn::Taxel).unwrap();
+        let text = findings.calibration("mat");
+        let read = Calibration::parse(&text, &[4, 5, 6]).unwrap();
+        let curve = |taxel: usize| read.curve_of(&read.taxels[taxel], None).unwrap().unwrap();
+        assert_eq!(curve(0).written(), [[-249.5, 6.98], [-150.0, 3.0], [-100.0, 1.0], [0.0, 0.0]]);
+        assert_eq!(curve(1).written()[1..3], [[-180.0, 3.0], [-120.0, 1.0]]);
+        assert_eq!(read.taxels[0].p_max, 6.98);
+        assert_eq!(read.taxels[0].dead_band, 0.02);
+        assert!(text.contains("curve = \"usual\"") && curve(2).written()[2][1] == 1.0, "{text}");
+        // What does not fit is named.
+        let why = |presses: Vec<Press>| {
+            let mut wrong = findings.clone();
+            wrong.presses = presses;
+            wrong.know(&"1N,3N".parse().unwrap(), PressedOn::Taxel).unwrap_err().to_string()
+        };
+        assert!(why(vec![press(1, 100.0)]).contains("sensor 5 was pressed 1 times, and 2 forces are known"));
+        assert!(why(vec![press(1, 100.0), press(1, 90.0)]).contains("sensor 5 went 100 under 1 N and 90 under 3 N"));
     }
 }

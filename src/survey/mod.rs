@@ -15,6 +15,9 @@ mod figure;
 mod file;
 pub mod gains;
 pub mod known;
+mod known_curve;
+mod presses;
+pub mod scale;
 pub mod tuning;
 mod which_way;
 
@@ -22,8 +25,11 @@ use crate::Body;
 use crate::error::{Error, Result};
 use crate::signal::{RawValue, UnitOfP};
 
-use self::at_rest::{chance_of, median, middle, movement_of, rest_of, sigma_of};
+use self::at_rest::{MIN_TRAVEL_BANDS, chance_of, median, middle, movement_of, rest_of, sigma_of};
 use self::crosstalk::{Crosstalk, Leaks};
+use self::known_curve::KnownCurve;
+pub use self::presses::Press;
+use self::presses::Presses;
 
 /// Maximum number of values kept per sensor; a longer rest is decimated by powers of two.
 const MAX_REST_VALUES: usize = 4096;
@@ -31,8 +37,6 @@ const MAX_REST_VALUES: usize = 4096;
 const MIN_SIGMA_VALUES: usize = 32;
 /// Dead band over noise.
 const DEAD_BAND_MARGIN: f64 = 1.5;
-/// Minimum travel of a press, in dead bands.
-const MIN_TRAVEL_BANDS: f64 = 3.0;
 /// Maximum deviation by random noise, in standard deviations.
 const MAX_NOISE_SIGMAS: f64 = 12.0;
 /// A dead band is too wide above this share of the raw range where noise does not explain it,
@@ -53,6 +57,7 @@ pub struct Survey {
     rest_frames: usize,
     stride: usize,
     pressed: Vec<Pressed>,
+    presses: Presses,
     leaks: Leaks,
     /// Baselines and dead bands, from the first press on.
     before_press: Vec<Option<(f64, f64)>>,
@@ -125,7 +130,7 @@ pub struct Found {
 }
 
 /// What a survey has come to.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
     /// The sensors, in the order of the survey.
     pub sensors: Vec<Found>,
@@ -139,6 +144,14 @@ pub struct Findings {
     pub unit: UnitOfP,
     /// What presses show on the rows and columns of sensors, if anything.
     pub crosstalk: Option<Crosstalk>,
+    /// Presses one after the other.
+    pub presses: Vec<Press>,
+    /// What every gain is multiplied by, where known forces gave one factor for all.
+    pub scale: Option<f64>,
+    /// Curves of sensors that several known forces pressed, the last one the middle of them.
+    pub curves: Vec<KnownCurve>,
+    /// How well known forces agree, in words.
+    pub known: Option<String>,
 }
 
 impl Survey {
@@ -150,6 +163,7 @@ impl Survey {
             rest_frames: 0,
             stride: 1,
             pressed: vec![Pressed::default(); ids.len()],
+            presses: Presses::default(),
             leaks: Leaks::default(),
             before_press: Vec::new(),
             whole_numbers: true,
@@ -198,6 +212,8 @@ impl Survey {
             self.before_press = self.rest.iter().map(rest).collect();
         }
         self.leaks.see(values, &self.before_press);
+        let step = self.step();
+        self.presses.see(values.iter().map(|value| value.number()), &self.before_press, step);
         for (pressed, value) in self.pressed.iter_mut().zip(values) {
             if let Some(value) = value.number() {
                 pressed.see(value as f32);
@@ -285,7 +301,18 @@ impl Survey {
         let sensors: Vec<Found> = sensors.collect();
         let mut bands: Vec<f64> = sensors.iter().map(|found| found.dead_band).collect();
         let crosstalk = self.leaks.found(median(&mut bands).unwrap_or(0.0), |band| self.rounded_band(band));
-        Ok(Findings { sensors, invert, raw_range, missing: Vec::new(), unit: UnitOfP::COUNT, crosstalk })
+        Ok(Findings {
+            sensors,
+            invert,
+            raw_range,
+            missing: Vec::new(),
+            unit: UnitOfP::COUNT,
+            crosstalk,
+            presses: self.presses.all(),
+            scale: None,
+            curves: Vec::new(),
+            known: None,
+        })
     }
 
     /// The step between raw values: 1 for whole numbers.
@@ -398,6 +425,7 @@ impl Findings {
             .filter(|(_, ids)| !ids.is_empty())
             .map(|(what, ids)| format!("{} of {} sensors {what}: {}", ids.len(), self.sensors.len(), several(&ids)))
             .chain(self.crosstalk.map(|found| found.to_string()))
+            .chain(self.known.clone())
             .collect()
     }
 

@@ -191,6 +191,67 @@ pub(super) fn refused(code: i32, arguments: &[&str]) -> String {
 }
 
 #[test]
+fn joint_states_of_two_topics_are_joined_unless_both_have_a_joint() {
+    let (folder, body) = arm();
+    let expected = of_tables(&body);
+    let mut messages = said(&ONE_CLOCK);
+    for one in &mut messages {
+        if matches!(&one.what, What::Joints(names, _) if names[0] == "shoulder") {
+            one.topic = "/shoulder_states";
+        }
+    }
+    let path = folder.path().join("two.mcap");
+    write_mcap(&path, &messages, "cdr");
+    let bag = format!("ros2-mcap:{}", text_of(&path));
+    for states in [bag.clone(), format!("{bag}:/joint_states,/shoulder_states")] {
+        let ran = output(&with(&run_of(&body, &bag, &states), &[]));
+        let told = stderr(&ran);
+        assert!(told.contains("joint states of /joint_states, /shoulder_states are joined"), "{told}");
+        assert_eq!((ran.status.code(), String::from_utf8(ran.stdout).unwrap()), (Some(0), expected.clone()), "{told}");
+    }
+    // One alone lacks a joint; and where both have one, none is preferred.
+    let why = refused(1, &with(&run_of(&body, &bag, &format!("{bag}:/shoulder_states")), &[]));
+    assert!(why.contains("no state has joint `elbow`"), "{why}");
+    let first = messages.iter().position(|one| one.topic == "/joint_states").unwrap();
+    messages[first].what = What::Joints(vec!["shoulder".to_owned()], vec![0.0]);
+    write_mcap(&path, &messages, "cdr");
+    let why = refused(1, &with(&run_of(&body, &bag, &bag), &[]));
+    assert!(why.contains("joint `shoulder` is in /") && why.contains("name the topics to read"), "{why}");
+}
+
+#[test]
+fn poses_of_a_bag_put_percepts_where_joints_do() {
+    let (folder, body) = arm();
+    let touch = format!("{ROBOT}/arm-touch.csv");
+    let bag = format!("ros2-mcap:{}", text_of(&folder.path().join("moved")));
+    let jointed = run_of(&body, &touch, &format!("{ROBOT}/arm-joints.csv"));
+    let expected = frames(&done(&with(&jointed, &["--sink", &bag])));
+    let run = ["run", "--backend", "reference", "--body", text_of(&body), "--source", &touch, "--sink", "-"];
+    let posed = output(&[&run[..], &["--poses", &bag]].concat());
+    assert!(stderr(&posed).contains("links, in `world`"), "{}", stderr(&posed));
+    let posed = frames(&String::from_utf8(posed.stdout).unwrap());
+    let mut compared = 0;
+    for (expected, found) in expected.iter().zip(&posed) {
+        let of = |frame: &Value| -> Vec<Value> { frame["fields"].as_array().cloned().unwrap_or_default() };
+        for (expected, found) in of(expected).iter().zip(of(found)).filter(|(one, _)| one["link"] == "world") {
+            assert_eq!((&found["field"], &found["link"]), (&expected["field"], &expected["link"]));
+            for axis in 0..3 {
+                let [a, b] = [&expected, &&found].map(|one| one["position"][axis].as_f64().unwrap());
+                assert!((a - b).abs() < 1e-9, "{expected} and {found}");
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared > 50 && posed.len() == expected.len(), "{compared}");
+    // A bag without transforms, and no bag.
+    let none = folder.path().join("none.mcap");
+    write_mcap(&none, &said(&ONE_CLOCK), "cdr");
+    let why = refused(1, &[&run[..], &["--poses", text_of(&none)]].concat());
+    assert!(why.contains("it has no topic of tf2_msgs/msg/TFMessage or nav_msgs/msg/Odometry"), "{why}");
+    assert!(fails(2, &[&run[..], &["--poses", "poses.csv"]].concat()).contains("poses come from a ROS 2 bag"));
+}
+
+#[test]
 fn a_bag_gives_the_percepts_of_the_tables_that_it_holds() {
     let (folder, body) = arm();
     let expected = of_tables(&body);
@@ -377,7 +438,7 @@ fn bags_that_are_not_read_say_what_to_do_and_cut_ones_give_what_is_whole() {
     two.iter_mut().step_by(2).filter(|one| one.topic != "/skin").for_each(|one| one.topic = "/left/joint_states");
     write_mcap(&at("two.mcap"), &two, "cdr");
     let why = refused(1, &with(&run(text_of(&at("two.mcap"))), &[]));
-    assert!(why.contains("/joint_states, /left/joint_states; name one: ros2-mcap:"), "{why}");
+    assert!(why.contains("/left/joint_states") && why.contains("name the topics to read, such as ros2-mcap:"), "{why}");
     let why = refused(1, &with(&run(&format!("ros2-mcap:{}:/skin", text_of(&at("two.mcap")))), &[]));
     assert!(why.contains("/skin: its messages are sensor_msgs/msg/PointCloud2"), "{why}");
     let why = refused(1, &with(&run(text_of(&at("none.mcap"))), &[]));

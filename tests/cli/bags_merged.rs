@@ -282,7 +282,7 @@ fn what_cannot_be_merged_is_one_line_with_what_to_do() {
     done(&with(&run_of(&body, &format!("ros2-mcap:{}@{CLOUD}", text_of(&at("mixed.mcap")))), &[]));
     done(&with(&run_of(&body, &format!("ros2-mcap:{}:/n", text_of(&at("mixed.mcap")))), &[]));
 
-    // A bag without joint states, and one with two topics named.
+    // A bag without joint states, and one with topics named that have none.
     let joints = joints();
     let jointed = joints.each_ref().map(String::as_str);
     let source = format!("ros2-mcap:{}:/a,/b", text_of(&at("mixed.mcap")));
@@ -292,7 +292,7 @@ fn what_cannot_be_merged_is_one_line_with_what_to_do() {
         "{why}"
     );
     let states = [&jointed[..], &["--joint-states", &source]].concat();
-    assert!(refused(1, &with(&run_of(&body, &source), &states)).contains("leave out /b"));
+    assert!(refused(1, &with(&run_of(&body, &source), &states)).contains("sensor_msgs/msg/JointState is read"));
     let looped = [&jointed[..], &["--loop"]].concat();
     assert!(fails(2, &with(&run_of(&body, &source), &looped)).contains("leave --loop out"));
 
@@ -424,7 +424,7 @@ fn info_lists_the_topics_of_a_bag() {
         assert_eq!(row(&format!("/somatic/taxels/{link}")), (CLOUD, 101, Some("frames")));
     }
     assert_eq!(row("/joint_states"), ("sensor_msgs/msg/JointState", 101, Some("joint states")));
-    assert_eq!(row("/tf").2, None);
+    assert_eq!(row("/tf").2, Some("poses"));
     let rate_hz = known["topics"][0]["rate_hz"].as_f64().unwrap();
     assert!((rate_hz - 50.0).abs() < 1e-6, "{known}");
     assert_eq!(info(text_of(&bag)), known, "its folder is known as a bag");

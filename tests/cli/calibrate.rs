@@ -208,3 +208,98 @@ fn a_press_that_shows_its_row_and_its_column_is_named_with_its_size() {
 
     assert!(found(0.0)["crosstalk"].is_null());
 }
+
+/// Frames at 50 Hz of four sensors that rest at 100: two seconds of rest, then these presses, how far each sensor goes.
+fn presses(all: &[[f64; 4]]) -> String {
+    let mut text = "t,0,1,2,3\n".to_owned();
+    let mut frame = 0;
+    let mut put = |values: [f64; 4], times: usize| {
+        for _ in 0..times {
+            let cells = values.map(|value| (100.0 + value).to_string()).join(",");
+            text += &format!("{},{cells}\n", 0.02 * f64::from(frame));
+            frame += 1;
+        }
+    };
+    put([0.0; 4], 100);
+    for &press in all {
+        put(press, 20);
+        put([0.0; 4], 20);
+    }
+    text
+}
+
+/// The largest force of the whole body in each press of `source`, N.
+fn forces(body: &str, source: &str, calibration: &str, count: usize) -> Vec<f64> {
+    let run = ["run", "--quiet", "--body", body, "--source", source, "--calibration", calibration, "--backend", "cpu"];
+    let all = frames(&done(&[&run[..], &["--outputs", "force", "--all-fields"]].concat()));
+    let force = |frame: &Value| frame["fields"][0]["force"].as_f64().unwrap_or(0.0);
+    (0..count).map(|press| force(&all[100 + 40 * press + 10])).collect()
+}
+
+#[test]
+fn several_weights_make_a_curve_of_each_sensor_and_one_scale_of_a_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let body = at("row.glb");
+    done(&["author", "--grid", "1x4", "--pitch", "18mm", "-o", &body]);
+    let calibrate = |source: &str, to: &str, more: &[&str]| {
+        done(&[&["calibrate", "--body", &body, "--source", source, "-o", to][..], more].concat())
+    };
+    // Each sensor has its own gain, and answers less and less.
+    let each: Vec<[f64; 4]> = [1.0, 1.1, 0.9, 1.2]
+        .iter()
+        .enumerate()
+        .flat_map(|(sensor, gain)| {
+            [100.0, 160.0, 250.0].map(|travel: f64| {
+                let mut press = [0.0; 4];
+                press[sensor] = (travel * gain).round();
+                press
+            })
+        })
+        .collect();
+    std::fs::write(at("each.csv"), presses(&each)).unwrap();
+    calibrate(&at("each.csv"), &at("curve.toml"), &["--rest", "2", "--known", "1N,2N,5N", "--on", "taxel"]);
+    let curves = std::fs::read_to_string(at("curve.toml")).unwrap();
+    assert!(curves.contains("curve = \"taxel_3\"") && curves.contains("[curve.usual]"), "{curves}");
+    for (press, force) in forces(&body, &at("each.csv"), &at("curve.toml"), 12).into_iter().enumerate() {
+        let known = [1.0, 2.0, 5.0][press % 3];
+        assert!((force / known - 1.0).abs() < 1e-3, "press {press}: {force} N");
+    }
+    let wrong = ["--rest", "2", "--known", "1N,2N", "--on", "taxel"];
+    let why =
+        fails(1, &[&["calibrate", "--body", &body, "--source", &at("each.csv"), "-o", &at("no")][..], &wrong].concat());
+    assert!(why.contains("sensor 0 was pressed 3 times, and 2 forces are known"), "{why}");
+
+    // One scale beside gains that were found before.
+    calibrate(&at("each.csv"), &at("equal.toml"), &["--rest", "2", "--equalise"]);
+    let gains = std::fs::read_to_string(at("equal.toml")).unwrap();
+    let field = [100.0, 200.0, 150.0].map(|travel: f64| [1.0, 1.1, 0.9, 1.2].map(|gain| (travel * gain).round()));
+    std::fs::write(at("field.csv"), presses(&field)).unwrap();
+    let known = ["--known", "4N,8N,6N", "--on", "field", "--calibration", &at("equal.toml")];
+    let told = calibrate(&at("field.csv"), &at("newton.toml"), &known);
+    assert!(told.contains("one scale for 3 presses"), "{told}");
+    let scaled = std::fs::read_to_string(at("newton.toml")).unwrap();
+    assert!(scaled.contains("\nscale = 0.0") && scaled.contains("unit = \"N\""), "{scaled}");
+    assert!(gains.lines().filter(|line| line.starts_with("gain = ")).all(|line| scaled.contains(line)), "{scaled}");
+    for (force, known) in forces(&body, &at("field.csv"), &at("newton.toml"), 3).into_iter().zip([4.0, 8.0, 6.0]) {
+        assert!((force / known - 1.0).abs() < 0.02, "{force} N for {known} N");
+    }
+    // The same without a file before: what is found at rest gets it.
+    calibrate(&at("field.csv"), &at("once.toml"), &["--rest", "2", "--known", "4N,8N,6N", "--on", "field"]);
+    for (force, known) in forces(&body, &at("field.csv"), &at("once.toml"), 3).into_iter().zip([4.0, 8.0, 6.0]) {
+        assert!((force / known - 1.0).abs() < 0.02, "{force} N for {known} N");
+    }
+    let alone = [
+        "calibrate",
+        "--body",
+        &body,
+        "--source",
+        &at("field.csv"),
+        "-o",
+        &at("no"),
+        "--calibration",
+        &at("newton.toml"),
+    ];
+    assert!(fails(2, &alone).contains("--calibration is for --gains-from and --known"));
+    assert!(!folder.path().join("no").exists());
+}

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use somatic_testing::skip;
+
 use super::{done, fails, file, frames, output, stderr, text_of};
 
 /// The documentation's example: two insoles.
@@ -77,10 +79,125 @@ fn what_is_known_of_an_export_is_reported() {
     assert_eq!((&known["kind"], &known["unit"], &known["frames"]), (&"XSENSOR".into(), &"mmHg".into(), &60.into()));
     assert_eq!((&known["panels"][1]["name"], &known["panels"][1]["taxels"]), (&"right".into(), &341.into()));
     let left = &known["fields"][0];
-    assert_eq!((&left["field"], &left["contacts"], &left["load_unit"]), (&"left".into(), &1.into(), &"N".into()));
+    assert_eq!((&left["field"], &left["contacts"], &left["unit"]), (&"left".into(), &1.into(), &"N".into()));
+    assert_eq!((&left["quantity"], &left["threshold"]), (&"force".into(), &20.0.into()));
     assert!((0.5..0.7).contains(&left["stance"].as_f64().unwrap()), "{left}");
     let text = done(&["info", INSOLES]);
     assert!(text.contains("682: left 341, right 341") && text.contains("unit        mmHg"), "{text}");
+}
+
+/// Rows of a plain table of two sensors in N at 100 Hz, of which one feels these forces.
+fn plain(forces: &[f64]) -> String {
+    forces.iter().map(|force| format!("{force} 0\n")).collect()
+}
+
+#[test]
+fn a_flicker_is_no_stance() {
+    let mut forces = vec![0.0; 20];
+    for stance in 0..3 {
+        forces.extend([3.0, 0.0, 3.0, 0.0, 0.0]);
+        forces.extend((0..60).map(|frame| 600.0 - 8.0 * f64::from((frame - 30_i32).abs()) + f64::from(stance)));
+        forces.extend([15.0, 3.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0]);
+    }
+    let (_folder, path) = file("step.txt", &plain(&forces));
+    let info = |more: &[&str]| -> Value {
+        let asked =
+            ["info", text_of(&path), "--grid", "1x2", "--pitch", "5mm", "--rate", "100", "--unit", "N", "--json"];
+        serde_json::from_str(&done(&[&asked[..], more].concat())).unwrap()
+    };
+    let field = &info(&[])["fields"][0];
+    assert_eq!((&field["contacts"], &field["whole"], &field["threshold"]), (&3.into(), &3.into(), &20.0.into()));
+    assert!((0.60..=0.62).contains(&field["stance"].as_f64().unwrap()), "{field}");
+    assert_eq!(info(&["--threshold", "1N", "--shortest", "0"])["fields"][0]["contacts"], 12);
+    assert_eq!(info(&["--threshold", "1%", "--shortest", "100ms"])["fields"][0]["contacts"], 3);
+    let text = done(&["info", text_of(&path), "--grid", "1x2", "--pitch", "5mm", "--rate", "100", "--unit", "N"]);
+    assert!(text.contains("force, peak") && !text.contains("load") && text.contains("lasts 50 ms or more"), "{text}");
+    // A sum of pressures is no load.
+    let (_folder, pedar, _) = pedar();
+    let text = done(&["info", &pedar]);
+    assert!(text.contains("total, peak") && !text.contains("load") && !text.contains("force"), "{text}");
+    assert!(fails(2, &["info", &pedar, "--threshold", "20N"]).contains("give a share of the peak"));
+}
+
+#[test]
+fn contacts_of_several_recordings_are_one_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("contacts.csv");
+    let mat = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/exports/mat.asf");
+    done(&["info", INSOLES, mat, "--contacts", text_of(&table)]);
+    let text = std::fs::read_to_string(&table).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 4, "{text}");
+    let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap_or_else(|| panic!("{name}: {text}"));
+    assert_eq!(rows[1..].iter().map(|row| row[column("recording")]).collect::<Vec<_>>(), [INSOLES, INSOLES, mat]);
+    assert_eq!(rows[1..].iter().map(|row| row[column("field")]).collect::<Vec<_>>(), ["left", "right", "sensor"]);
+    for row in &rows[1..] {
+        let number = |name: &str| row[column(name)].parse::<f64>().unwrap_or_else(|_| panic!("{name}: {row:?}"));
+        let lasts = number("offset [s]") - number("onset [s]");
+        let mean = number("impulse [N s]") / lasts;
+        assert!(lasts > 0.4 && mean > 0.3 * number("force_peak [N]") && mean < number("force_peak [N]"), "{row:?}");
+        assert!(number("pressure_time") > 0.0 && number("pressure_time") < lasts * number("pressure_peak"), "{row:?}");
+        assert!(number("area [m²]") > 1e-4 && number("path [m]") > 0.0 && row[column("unit")] == "Pa", "{row:?}");
+    }
+    // The force of an insole is what `run` gives.
+    let left = run(&["--source", INSOLES, "--outputs", "force", "--fields", "left"]);
+    let forces = left.iter().filter_map(|frame| frame["fields"][0]["force"].as_f64());
+    let largest = rows[1][column("force_peak [N]")].parse::<f64>().unwrap();
+    assert!((forces.fold(0.0, f64::max) / largest - 1.0).abs() < 1e-5, "{text}");
+    assert!(fails(1, &["info", INSOLES, "--contacts", text_of(&table)]).contains("it exists"));
+    let touch = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/touch.csv");
+    let none = folder.path().join("none.csv");
+    assert!(fails(1, &["info", touch, "--contacts", text_of(&none)]).contains("it has no body"));
+    assert!(!none.exists());
+    let both: Value = serde_json::from_str(&done(&["info", INSOLES, mat, "--json"])).unwrap();
+    assert_eq!(both.as_array().map(Vec::len), Some(2));
+}
+
+#[test]
+fn steps_of_real_insoles_are_those_that_were_made() {
+    let root = std::env::var("SOMATIC_DATA").unwrap_or_else(|_| "../shared/data".to_owned());
+    let path = format!("{root}/recordings/vendor/pedar_example.asc");
+    if !Path::new(&path).exists() {
+        return skip("DATA", format!("{path} is not there; set SOMATIC_DATA to the folder that has it"));
+    }
+    let known: Value = serde_json::from_str(&done(&["info", &path, "--json"])).unwrap();
+    let counted =
+        |of: &str| known["fields"].as_array().unwrap().iter().map(|field| field[of].clone()).collect::<Vec<_>>();
+    // Ten of each foot. Both stand when the recording begins, and the right one when it ends.
+    assert_eq!(counted("contacts"), [10, 10]);
+    assert_eq!(counted("whole"), [9, 8]);
+}
+
+#[test]
+fn an_export_becomes_a_body_with_named_zones() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (body, zones, listed) = (at("body.glb"), at("zones.glb"), at("listed.glb"));
+    done(&["convert", INSOLES, "-o", &body]);
+    let told = done(&["author", &body, "--zones", "heel=30%,midfoot,forefoot=30%,toes=15%", "-o", &zones]);
+    assert!(told.contains("left/heel: ") && told.contains("right/toes: "), "{told}");
+    let force = |frame: &Value, name: &str| {
+        let fields = frame["fields"].as_array().unwrap();
+        fields.iter().find(|field| field["field"] == name).and_then(|field| field["force"].as_f64()).unwrap_or(0.0)
+    };
+    // The zones of a foot are all of it, and a step goes from the heel to the toes.
+    let all = run(&["--source", INSOLES, "--body", &zones, "--outputs", "force", "--all-fields"]);
+    let names = ["left/heel", "left/midfoot", "left/forefoot", "left/toes"];
+    for frame in &all {
+        let sum: f64 = names.iter().map(|name| force(frame, name)).sum();
+        assert!((sum - force(frame, "left")).abs() < 1e-3 * sum.max(1.0), "{frame}");
+    }
+    let peaks = names.map(|name| all.iter().map(|frame| force(frame, name)).fold(0.0, f64::max));
+    assert!(peaks.iter().filter(|peak| **peak > 0.0).count() >= 3, "{peaks:?}");
+    std::fs::write(at("masks.csv"), "taxel,zone\n0,toe\n1,toe\n2,big\n").unwrap();
+    done(&["author", &body, "--zones", &at("masks.csv"), "-o", &listed]);
+    let inspected: Value = serde_json::from_str(&done(&["inspect", &listed, "--json"])).unwrap();
+    let named: Vec<&str> =
+        inspected["fields"].as_array().unwrap().iter().map(|field| field["name"].as_str().unwrap()).collect();
+    assert!(named.contains(&"left/toe") && named.contains(&"left/big"), "{named:?}");
+    let (_folder, bare, _) = pedar();
+    assert!(fails(1, &["convert", &bare, "-o", &at("no.glb")]).contains("give their places as --layout"));
+    assert!(fails(2, &["author", &body, "--zones", "heel,heel", "-o", &at("no.glb")]).contains("a name of its own"));
 }
 
 #[test]
@@ -256,7 +373,7 @@ fn places_of_insoles_are_used_by_every_command_that_reads_them() {
     let (force, centroid) = (&placed[5]["fields"][0]["force"], &placed[5]["fields"][0]["centroid"]);
     assert!((force.as_f64().unwrap() - 5.0 * 60.0 * 1000.0 * 1e-4).abs() < 1e-3 && centroid.is_array(), "{force}");
     let info: Value = serde_json::from_str(&done(&["info", &path, "--layout", &table, "--json"])).unwrap();
-    assert_eq!((&info["panels"][0]["placed"], &info["fields"][0]["load_unit"]), (&true.into(), &"N".into()), "{info}");
+    assert_eq!((&info["panels"][0]["placed"], &info["fields"][0]["unit"]), (&true.into(), &"N".into()), "{info}");
     let plot = folder.path().join("walk.svg");
     done(&["plot", &path, "--layout", &table, "-o", text_of(&plot)]);
     assert!(std::fs::read_to_string(&plot).unwrap().len() > 1000);

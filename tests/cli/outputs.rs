@@ -88,6 +88,12 @@ const WRITTEN: &[Written] = &[
     },
     Written {
         flag: "--output",
+        command: "author hand.glb --zones points.csv --output OUT",
+        ending: ".glb",
+        reads: &["hand.glb", "points.csv"],
+    },
+    Written {
+        flag: "--output",
         command: "author --compare hand.glb hand.glb --output OUT",
         ending: ".svg",
         reads: &["hand.glb"],
@@ -123,6 +129,7 @@ const WRITTEN: &[Written] = &[
         ending: "",
         reads: &["touch.csv", "hand.glb", "cal.toml"],
     },
+    Written { flag: "--contacts", command: "info mcap:touch.mcap --contacts OUT", ending: "", reads: &["touch.mcap"] },
     Written { flag: "--output", command: "convert hand.glb --output OUT", ending: ".csv", reads: &["hand.glb"] },
     Written { flag: "--output", command: "convert hand.glb --output OUT", ending: ".urdf", reads: &["hand.glb"] },
     Written { flag: "OUT", command: "convert sim:sim.toml csv:OUT", ending: "", reads: &["sim.toml", "hand.glb"] },
@@ -141,6 +148,12 @@ const WRITTEN: &[Written] = &[
     Written {
         flag: "--output",
         command: "calibrate --body hand.glb --gains-from touch.csv --calibration cal.toml --output OUT",
+        ending: "",
+        reads: &["hand.glb", "touch.csv", "cal.toml"],
+    },
+    Written {
+        flag: "--output",
+        command: "calibrate --body hand.glb --source touch.csv --known 1N --on field --calibration cal.toml --output OUT",
         ending: "",
         reads: &["hand.glb", "touch.csv", "cal.toml"],
     },

@@ -94,6 +94,54 @@ fn wrong_lines_of_plain_tables_are_left_out_and_their_frames_keep_their_times() 
 }
 
 #[test]
+fn frames_of_several_lines_are_left_out_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/exports");
+    let run = |path: &str| -> Vec<String> {
+        let run = [
+            "run",
+            "--quiet",
+            "--backend",
+            "reference",
+            "--outputs",
+            "force",
+            "--all-fields",
+            "--sink",
+            "-",
+            "--source",
+            path,
+        ];
+        run.map(str::to_owned).to_vec()
+    };
+    let told = |text: &str| -> Vec<(String, String)> {
+        frames(text).iter().map(|frame| (frame["t"].to_string(), frame["fields"].to_string())).collect()
+    };
+    // A wrong cell within a frame, and a row too few, which the next frame shows.
+    for (name, mark, number, wrong) in
+        [("insoles.csv", "FRAME", 9, "0,0,0,0,0,0,0,0,0,0,0\n"), ("mat.asf", "Frame ", 14, "0,0,0,0,0,0\n")]
+    {
+        let whole = format!("{examples}/{name}");
+        let text = fs::read_to_string(&whole).unwrap();
+        let mut expected = told(&done(&with(&run(&whole), &[])));
+        expected.remove(number);
+        let start = text.match_indices(mark).nth(number).unwrap().0;
+        let row = start + text[start..].find(wrong).unwrap();
+        for (what, changed) in [("x,", wrong.replacen("0,", "x,", 1)), ("", String::new())] {
+            let path = folder.path().join(name);
+            fs::write(&path, format!("{}{changed}{}", &text[..row], &text[row + wrong.len()..])).unwrap();
+            let arguments = run(text_of(&path));
+            let why = refused(1, &with(&arguments, &[]));
+            assert!(why.contains(&format!("{name}: line ")), "{what}: {why}");
+            let skipping = output(&with(&arguments, &["--skip-bad"]));
+            let said = stderr(&skipping);
+            assert_eq!(skipping.status.code(), Some(3), "{said}");
+            assert!(said.contains("1 frame skipped, a line that does not fit"), "{said}");
+            assert_eq!(told(&String::from_utf8_lossy(&skipping.stdout)), expected, "{name}, {what}: {said}");
+        }
+    }
+}
+
+#[test]
 fn messages_of_bags_that_do_not_fit_are_left_out() {
     let (folder, body) = arm();
     let array = |(ns, cells): (u64, Vec<(String, f64)>)| {

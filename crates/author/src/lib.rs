@@ -60,6 +60,7 @@ mod surface_search;
 mod table_body;
 mod tear;
 mod voronoi;
+mod zones;
 
 pub use cell_spread::cell_spread;
 pub use coverage::{Coverage, Hole, LinkCoverage, coverage};
@@ -75,6 +76,7 @@ pub use report::PlaceReport;
 pub use sheet::{GridOrder, Sheet, SheetCell, SheetGrid, author_sheets, sheets};
 pub use skin::{Authored, author, author_while};
 pub use table_body::author_csv_skin;
+pub use zones::{Zones, author_zones};
 
 pub use crate::body::{blend_skinning, heaviest_four};
 

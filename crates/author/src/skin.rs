@@ -200,7 +200,7 @@ fn group(
 }
 
 /// Adds `fields` as empty nodes, each below its anchor and in the middle of its taxels.
-fn add_fields(file: &mut Original, body: &Body, details: &Details, fields: &[FieldSpec]) {
+pub(super) fn add_fields(file: &mut Original, body: &Body, details: &Details, fields: &[FieldSpec]) {
     let mut addition = file.addition();
     for (field, ids) in fields.iter().zip(unions(fields)) {
         let taxels: Vec<&Taxel> =

@@ -188,6 +188,18 @@ impl BagReader {
     }
 }
 
+/// The topics of the bag at `path`, with the types of their messages.
+///
+/// # Errors
+/// It cannot be read, or is not a bag.
+pub fn topics_of_bag(path: &Path) -> Result<Vec<(String, String)>> {
+    let topics = topics_of(&bag_files(path)?)?;
+    let kinds = |(name, all): (String, BTreeSet<(String, String)>)| {
+        all.into_iter().map(move |(kind, _)| (name.clone(), kind)).collect::<Vec<_>>()
+    };
+    Ok(topics.into_iter().flat_map(kinds).collect())
+}
+
 /// The topics of all `files`.
 fn topics_of(files: &[PathBuf]) -> Result<Topics> {
     let mut topics = Topics::new();

@@ -36,7 +36,7 @@ mod yaml_list;
 use somatic_skin::{body, error, limits, output, signal};
 
 pub use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
-pub use self::bag_reader::{BagMessage, BagReader, DefinedTopic, WantedTopics};
+pub use self::bag_reader::{BagMessage, BagReader, DefinedTopic, WantedTopics, topics_of_bag};
 pub use self::bag_survey::{BagSurvey, SurveyedTopic};
 pub use self::entries::Attached;
 pub use self::reader::Reader;

@@ -11,8 +11,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use somatic::author::{Recipe, author};
+use somatic::internal::author::{Zones, author_zones};
 use somatic::internal::body::Original;
 use somatic::internal::error::nearest;
+use somatic::internal::limits::{self, MAX_TABLE_BYTES};
 use somatic::internal::setup::FilesRead;
 use somatic::{Error, Result, bundled};
 
@@ -31,6 +33,7 @@ Examples:
   somatic author arm.glb --spacing 8mm --region 'forearm*' -o skin.glb
   somatic author arm.gltf --unit mm --recipe arm.toml -o skin.glb
   somatic author --grid 31x11 --pitch 8.6mm -o insole.glb       a flat sheet; it needs no mesh
+  somatic author insole.glb --zones heel=30%,midfoot,toes=15% -o zones.glb
   somatic author finger.stl --unit mm --spacing 3mm -o finger.glb
   somatic author --icub left_hand.txt left_forearm.txt -o icub.glb
   somatic author --urdf-skin robot.urdf --geometry none -o robot.glb
@@ -118,6 +121,14 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
 
+    /// Named zones of each topmost field, from the bottom of the page up or from the left to the right, such as heel=30%,midfoot,toes.
+    ///
+    /// A share is of the length; zones without one share the rest equally. Or a table: a CSV with the columns taxel and
+    /// zone. Taxels and other fields stay.
+    #[arg(long, value_name = "NAME,...|FILE.csv", requires = "mesh",
+        conflicts_with_all = ["recipe", "taxels", "spacing", "region", "seed", "unit", "even", "hidden", "clear", "mirror"])]
+    zones: Option<String>,
+
     #[command(flatten)]
     mesh_file: MeshArguments,
 
@@ -178,9 +189,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
     };
     let read = FilesRead::default().bodies(&arguments.mesh).files(&arguments.recipe).files(arguments.sheet.files());
     let read = read.files(recipe.iter().flat_map(Recipe::files)).files(foreign.iter().flat_map(MeshFile::files));
-    let read = read.files(arguments.skin.files(&arguments.mesh_file)?);
+    let read = read.files(arguments.skin.files(&arguments.mesh_file)?).files(arguments.zone_table());
     let output = read.outputs(arguments.force).add(path)?;
     let authored = match (&recipe, &arguments.mesh) {
+        (_, Some(mesh)) if arguments.zones.is_some() => {
+            let file = foreign.as_ref().map_or_else(|| open(mesh), MeshFile::open)?;
+            author_zones(file, &arguments.read_zones()?)?
+        }
         (Some(recipe), Some(mesh)) => {
             let file = foreign.as_ref().map_or_else(|| open(mesh), MeshFile::open)?;
             if foreign.is_some() && recipe.is_empty() {
@@ -199,6 +214,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
         false => text(path, &authored, errors.as_ref(), foreign.as_ref().is_some_and(MeshFile::is_visual_robot)),
     })?;
     Ok(DONE)
+}
+
+impl Arguments {
+    /// The table of zones, if one is named.
+    fn zone_table(&self) -> Option<&Path> {
+        let path = Path::new(self.zones.as_deref()?);
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")).then_some(path)
+    }
+
+    fn read_zones(&self) -> Result<Zones> {
+        match (self.zone_table(), &self.zones) {
+            (Some(path), _) => {
+                let text = limits::read_to_string(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e))?;
+                Zones::of_table(&path.display().to_string(), &text)
+            }
+            (None, zones) => Zones::of_shares(zones.as_deref().unwrap_or_default()).map_err(|e| e.at("--zones")),
+        }
+    }
 }
 
 fn recipe(arguments: &Arguments) -> Result<Recipe> {

@@ -1,11 +1,14 @@
 //! The skin of a body as a table or a URDF.
 
 use std::path::Path;
+use std::slice;
 
 use somatic::internal::convert::SkinFormat;
 use somatic::internal::setup::FilesRead;
+use somatic::internal::setup::attached;
 use somatic::internal::setup::bodies::load_body;
-use somatic::{Error, Result};
+use somatic::source::{SourceSpec, VendorOptions, VendorSource};
+use somatic::{Body, Error, Result};
 
 use crate::cli::stdio::{DONE, say};
 use crate::cli::words::count;
@@ -28,5 +31,35 @@ pub(super) fn convert(from: &str, to: &str, force: bool) -> Result<u8> {
     output.write(text.as_bytes())?;
     say(&format!("{} in {name}", count(format.taxels(&body) as u64, "taxel")));
     notes.iter().chain(&format.without_fields(&body)).for_each(|note| say(note));
+    Ok(DONE)
+}
+
+/// Writes the body that the recording `from` has, which is called `name` and read with `options`, to `to`.
+pub(super) fn of_recording(
+    (name, from): (&String, &SourceSpec),
+    options: &VendorOptions,
+    to: &str,
+    force: bool,
+) -> Result<u8> {
+    let read = FilesRead::default().named(slice::from_ref(name)).files(&options.layout);
+    let output = read.outputs(force).add(to)?;
+    let (name, bytes) = match from {
+        SourceSpec::Vendor(path) => {
+            let export = VendorSource::open(path, options)?;
+            if !export.layout().is_placed() {
+                let what = "the file does not say where its sensors are; give their places as --layout";
+                return Err(Error::failed(what).at(path.display()));
+            }
+            (export.body_name(), export.body()?)
+        }
+        SourceSpec::Mcap(path) => attached::body(path)?.ok_or_else(|| {
+            Error::failed("it has no body; record it with one: somatic run --body BODY").at(path.display())
+        })?,
+        _ => return Err(Error::failed("it has no body; make one: somatic author --help").at(name)),
+    };
+    let body = Body::from_bytes(&name, &bytes)?;
+    let name = output.name().display().to_string();
+    output.write(&bytes)?;
+    say(&format!("{} in {name}", count(body.taxels.len() as u64, "taxel")));
     Ok(DONE)
 }

@@ -269,6 +269,12 @@ pub(in crate::cli) struct RunFlags {
     #[arg(long, help_heading = ROBOT, value_name = "FILE")]
     pub(in crate::cli) joint_states: Option<PathBuf>,
 
+    /// A ROS 2 bag with poses of links: its /tf, /tf_static and odometry, or ros2-mcap:PATH:/TOPIC,...
+    ///
+    /// Links are matched by name. The root of the transforms is the world. With --joints, they are where the robot is.
+    #[arg(long, help_heading = ROBOT, value_name = "BAG")]
+    pub(in crate::cli) poses: Option<PathBuf>,
+
     /// The URDF's axis that points up: z, or y if its axes are glTF's [default: the axis used for the body, else z].
     #[arg(long, help_heading = ROBOT, value_name = "AXIS", value_parser = one_of::<Up>(Up::WORDS))]
     pub(in crate::cli) up: Option<Up>,
@@ -389,7 +395,7 @@ impl RunFlags {
             };
         }
         lay! {
-            values: zenoh_config ros_time joints joint_states up joints_delay_s joints_max_age_s body backend calibration rate_hz wiring
+            values: zenoh_config ros_time joints joint_states poses up joints_delay_s joints_max_age_s body backend calibration rate_hz wiring
                 format grid pitch unit layout map live_rate_hz board_rate_hz batch playback_speed from_s to_s repeat max_age_s max_gap_s
                 contact_tolerance_m coordinates relative_to filter_window filter_by filter_time_s filter_over_s,
             lists: allow_hosts outputs fields letters signal record,

@@ -60,6 +60,7 @@ fn body(what: &str, asked: &RunFlags) -> Result<Subject> {
         let about_frames = [
             ("--joints", asked.joints.is_some()),
             ("--joint-states", asked.joint_states.is_some()),
+            ("--poses", asked.poses.is_some()),
             ("--calibration", asked.calibration.is_some()),
             ("--outputs", !asked.outputs.is_empty()),
             ("--fields", !asked.fields.is_empty()),

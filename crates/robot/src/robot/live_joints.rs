@@ -40,8 +40,9 @@ pub struct LiveJoints {
     source: Box<dyn Source + Send>,
     name: String,
     node: Node,
-    topic: String,
-    states: Reader<JointState>,
+    topics: Vec<String>,
+    /// By topic.
+    states: Vec<Reader<JointState>>,
     /// When it began to wait for the first state; nothing once that has come.
     waits_since: Option<Instant>,
     /// Whether it has reported that no state comes.
@@ -55,7 +56,7 @@ pub struct LiveJoints {
 }
 
 impl LiveJoints {
-    /// Reads `topic`, whose messages are `sensor_msgs/msg/JointState`, for the frames of `source`.
+    /// Reads `topic`, whose messages are `sensor_msgs/msg/JointState`, for the frames of `source`; or several topics with commas between.
     ///
     /// # Errors
     /// There is no network, or the name is none of a topic.
@@ -63,11 +64,13 @@ impl LiveJoints {
         let name = format!("joint states `ros2:{topic}`");
         let at = |e: Error| e.at(&name);
         let mut node = Node::new("", NODE).map_err(at)?;
-        let states = node.reader(topic, JointState::TYPE, Delivery::BestEffort { depth: DEPTH }).map_err(at)?;
+        let topics: Vec<String> = topic.split(',').map(str::to_owned).collect();
+        let mut reader = |topic: &String| node.reader(topic, JointState::TYPE, Delivery::BestEffort { depth: DEPTH });
+        let states = topics.iter().map(&mut reader).collect::<Result<_>>().map_err(at)?;
         Ok(Self {
             source,
             node,
-            topic: topic.to_owned(),
+            topics,
             states,
             waits_since: Some(Instant::now()),
             has_reported: false,
@@ -80,15 +83,17 @@ impl LiveJoints {
     }
 
     fn read_states(&mut self) -> Result<()> {
-        while let Some(state) = self.states.take()? {
-            let stamp = state.header.stamp.frame_time();
-            take_state(&state, |joint, position| {
-                if self.time != StatesTime::Arrival {
-                    self.stamped.add(joint, stamp, position);
-                }
-                self.arrived.insert(joint.to_owned(), position);
-            })?;
-            self.waits_since = None;
+        for states in &mut self.states {
+            while let Some(state) = states.take()? {
+                let stamp = state.header.stamp.frame_time();
+                take_state(&state, |joint, position| {
+                    if self.time != StatesTime::Arrival {
+                        self.stamped.add(joint, stamp, position);
+                    }
+                    self.arrived.insert(joint.to_owned(), position);
+                })?;
+                self.waits_since = None;
+            }
         }
         Ok(())
     }
@@ -113,7 +118,7 @@ impl LiveJoints {
         let waited_s = self.waits_since?.elapsed().as_secs_f64();
         let mut others = self.node.topics();
         // A reader makes its own topic known, too.
-        others.retain(|(topic, kind)| kind == JointState::TYPE && *topic != self.topic);
+        others.retain(|(topic, kind)| kind == JointState::TYPE && !self.topics.contains(topic));
         let others: Vec<String> = others.into_iter().map(|(topic, _)| topic).collect();
         let there = if others.is_empty() {
             "no other topic has any".to_owned()

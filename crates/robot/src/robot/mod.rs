@@ -16,6 +16,8 @@
 //! ```
 
 #[cfg(feature = "mcap")]
+mod bag_poses;
+#[cfg(feature = "mcap")]
 mod bag_source;
 #[cfg(feature = "mcap")]
 mod bag_states;
@@ -44,11 +46,15 @@ mod matching;
 pub mod messages;
 #[cfg(any(feature = "mcap", feature = "ros2"))]
 mod places;
+#[cfg(feature = "mcap")]
+mod posed_source;
 #[cfg(feature = "ros2")]
 mod ros2_source;
 #[cfg(feature = "ros2")]
 mod stamped_states;
 
+#[cfg(feature = "mcap")]
+pub use bag_poses::{BagPoses, poses_of_bag};
 #[cfg(feature = "mcap")]
 pub use bag_source::BagSource;
 #[cfg(feature = "mcap")]
@@ -67,5 +73,7 @@ pub use live_joints::{LiveJoints, StatesTime};
 pub use mapped_bag::mapped_bag;
 #[cfg(feature = "meshes")]
 pub use matching::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M};
+#[cfg(feature = "mcap")]
+pub use posed_source::PosedSource;
 #[cfg(feature = "ros2")]
 pub use ros2_source::Ros2Source;

@@ -82,6 +82,7 @@ impl Calibration {
                 );
                 return Err(text.wrong(id.span(), what));
             }
+            keys.only_for_one(id.get_ref(), text)?;
             if let Some(codes) = keys.missing(text)? {
                 missing[index] = codes;
             }
@@ -138,6 +139,25 @@ mod tests {
         assert_eq!([0, 1].map(|taxel| calibration.taxels[taxel].noise), [Some(1.5), Some(0.0)]);
         assert_eq!(Calibration::parse("", &[3]).unwrap().taxels[0].noise, None);
         assert!(calibration.taxels[1].mask && !calibration.taxels[0].mask);
+    }
+
+    #[test]
+    fn a_scale_multiplies_every_gain_and_no_other_key() {
+        let text = "[curve.a]\nraw = [0, 10]\np = [0, 4]\n[all]\nscale = 0.5\ngain = 3\ndead_band = 2\np_max = 90\nunit = \"kPa\"\n\
+             [taxel.7]\ngain = 4\ninvert = true\n[taxel.9]\ncurve = \"a\"\n";
+        let read = Calibration::parse(text, &[3, 7, 9]).unwrap();
+        assert_eq!(read.taxels.iter().map(|taxel| taxel.gain).collect::<Vec<_>>(), [1500.0, -2000.0, 1500.0]);
+        assert!(read.taxels.iter().all(|taxel| (taxel.dead_band, taxel.p_max) == (2000.0, 90_000.0)));
+        let why = |text: &str| without_column(&Calibration::parse(text, &[3, 7]).unwrap_err().to_string());
+        assert_eq!(why("[all]\nscale = 0"), "line 2: `scale` is 0; it must be between 1e-12 and 1e12");
+        assert_eq!(
+            why("[taxel.7]\nscale = 2"),
+            "line 2: `scale` is a key of [all], for every gain; give [taxel.7] its own `gain`"
+        );
+        assert_eq!(
+            why("[all]\ngain = 1e-10\nscale = 1e-6"),
+            "line 3: `scale` makes a gain 1e-16; gains must be between 1e-12 and 1e12"
+        );
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub(super) struct Keys {
     sensors: Option<Spanned<String>>,
     baseline: Option<Spanned<f64>>,
     gain: Option<Spanned<f64>>,
+    scale: Option<Spanned<f64>>,
     invert: Option<bool>,
     dead_band: Option<Spanned<f64>>,
     onset: Option<Spanned<String>>,
@@ -50,6 +51,17 @@ impl Keys {
             raw => Err(text.wrong(code.span(), format!("`missing` has {raw}; its values must be finite raw values"))),
         };
         codes.get_ref().iter().map(code).collect::<Result<_>>().map(Some)
+    }
+
+    /// Refuses keys that hold for all taxels alike under a single one.
+    pub(super) fn only_for_one(&self, id: &str, text: Text<'_>) -> Result<()> {
+        match &self.scale {
+            Some(scale) => {
+                let what = format!("`scale` is a key of [all], for every gain; give [taxel.{id}] its own `gain`");
+                Err(text.wrong(scale.span(), what))
+            }
+            None => Ok(()),
+        }
     }
 }
 
@@ -86,6 +98,8 @@ pub(super) struct Draft {
     baseline_at: Option<usize>,
     gain_at: Option<usize>,
     range_given: bool,
+    /// What every gain is multiplied by, and where that stands.
+    scale: Option<(f64, usize)>,
 }
 
 #[derive(Clone, Copy, Default, PartialEq)]
@@ -131,6 +145,11 @@ impl Draft {
             "over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)",
         )? {
             taxel.gain = x.copysign(taxel.gain);
+        }
+        if let (Some(x), Some(scale)) =
+            (number("scale", &keys.scale, &|x| GAIN_RANGE.contains(&x), "between 1e-12 and 1e12")?, &keys.scale)
+        {
+            self.scale = Some((x, scale.span().start));
         }
         if let Some(invert) = keys.invert {
             taxel.gain = if invert { -taxel.gain.abs() } else { taxel.gain.abs() };
@@ -236,7 +255,15 @@ impl Draft {
     }
 
     /// The finished calibration, if its keys fit together.
-    pub(super) fn finish(self, curves: &[Curve], text: Text<'_>) -> Result<TaxelCalibration> {
+    pub(super) fn finish(mut self, curves: &[Curve], text: Text<'_>) -> Result<TaxelCalibration> {
+        if let Some((scale, at)) = self.scale {
+            self.taxel.gain *= scale;
+            if !GAIN_RANGE.contains(&self.taxel.gain.abs()) {
+                let gain = self.taxel.gain.abs();
+                let what = format!("`scale` makes a gain {gain:e}; gains must be between 1e-12 and 1e12");
+                return Err(text.wrong(at..at, what));
+            }
+        }
         let mut taxel = self.taxel;
         match self.kind {
             Kind::Linear => self.check_baseline(text)?,

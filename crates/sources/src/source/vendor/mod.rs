@@ -170,7 +170,12 @@ impl VendorSource {
                         self.ended = true;
                         return Err(self.unskipped(error));
                     }
-                    self.skipped.skip("line", "not a frame", error)?;
+                    let (thing, wrong) = if self.parser.is_of_lines() {
+                        ("frame", "a line that does not fit")
+                    } else {
+                        ("line", "not a frame")
+                    };
+                    self.skipped.skip(thing, wrong, error)?;
                 }
             }
         }
@@ -181,7 +186,9 @@ impl VendorSource {
     fn unskipped(&self, error: Error) -> Error {
         match self.skipped.is_on() {
             false => error,
-            true => failed!("{error}; --skip-bad skips whole frames of one line, and this is part of more"),
+            true => failed!(
+                "{error}; --skip-bad skips frames of one line, and those of XSENSOR and Tekscan after the first one; correct the file"
+            ),
         }
     }
 

@@ -18,9 +18,14 @@ pub(super) trait Parser: Send {
     /// The last frame is incomplete.
     fn end(&mut self, to: &mut Frame) -> Result<bool>;
 
-    /// Goes on after a line that is not what it should be, as if it were not there; its frame counts for the times that a rate
-    /// gives. `false` if that is not possible, as frames are of several lines.
+    /// Goes on after a line that is not what it should be, with the next frame; its own frame counts for the times that a rate
+    /// gives. `false` if that is not possible, as nothing marks where the next frame begins.
     fn go_on(&mut self) -> bool {
+        false
+    }
+
+    /// Whether frames are of several lines, so that [`Parser::go_on`] passes over the rest of one.
+    fn is_of_lines(&self) -> bool {
         false
     }
 
@@ -70,5 +75,32 @@ impl Rate {
             (None, Some(hz)) => Ok(index / hz),
             (None, None) => Err(Error::usage("the recording has no times; give its frame rate with --rate HZ")),
         }
+    }
+}
+
+/// Where a reader of frames of several lines, whose first lines are marked, goes on after a wrong line.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct AfterWrong {
+    /// What is left of a frame is passed over.
+    is_passing: bool,
+    /// The wrong line is the first one of the next frame, and showed that the frame before is not whole.
+    has_begun: bool,
+}
+
+impl AfterWrong {
+    /// Whether a line is passed over, which `begins` a frame or does not.
+    pub(super) fn passes(&self, begins: impl FnOnce() -> bool) -> bool {
+        self.is_passing && !begins()
+    }
+
+    /// A frame begins; `before` is what became of the one before.
+    pub(super) fn begin(&mut self, before: &Result<bool>) {
+        *self = Self { is_passing: false, has_begun: before.is_err() };
+    }
+
+    /// After a wrong line, passes over the rest of its frame; `false` if the next one has begun.
+    pub(super) fn pass_rest(&mut self) -> bool {
+        self.is_passing = !std::mem::take(&mut self.has_begun);
+        self.is_passing
     }
 }

@@ -3,7 +3,7 @@
 //! `B` marks places without a sensor. They also part panels: cells that touch each other, corners included, are one.
 
 use super::layout::{Cell, Grid, Layout, Panel, value};
-use super::parser::{Parser, Rate};
+use super::parser::{AfterWrong, Parser, Rate};
 use super::text::{Separator, Word, leading_number, metres};
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue, UnitOfP};
@@ -22,6 +22,7 @@ pub(super) struct Tekscan {
     frame: Option<Started>,
     /// The cells of the first frame.
     first_cells: Vec<Option<RawValue>>,
+    after_wrong: AfterWrong,
 }
 
 struct Started {
@@ -52,6 +53,7 @@ impl Tekscan {
             values: Vec::new(),
             frame: None,
             first_cells: Vec::new(),
+            after_wrong: AfterWrong::default(),
         }
     }
 
@@ -226,16 +228,20 @@ fn panel(name: &str, map: Grid, members: &[usize]) -> Panel {
 impl Parser for Tekscan {
     fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
         let mut cells = self.separator.cells(line);
+        if self.after_wrong.passes(|| cells.clone().next().is_some_and(|word| word.after("Frame ").is_some())) {
+            return Ok(false);
+        }
         let Some(word) = cells.next().filter(|_| !line.trim_ascii().is_empty()) else {
             // A blank line ends a frame whose number of rows is unknown.
             let ends = self.keys.rows.is_none() && self.frame.as_ref().is_some_and(|frame| frame.rows > 0);
             return if ends { self.finish(to) } else { Ok(false) };
         };
         if let Some(number) = word.after("Frame ") {
-            let complete = self.finish(to)?;
+            let complete = self.finish(to);
+            self.after_wrong.begin(&complete);
             let t_s = cells.next().and_then(Word::number);
             self.frame = Some(Started { number: number.parse().ok(), t_s, rows: 0 });
-            return Ok(complete);
+            return complete;
         }
         if word.is("@@") {
             return self.finish(to);
@@ -251,6 +257,22 @@ impl Parser for Tekscan {
 
     fn end(&mut self, to: &mut Frame) -> Result<bool> {
         self.finish(to)
+    }
+
+    fn go_on(&mut self) -> bool {
+        if self.map.is_empty() {
+            return false;
+        }
+        self.rate.pass();
+        self.values.fill(RawValue::MISSING);
+        if self.after_wrong.pass_rest() {
+            self.frame = None;
+        }
+        true
+    }
+
+    fn is_of_lines(&self) -> bool {
+        true
     }
 
     fn layout(&self) -> Layout {

@@ -5,7 +5,7 @@
 //! and height in the file have only two digits.
 
 use super::layout::{Grid, Layout, next_value};
-use super::parser::{Parser, Rate};
+use super::parser::{AfterWrong, Parser, Rate};
 use super::text::{Cells, Separator, Word, in_parentheses, metres};
 use super::time::OfDay;
 use crate::error::{Error, Result, failed};
@@ -25,6 +25,7 @@ pub(super) struct Xsensor {
     frame: Option<Started>,
     time: OfDay,
     values: Vec<RawValue>,
+    after_wrong: AfterWrong,
 }
 
 /// A frame that is not complete yet.
@@ -74,6 +75,7 @@ impl Xsensor {
             frame: None,
             time: OfDay::default(),
             values: Vec::new(),
+            after_wrong: AfterWrong::default(),
         }
     }
 
@@ -222,6 +224,9 @@ impl Xsensor {
 impl Parser for Xsensor {
     fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
         let mut cells = self.separator.cells(line);
+        if self.after_wrong.passes(|| cells.clone().next().is_some_and(|word| word.is("FRAME"))) {
+            return Ok(false);
+        }
         // Most lines are rows of cells, and no keyword begins with a digit.
         if line.first().is_some_and(u8::is_ascii_digit) {
             match self.place {
@@ -234,12 +239,13 @@ impl Parser for Xsensor {
         let Some(word) = word.filter(|_| !is_blank(line)) else { return Ok(false) };
         let keyword = |name: &str| word.is(name);
         if keyword("FRAME") {
-            let complete = self.finish(to)?;
+            let complete = self.finish(to);
+            self.after_wrong.begin(&complete);
             cells.next();
             let number = cells.next().and_then(Word::whole);
             self.place = Place::Head;
             self.frame = Some(Started { number, t_s: None, seen: vec![false; self.sensors.len()] });
-            return Ok(complete);
+            return complete;
         }
         if let Place::Table { sensor, row } = self.place {
             if keyword("SENSOR") || keyword("GROUP") {
@@ -285,6 +291,22 @@ impl Parser for Xsensor {
 
     fn end(&mut self, to: &mut Frame) -> Result<bool> {
         self.finish(to)
+    }
+
+    fn go_on(&mut self) -> bool {
+        if !self.is_known {
+            return false;
+        }
+        self.rate.pass();
+        self.values.fill(RawValue::MISSING);
+        if self.after_wrong.pass_rest() {
+            (self.frame, self.place) = (None, Place::Head);
+        }
+        true
+    }
+
+    fn is_of_lines(&self) -> bool {
+        true
     }
 
     fn layout(&self) -> Layout {
