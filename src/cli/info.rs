@@ -57,7 +57,7 @@ pub(super) struct Arguments {
     /// Where contacts begin: a force, or a share of the field's peak [default: 20N if a force of any field reaches it, else 5%].
     ///
     /// They end at half of it.
-    #[arg(long, value_name = "20N|5%", value_parser = str::parse::<Threshold>)]
+    #[arg(long, value_name = "FORCE|SHARE", value_parser = str::parse::<Threshold>)]
     threshold: Option<Threshold>,
 
     /// How long contacts last at least; shorter ones do not count.

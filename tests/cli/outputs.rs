@@ -479,6 +479,8 @@ const READ: &[&str] = &[
     "--body",
     "--joints",
     "--joint-states",
+    "--poses",
+    "--zones",
     "--source",
     "--calibration",
     "--wiring",
@@ -501,6 +503,7 @@ const READ: &[&str] = &[
     "<IN>",
     "<FILE.toml>",
     "<FILE>",
+    "<FILE>...",
     "[WHAT]",
 ];
 
@@ -515,7 +518,8 @@ const NO_FILES: &[&str] = &[
     "F",
     "FAULTS",
     "FIELD",
-    "FORCE",
+    "FORCE,...",
+    "FORCE|SHARE",
     "FORMAT",
     "FRAME",
     "GLOB",
