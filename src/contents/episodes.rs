@@ -74,7 +74,7 @@ impl Rule {
 
 /// A field in a frame in which it is pressed.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub(super) struct Sample {
     /// Which of the recording's frames it is.
     pub frame: u32,
     /// ΣP.
@@ -91,7 +91,7 @@ pub struct Sample {
 
 impl Sample {
     /// Force where it is known, else the total.
-    pub fn load(&self) -> f64 {
+    pub(super) fn load(&self) -> f64 {
         if self.force.is_nan() { self.total.into() } else { self.force.into() }
     }
 }
@@ -117,7 +117,7 @@ impl Episode {
 }
 
 /// The contacts in `samples`, whose frames are at `times_s`, that begin above `over` and last for `shortest_s`.
-pub fn episodes(samples: &[Sample], times_s: &[f64], over: f64, shortest_s: f64) -> Vec<Episode> {
+pub(super) fn episodes(samples: &[Sample], times_s: &[f64], over: f64, shortest_s: f64) -> Vec<Episode> {
     let mut found: Vec<Episode> = Vec::new();
     let mut begun: Option<usize> = None;
     let time = |frame: u32| times_s[(frame as usize).min(times_s.len() - 1)];
@@ -150,7 +150,7 @@ pub fn episodes(samples: &[Sample], times_s: &[f64], over: f64, shortest_s: f64)
 
 /// What a contact comes to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Summary {
+pub(super) struct Summary {
     /// The largest force, N, and force over time, N s.
     pub force: Option<[f64; 2]>,
     /// The largest ΣP, and ΣP over time.
@@ -164,7 +164,7 @@ pub struct Summary {
 }
 
 /// What the `samples` of one contact come to, whose frames are at `times_s`.
-pub fn summary(samples: &[Sample], times_s: &[f64]) -> Summary {
+pub(super) fn summary(samples: &[Sample], times_s: &[f64]) -> Summary {
     let steps = || {
         samples.windows(2).filter_map(|pair| {
             let step_s = times_s[pair[1].frame as usize] - times_s[pair[0].frame as usize];

@@ -249,20 +249,20 @@ pub(super) fn bag_db3() -> Target {
     let body = Body::from_bytes("hand", bundled::HAND).unwrap();
     target("bag_db3", "a.db3", [seeds::bag_db3()], move |case| {
         let read = BagSource::open(&BagName::new(case.path), &body).and_then(|mut source| frames(&mut source));
-        told(read)?;
-        told(BagSurvey::read(case.path, |_| {}))
+        verdict(read)?;
+        verdict(BagSurvey::read(case.path, |_| {}))
     })
 }
 
 pub(super) fn map() -> Target {
-    target("map", "a.toml", [seeds::MAP], |case| told(ArrayMap::parse(&case.text())))
+    target("map", "a.toml", [seeds::MAP], |case| verdict(ArrayMap::parse(&case.text())))
 }
 
 pub(super) fn mapped_lines() -> Target {
     target("mapped_lines", "a.ndjson", [seeds::MAPPED_LINES], |case| {
         let map = ArrayMap::parse("values = ['pads[*].p', 'digits']\ndecoder = 'u8'").unwrap();
         let source = JsonLines::open(case.path, &map).and_then(|lines| MappedSource::new(Box::new(lines), &map, true));
-        told(source.and_then(|mut source| frames(&mut source)))
+        verdict(source.and_then(|mut source| frames(&mut source)))
     })
 }
 

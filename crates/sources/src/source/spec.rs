@@ -12,7 +12,7 @@ use super::{CsvSource, NdjsonSource, SimulatedSource, Source, TextPlace, TextSou
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 12] = [
+const FORMS: [(&str, &str); 13] = [
     ("csv", "csv:FILE"),
     ("ndjson", "ndjson:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
