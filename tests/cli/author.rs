@@ -31,12 +31,12 @@ fn a_mesh_gets_a_skin_that_is_inspected_and_run() {
             && text.contains("least mm"),
         "{text}"
     );
-    let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
-    let fields = told["fields"].as_array().unwrap();
+    let reported: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    let fields = reported["fields"].as_array().unwrap();
     let charted = fields.iter().filter(|field| !field["chart"].is_null()).count();
     assert!(text.contains(&format!(" {charted} of {} fields have centroids", fields.len())), "{text}");
     // Every taxel is in a field that has centroids, below the field of its link.
-    for taxel in told["taxels"].as_array().unwrap() {
+    for taxel in reported["taxels"].as_array().unwrap() {
         let holds = |field: &&Value| {
             let members = field["members"].as_array().unwrap();
             !field["chart"].is_null() && members.iter().any(|member| member["taxel"] == taxel["id"])
@@ -44,7 +44,7 @@ fn a_mesh_gets_a_skin_that_is_inspected_and_run() {
         let name = fields.iter().find(holds).expect("it has one")["name"].as_str().unwrap();
         assert!(name.starts_with(taxel["link"].as_str().unwrap()), "{name}");
     }
-    assert_eq!(told["taxels"].as_array().unwrap().len(), 300);
+    assert_eq!(reported["taxels"].as_array().unwrap().len(), 300);
     // Each taxel pressed in its turn is felt by the field of its link.
     let mut csv = format!("t,{}\n", (0..300).map(|id| id.to_string()).collect::<Vec<_>>().join(","));
     for frame in 0..300 {
@@ -56,7 +56,7 @@ fn a_mesh_gets_a_skin_that_is_inspected_and_run() {
     let percepts = done(&["run", "--body", text_of(&path), "--source", text_of(&touch), "--backend", "cpu"]);
     let felt = frames(&percepts);
     assert_eq!(felt.len(), 300);
-    for (frame, taxel) in felt.iter().zip(told["taxels"].as_array().unwrap()) {
+    for (frame, taxel) in felt.iter().zip(reported["taxels"].as_array().unwrap()) {
         let touched = frame["fields"].as_array().unwrap();
         assert_eq!((&touched[0]["field"], &touched[0]["total"]), (&taxel["link"], &Value::from(50.0)));
         let least = touched.iter().filter(|field| !field["centroid"].is_null());
@@ -69,12 +69,12 @@ fn flags_say_how_even_taxels_are_and_where() {
     let spread = |more: &[&str]| -> [f64; 2] {
         let (_folder, path, text) = skin(&[&["--taxels", "200", "--json"], more].concat());
         let made: Value = serde_json::from_str(&text).unwrap();
-        let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+        let reported: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
         let cells = |of: &Value| ["p5", "p95"].map(|key| of["cells"][key].as_f64().unwrap());
-        let (made, told) = (cells(&made["places"][0]), cells(&told));
+        let (made, reported) = (cells(&made["places"][0]), cells(&reported));
         // Areas are stored in single precision.
-        assert!((0..2).all(|end| (made[end] - told[end]).abs() < 1e-6), "{made:?} {told:?}");
-        told
+        assert!((0..2).all(|end| (made[end] - reported[end]).abs() < 1e-6), "{made:?} {reported:?}");
+        reported
     };
     let (even, scattered) = (spread(&[]), spread(&["--even", "off", "--hidden", "keep"]));
     assert!(even[0] > 0.85 && even[1] < 1.15, "{even:?}");
@@ -90,8 +90,8 @@ fn flags_say_how_even_taxels_are_and_where() {
 fn a_mirrored_skin_says_which_ids_are_pairs() {
     let (_folder, path, text) = skin(&["--taxels", "300", "--mirror", "y"]);
     assert!(text.contains("150 pairs"), "{text}");
-    let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
-    let all = told["fields"].as_array().unwrap().iter().filter_map(|field| field["name"].as_str());
+    let reported: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    let all = reported["fields"].as_array().unwrap().iter().filter_map(|field| field["name"].as_str());
     let names: Vec<&str> = all.filter(|name| name.matches('/').count() < 2).collect();
     let paired = |left: &&&str| left.contains("left") && names.contains(&left.replace("left", "right").as_str());
     let lefts = names.iter().filter(|name| name.contains("left")).count();
@@ -105,16 +105,17 @@ fn a_sheet_needs_no_mesh() {
     let grid = ["author", "--grid", "3x2", "--pitch", "8.6mm,5mm", "-o", text_of(&path)];
     let text = done(&[&grid[..], &["--cells", text_of(&mask), "--regions", "3x1"]].concat());
     assert!(text.contains("4 taxels in 4 fields") && text.contains("4 of 4 fields have centroids"), "{text}");
-    let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
-    let ids: Vec<u64> = told["taxels"].as_array().unwrap().iter().map(|taxel| taxel["id"].as_u64().unwrap()).collect();
+    let reported: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    let ids: Vec<u64> =
+        reported["taxels"].as_array().unwrap().iter().map(|taxel| taxel["id"].as_u64().unwrap()).collect();
     assert_eq!(ids, [1, 2, 3, 4]);
-    let area = told["taxels"][0]["area"].as_f64().unwrap();
+    let area = reported["taxels"][0]["area"].as_f64().unwrap();
     assert!((area - 0.0086 * 0.005).abs() < 1e-11, "{area}");
-    let left_of_middle = |told: &Value| told["taxels"][0]["position"][0].as_f64().unwrap() < 0.0;
-    assert!(!left_of_middle(&told), "cell 1 is the second of its row");
+    let left_of_middle = |reported: &Value| reported["taxels"][0]["position"][0].as_f64().unwrap() < 0.0;
+    assert!(!left_of_middle(&reported), "cell 1 is the second of its row");
     done(&[&grid[..], &["--cells", text_of(&mask), "--ids", "columns", "--force"]].concat());
-    let told: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
-    assert!(left_of_middle(&told), "cell 1 is the second of its column");
+    let reported: Value = serde_json::from_str(&done(&["inspect", text_of(&path), "--json"])).unwrap();
+    assert!(left_of_middle(&reported), "cell 1 is the second of its column");
     let (_folder, touch) = file("touch.csv", "t,1,2,3,4\n0,0,0,5,5\n");
     let percepts = done(&["run", "--body", text_of(&path), "--source", text_of(&touch), "--backend", "cpu"]);
     let felt = frames(&percepts);
@@ -148,14 +149,14 @@ fn a_recipe_places_region_by_region_and_says_so_as_json() {
     );
     let output = folder.path().join("out.gltf");
     let text = done(&["author", "humanoid", "--recipe", text_of(&recipe), "-o", text_of(&output), "--json"]);
-    let told: Value = serde_json::from_str(&text).unwrap();
-    let [head, arms] = &told["places"].as_array().unwrap()[..] else { panic!("{told}") };
+    let reported: Value = serde_json::from_str(&text).unwrap();
+    let [head, arms] = &reported["places"].as_array().unwrap()[..] else { panic!("{reported}") };
     assert_eq!((&head["name"], &head["ids"]), (&"head".into(), &serde_json::json!([[0, 39]])));
     assert_eq!(head["links"], serde_json::json!({"head": 40}));
     assert!(arms["spacing"]["least"].as_f64().unwrap() >= 0.015, "{arms}");
     let body: Value = serde_json::from_str(&done(&["inspect", text_of(&output), "--json"])).unwrap();
     let taxels = body["taxels"].as_array().unwrap();
-    assert_eq!(taxels.len() as u64, told["taxels"].as_u64().unwrap());
+    assert_eq!(taxels.len() as u64, reported["taxels"].as_u64().unwrap());
     assert!(taxels.iter().all(|taxel| (taxel["modality"] == "temperature") == (taxel["id"].as_u64().unwrap() >= 1000)));
 }
 
@@ -260,12 +261,12 @@ fn a_layout_that_stays_is_brought_up_to_date() {
         assert!(text.contains(words), "{words}: {text}");
     }
     let (before, after) = (seen("hand".as_ref()), seen(&out));
-    let by_id = |told: &Value, id: u64| {
-        told["taxels"].as_array().unwrap().iter().find(|taxel| taxel["id"] == id).cloned().unwrap_or_default()
+    let by_id = |reported: &Value, id: u64| {
+        reported["taxels"].as_array().unwrap().iter().find(|taxel| taxel["id"] == id).cloned().unwrap_or_default()
     };
     // The normal is back, to the rounding of a unit vector in single precision; all other taxels are as they were.
     for (x, y) in [0, 1, 2].map(|axis| {
-        let normal = |told: &Value| by_id(told, 5)["normal"][axis].as_f64().unwrap();
+        let normal = |reported: &Value| by_id(reported, 5)["normal"][axis].as_f64().unwrap();
         (normal(&before), normal(&after))
     }) {
         assert!((x - y).abs() <= 2.0 * f64::from(f32::EPSILON), "{x} {y}");
@@ -275,7 +276,7 @@ fn a_layout_that_stays_is_brought_up_to_date() {
         assert_eq!(by_id(&after, id), by_id(&before, id));
     }
     // Fields are those it had, less the taxel that lost its id; nothing is found twice any more.
-    let fields = |told: &Value| told["fields"].as_array().unwrap().len();
+    let fields = |reported: &Value| reported["fields"].as_array().unwrap().len();
     assert_eq!(fields(&after), fields(&before));
     let said = done(&["inspect", text_of(&out)]);
     assert!(!said.contains("id of another") && !said.contains("not the surface's"), "{said}");

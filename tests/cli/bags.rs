@@ -185,9 +185,9 @@ fn of_tables(body: &Path) -> String {
 /// The error, of one line, of a run that must end with `code`.
 pub(super) fn refused(code: i32, arguments: &[&str]) -> String {
     let why = fails(code, arguments);
-    let told: Vec<&str> = why.lines().filter(|line| line.starts_with("somatic: error: ")).collect();
-    assert_eq!(told.len(), 1, "{why}");
-    told[0].to_owned()
+    let said: Vec<&str> = why.lines().filter(|line| line.starts_with("somatic: error: ")).collect();
+    assert_eq!(said.len(), 1, "{why}");
+    said[0].to_owned()
 }
 
 #[test]
@@ -205,9 +205,9 @@ fn joint_states_of_two_topics_are_joined_unless_both_have_a_joint() {
     let bag = format!("ros2-mcap:{}", text_of(&path));
     for states in [bag.clone(), format!("{bag}:/joint_states,/shoulder_states")] {
         let ran = output(&with(&run_of(&body, &bag, &states), &[]));
-        let told = stderr(&ran);
-        assert!(told.contains("joint states of /joint_states, /shoulder_states are joined"), "{told}");
-        assert_eq!((ran.status.code(), String::from_utf8(ran.stdout).unwrap()), (Some(0), expected.clone()), "{told}");
+        let said = stderr(&ran);
+        assert!(said.contains("joint states of /joint_states, /shoulder_states are joined"), "{said}");
+        assert_eq!((ran.status.code(), String::from_utf8(ran.stdout).unwrap()), (Some(0), expected.clone()), "{said}");
     }
     // One alone lacks a joint; and where both have one, none is preferred.
     let why = refused(1, &with(&run_of(&body, &bag, &format!("{bag}:/shoulder_states")), &[]));
@@ -418,11 +418,11 @@ fn an_estimate_that_cannot_be_had_is_refused_with_what_is_missing() {
         (1, bag("bag.mcap"), bag("other.mcap"), "is another bag; record both topics into one"),
         (1, bag("numbers.mcap"), bag("numbers.mcap"), "Float32MultiArray have no stamps"),
     ] {
-        let told = refused(code, &with(&run_of(&body, &source, &states), &["--joints-delay", "auto"]));
-        assert!(told.contains(why), "{told}");
+        let said = refused(code, &with(&run_of(&body, &source, &states), &["--joints-delay", "auto"]));
+        assert!(said.contains(why), "{said}");
     }
-    let told = fails(2, &with(&run_of(&body, &bag("bag.mcap"), &bag("bag.mcap")), &["--joints-delay", "soon"]));
-    assert!(told.contains("`soon` is not a time; give seconds, a time such as 25ms, or auto"), "{told}");
+    let said = fails(2, &with(&run_of(&body, &bag("bag.mcap"), &bag("bag.mcap")), &["--joints-delay", "soon"]));
+    assert!(said.contains("`soon` is not a time; give seconds, a time such as 25ms, or auto"), "{said}");
 }
 
 #[test]
@@ -497,8 +497,8 @@ fn bags_that_are_not_read_say_what_to_do_and_cut_ones_give_what_is_whole() {
     // The last states are known no more, so that positions there are the last known.
     let same = found.lines().zip(whole.lines()).take_while(|(cut, whole)| cut == whole).count();
     assert!(same + 10 > count, "{same} of {count}");
-    let told = stderr(&cut);
-    assert_eq!(told.matches("cut.mcap: it is cut off: what came after t = ").count(), 2, "{told}");
+    let said = stderr(&cut);
+    assert_eq!(said.matches("cut.mcap: it is cut off: what came after t = ").count(), 2, "{said}");
     // A position that is not a number is ignored and reported.
     let mut odd = messages.clone();
     let What::Joints(_, position) = &mut odd.iter_mut().rfind(|one| one.topic != "/skin").unwrap().what else {

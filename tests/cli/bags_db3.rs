@@ -105,9 +105,9 @@ fn a_bag_in_sqlite_gives_what_the_same_bag_in_mcap_gives() {
     };
     let info = |name: &str| {
         let text = done(&["info", "--json", name]);
-        let mut told: serde_json::Value = serde_json::from_str(&text).unwrap();
-        (told["bytes"], told["files"]) = (0.into(), 0.into());
-        told
+        let mut reported: serde_json::Value = serde_json::from_str(&text).unwrap();
+        (reported["bytes"], reported["files"]) = (0.into(), 0.into());
+        reported
     };
     let of_mcap = format!("ros2-mcap:{}", text_of(&bag));
     for delay in ["0", "auto"] {
@@ -120,10 +120,10 @@ fn a_bag_in_sqlite_gives_what_the_same_bag_in_mcap_gives() {
         assert!(run(&named, &topic, delay) == expected, "{delay}");
         assert!(run(text_of(&split), text_of(&split), delay) == expected, "{delay}");
     }
-    let told = info(&of_mcap);
-    assert!(told["topics"].as_array().unwrap().len() > 2, "{told}");
-    assert_eq!(info(text_of(&one)), told);
-    assert_eq!(info(text_of(&split)), told);
+    let reported = info(&of_mcap);
+    assert!(reported["topics"].as_array().unwrap().len() > 2, "{reported}");
+    assert_eq!(info(text_of(&one)), reported);
+    assert_eq!(info(text_of(&split)), reported);
 }
 
 #[test]

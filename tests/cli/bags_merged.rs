@@ -86,8 +86,8 @@ fn our_own_bag_of_two_links_is_the_run_that_made_it() {
         let sink = format!("ros2-mcap:{}", text_of(&bag));
         let joints = joints();
         let joints = joints.each_ref().map(String::as_str);
-        let told = ["--joint-states", states.as_str(), "--joints-delay", delay, "--sink", sink.as_str()];
-        let first = done(&with(&run_of(&body, &touch), &[&joints[..], &told, &outputs].concat()));
+        let said = ["--joint-states", states.as_str(), "--joints-delay", delay, "--sink", sink.as_str()];
+        let first = done(&with(&run_of(&body, &touch), &[&joints[..], &said, &outputs].concat()));
         assert!(
             first.contains("\"link\":\"world\"")
                 && first.contains("\"self_contacts\":[{")
@@ -123,7 +123,7 @@ fn our_own_bag_of_two_links_is_the_run_that_made_it() {
                 "one link is not both"
             );
         } else {
-            assert!(first != done(&with(&run_of(&body, &touch), &[&joints[..], &told[..2], &outputs].concat())));
+            assert!(first != done(&with(&run_of(&body, &touch), &[&joints[..], &said[..2], &outputs].concat())));
         }
     }
 }
@@ -231,10 +231,10 @@ fn a_topic_that_stops_leaves_its_taxels_stale() {
         }
         // A topic that led is waited for as long.
         assert!((97..=101).contains(&found.len()) && stale >= 47, "{} frames, {stale} stale", found.len());
-        let told = stderr(&run);
+        let said = stderr(&run);
         let expected =
             format!("{}: {stale} of {} frames have no cloud of it that is young enough", topics[stops], found.len());
-        assert!(told.contains(&expected) && told.contains("they are of 1 to 1.98 s, frames of 1 to 3 s"), "{told}");
+        assert!(said.contains(&expected) && said.contains("they are of 1 to 1.98 s, frames of 1 to 3 s"), "{said}");
     }
 }
 
@@ -352,8 +352,8 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
     std::fs::write(&states, text.lines().take(22).collect::<Vec<_>>().join("\n")).unwrap();
     let bag = folder.path().join("bag");
     let sink = format!("ros2-mcap:{}", text_of(&bag));
-    let told = ["--joint-states", text_of(&states), "--sink", &sink];
-    let first = done(&with(&run_of(&body, &example("gripper-touch.csv")), &[&joints[..], &told].concat()));
+    let said = ["--joint-states", text_of(&states), "--sink", &sink];
+    let first = done(&with(&run_of(&body, &example("gripper-touch.csv")), &[&joints[..], &said].concat()));
     let written = somatic::internal::robot::joint_states_of_bag(&BagName::new(&bag), false).unwrap();
     assert_eq!((written.joint_names(), written.span_s()), (&["grip".to_owned()][..], Some([0.0, 1.1])));
     // At the frame's time, between two states of the recording.
@@ -376,11 +376,11 @@ fn joint_positions_are_written_only_where_they_are_known_and_a_recording_stands_
     };
     let both = folder.path().join("both");
     let sink = format!("ros2-mcap:{}", text_of(&both));
-    let (found, told) = run(&["--joint-states", text_of(&states), "--sink", &sink]);
+    let (found, said) = run(&["--joint-states", text_of(&states), "--sink", &sink]);
     let line = format!("at 0.5 s: frames carry joint states of their own; states of {} replace them", text_of(&states));
-    assert!(told.matches(&line).count() == 1, "{told}");
-    let (carried, told) = run(&[]);
-    assert!(found != carried && !told.contains("frames carry"), "{told}");
+    assert!(said.matches(&line).count() == 1, "{said}");
+    let (carried, said) = run(&[]);
+    assert!(found != carried && !said.contains("frames carry"), "{said}");
     let written = somatic::internal::robot::joint_states_of_bag(&BagName::new(&both), false).unwrap();
     let used = JointStates::open(&states).unwrap();
     assert_eq!(written.at(0, 0.5, false), used.at(0, 0.5, false));
@@ -398,9 +398,9 @@ fn a_bag_of_another_robot_whose_ids_fit_is_reported() {
         let arguments = run_of(body, &format!("ros2-mcap:{}", text_of(&bag)));
         stderr(&output(&arguments.iter().map(String::as_str).collect::<Vec<_>>()))
     };
-    let told = run(&gripper);
-    assert_eq!(told.matches("clouds are in frame `fore_arm`, which is not a link of ").count(), 1, "{told}");
-    assert!(told.contains("gripper.glb; is it the right body?"), "{told}");
+    let said = run(&gripper);
+    assert_eq!(said.matches("clouds are in frame `fore_arm`, which is not a link of ").count(), 1, "{said}");
+    assert!(said.contains("gripper.glb; is it the right body?"), "{said}");
     assert!(!run(&arm).contains("clouds are in frame"));
 }
 

@@ -48,7 +48,7 @@ fn a_limb_goes_on_behind_a_network_that_blocks_and_both_sides_count_what_is_left
     wait_for("the head", || {
         thread::sleep(PERIOD);
         send();
-        limb.told.has("it has a subscriber") && head.running.out.has("peak")
+        limb.reported.has("it has a subscriber") && head.running.out.has("peak")
     });
     relay.set(Link::Blocked);
     // 9 MB: more than systems keep for a connection.
@@ -56,13 +56,14 @@ fn a_limb_goes_on_behind_a_network_that_blocks_and_both_sides_count_what_is_left
     let has_newest = |lines: &Lines| lines.has(&format!("\"peak\":{}", peak(rows - 1)));
     wait_for("every percept while the network is blocked", || has_newest(&limb.out));
     assert_eq!(limb.out.all().len() as u64, rows, "the limb's own percepts are all there");
-    assert!(limb.told.has("frames come faster than they can be sent"), "{:?}", limb.told.all());
+    assert!(limb.reported.has("frames come faster than they can be sent"), "{:?}", limb.reported.all());
     relay.set(Link::Up);
     wait_for("the newest frame", || has_newest(&head.running.out));
     drop(input);
-    let (_, told) = limb.end(&[0]);
-    let counts = told.iter().find_map(|line| Some(line.strip_suffix(" frames were left out")?.rsplit_once(": ")?.1));
-    let (left_out, of) = counts.unwrap_or_else(|| panic!("{told:?}")).split_once(" of ").unwrap();
+    let (_, reported) = limb.end(&[0]);
+    let counts =
+        reported.iter().find_map(|line| Some(line.strip_suffix(" frames were left out")?.rsplit_once(": ")?.1));
+    let (left_out, of) = counts.unwrap_or_else(|| panic!("{reported:?}")).split_once(" of ").unwrap();
     // It says with its code that frames are missing.
     let (_, _, accounts) = head.end(&[3]);
     let account = &accounts["sheet"];
@@ -108,11 +109,11 @@ fn a_node_that_stops_reading_holds_up_no_percept_and_what_it_did_not_get_is_coun
         thread::sleep((Duration::from_micros(333) * (number - begun) as u32).saturating_sub(begin.elapsed()));
         send(number);
     }
-    let (told, said) = ended(child);
+    let (reported, said) = ended(child);
     let took = begin.elapsed();
     peer.signal("CONT");
     let peaks: Vec<u64> =
-        super::frames(&told).iter().map(|line| line["fields"][0]["peak"].as_f64().unwrap() as u64).collect();
+        super::frames(&reported).iter().map(|line| line["fields"][0]["peak"].as_f64().unwrap() as u64).collect();
     assert_eq!(peaks, (0..COUNT).map(peak).collect::<Vec<_>>(), "every percept, while nobody reads");
     let counted = |what: &str| -> u64 {
         let counts = said.lines().find_map(|line| Some(line.strip_suffix(what)?.rsplit_once(": ")?.1));

@@ -12,7 +12,7 @@ use crate::{done, fails, somatic};
 /// A running `somatic board --json`, and where its boards are.
 struct Playing {
     child: Child,
-    told: BufReader<ChildStdout>,
+    printed: BufReader<ChildStdout>,
     ports: Vec<(u16, String)>,
 }
 
@@ -20,9 +20,9 @@ impl Playing {
     fn start(arguments: &[&str]) -> Self {
         let arguments = [&["board", "--json"], arguments].concat();
         let mut child = somatic(&arguments).stdout(Stdio::piped()).spawn().unwrap();
-        let mut told = BufReader::new(child.stdout.take().unwrap());
+        let mut printed = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
-        told.read_line(&mut line).unwrap();
+        printed.read_line(&mut line).unwrap();
         let where_: Value = serde_json::from_str(&line).unwrap();
         let boards = where_["playing"].as_array().unwrap().iter();
         let port = |board: &Value| {
@@ -30,13 +30,13 @@ impl Playing {
             (board["board"].as_u64().unwrap() as u16, name.to_owned())
         };
         let ports = boards.map(port).collect();
-        Self { child, told, ports }
+        Self { child, printed, ports }
     }
 
     /// What each board sent, reported at the end.
     fn end(mut self) -> Vec<Value> {
         let mut line = String::new();
-        self.told.read_line(&mut line).unwrap();
+        self.printed.read_line(&mut line).unwrap();
         assert!(self.child.wait().unwrap().success());
         serde_json::from_str::<Value>(&line).unwrap()["sent"].as_array().unwrap().clone()
     }

@@ -143,8 +143,11 @@ fn gains_from_a_wandering_finger_are_written_into_the_calibration() {
     done(&["author", "--grid", "13x13", "--pitch", "5mm", "-o", &grid]);
     done(&["simulate", &at("finger.toml"), "-o", &touches]);
     let calibrate = ["calibrate", "--body", &grid, "--gains-from", &touches, "--calibration", &first];
-    let told = done(&[&calibrate[..], &["-o", &second]].concat());
-    assert!(told.contains("of 145 of 169 taxels; they differ by 20") && told.contains("pressed too seldom"), "{told}");
+    let reported = done(&[&calibrate[..], &["-o", &second]].concat());
+    assert!(
+        reported.contains("of 145 of 169 taxels; they differ by 20") && reported.contains("pressed too seldom"),
+        "{reported}"
+    );
     let written = std::fs::read_to_string(&second).unwrap();
     assert!(written.contains("[taxel.162]\ngain = ") && written.contains("[layer]\nsigma_m = 0.0035"), "{written}");
     // It is what `run` takes, and fits come of it.
@@ -276,8 +279,8 @@ fn several_weights_make_a_curve_of_each_sensor_and_one_scale_of_a_field() {
     let field = [100.0, 200.0, 150.0].map(|travel: f64| [1.0, 1.1, 0.9, 1.2].map(|gain| (travel * gain).round()));
     std::fs::write(at("field.csv"), presses(&field)).unwrap();
     let known = ["--known", "4N,8N,6N", "--on", "field", "--calibration", &at("equal.toml")];
-    let told = calibrate(&at("field.csv"), &at("newton.toml"), &known);
-    assert!(told.contains("one scale for 3 presses"), "{told}");
+    let reported = calibrate(&at("field.csv"), &at("newton.toml"), &known);
+    assert!(reported.contains("one scale for 3 presses"), "{reported}");
     let scaled = std::fs::read_to_string(at("newton.toml")).unwrap();
     assert!(scaled.contains("\nscale = 0.0") && scaled.contains("unit = \"N\""), "{scaled}");
     assert!(gains.lines().filter(|line| line.starts_with("gain = ")).all(|line| scaled.contains(line)), "{scaled}");

@@ -24,8 +24,8 @@ fn errors_are_printed_beside_those_of_an_ideal_skin() {
     let line = |name: &str| text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_default();
     assert!(line("errors").contains(" mm, axis ") && line("errors").contains("of 400 touches"), "{text}");
     assert!(line("ideal").contains("the same on a flat sheet of regular hexagons as dense"), "{text}");
-    let told: Value = serde_json::from_str(&done(&["inspect", grid, "--errors", "--json"])).unwrap();
-    let errors = &told["errors"];
+    let reported: Value = serde_json::from_str(&done(&["inspect", grid, "--errors", "--json"])).unwrap();
+    let errors = &reported["errors"];
     assert_eq!(keys(errors), [&KEYS[..], &["ideal"]].concat());
     assert_eq!(keys(&errors["ideal"]), KEYS);
     assert_eq!(keys(&errors["place"]), ["touches", "median", "p95"]);
@@ -46,8 +46,8 @@ fn two_layouts_are_compared_and_drawn() {
     let author = ["author", "humanoid", "--taxels", "300", "--json"];
     let made = |more: &[&str]| -> Value { serde_json::from_str(&done(&[&author[..], more].concat())).unwrap() };
     assert!(made(&["--even", "off", "-o", &scattered])["errors"].is_null());
-    let told = made(&["-o", &even, "--errors"]);
-    assert_eq!(keys(&told["errors"]), [&KEYS[..], &["ideal"]].concat());
+    let reported = made(&["-o", &even, "--errors"]);
+    assert_eq!(keys(&reported["errors"]), [&KEYS[..], &["ideal"]].concat());
 
     let compare = ["author", "--compare", &scattered, &even];
     let compared: Value = serde_json::from_str(&done(&[&compare[..], &["--json", "-o", &picture]].concat())).unwrap();

@@ -174,8 +174,8 @@ fn an_export_becomes_a_body_with_named_zones() {
     let at = |name: &str| folder.path().join(name).display().to_string();
     let (body, zones, listed) = (at("body.glb"), at("zones.glb"), at("listed.glb"));
     done(&["convert", INSOLES, "-o", &body]);
-    let told = done(&["author", &body, "--zones", "heel=30%,midfoot,forefoot=30%,toes=15%", "-o", &zones]);
-    assert!(told.contains("left/heel: ") && told.contains("right/toes: "), "{told}");
+    let reported = done(&["author", &body, "--zones", "heel=30%,midfoot,forefoot=30%,toes=15%", "-o", &zones]);
+    assert!(reported.contains("left/heel: ") && reported.contains("right/toes: "), "{reported}");
     let force = |frame: &Value, name: &str| {
         let fields = frame["fields"].as_array().unwrap();
         fields.iter().find(|field| field["field"] == name).and_then(|field| field["force"].as_f64()).unwrap_or(0.0)

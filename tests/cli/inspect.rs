@@ -113,17 +113,17 @@ fn what_was_put_right_on_reading_is_reported_by_inspect_and_by_run() {
     let members = [1, 2, 7].map(|id| (id, MemberSpec::default())).into();
     glb.field(&FieldSpec { name: "arm".into(), members, ..FieldSpec::default() }, Some(arm), DVec3::ZERO);
     glb.save(somatic::OutputPath::new(&path, false, &[]).unwrap()).unwrap();
-    let told = ["2 on link `arm` is now 3", "field `arm` names taxel 7"];
+    let reported = ["2 on link `arm` is now 3", "field `arm` names taxel 7"];
 
     let strict = output(&["inspect", text_of(&path), "--strict"]);
     assert_eq!(strict.status.code(), Some(1));
     let text = String::from_utf8(strict.stdout).unwrap();
-    assert!(told.iter().all(|words| text.contains(words)), "{text}");
+    assert!(reported.iter().all(|words| text.contains(words)), "{text}");
 
     let (_recording, recording) = file("touch.csv", "t,1,2,3\n0,5,6,7\n");
     let run = output(&["run", "--body", text_of(&path), "--source", text_of(&recording), "--sink", "-"]);
     assert_eq!(run.status.code(), Some(0), "{}", super::stderr(&run));
-    assert!(told.iter().all(|words| super::stderr(&run).contains(words)), "{}", super::stderr(&run));
+    assert!(reported.iter().all(|words| super::stderr(&run).contains(words)), "{}", super::stderr(&run));
     let frame: Value = serde_json::from_slice(&run.stdout).unwrap();
     assert_eq!(frame["fields"][0]["total"], 11.0, "taxel 3 is in no field");
 }

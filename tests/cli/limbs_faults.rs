@@ -36,10 +36,13 @@ fn account_for(key: &str, account: &Value, rows: u64, seen: &super::limbs_networ
     let of = |what: &str| number(&account[what]);
     assert_eq!(of("sent"), of("delivered") + of("lost"));
     let missing = rows - seen.rows.first().unwrap() - seen.rows.len() as u64;
-    let told = of("lost") + of("replaced") + of("dropped");
+    let reported = of("lost") + of("replaced") + of("dropped");
     // Where the head's first frame of a limb was replaced, its row is before all that were seen; the last may still wait for
     // a frame of the skin at the end.
-    assert!((missing.saturating_sub(1)..=missing + 1).contains(&told), "{key}: {missing} rows are missing: {account}");
+    assert!(
+        (missing.saturating_sub(1)..=missing + 1).contains(&reported),
+        "{key}: {missing} rows are missing: {account}"
+    );
     eprintln!(
         "{key:6} {} sent, {} delivered, {} lost, {} replaced",
         of("sent"),
@@ -96,12 +99,12 @@ impl Story<'_> {
         let row = play(limbs, row, |now| now == row + during);
         event(false);
         let back = format!("zenoh:{}: the limb sends again", KEYS[concerned]);
-        let row = play(limbs, row, |_| head.running.told.has(&back));
+        let row = play(limbs, row, |_| head.running.reported.has(&back));
         let rows = play(limbs, row, |now| now == row + after);
         let written: Vec<Vec<Instant>> = limbs.iter().map(|limb| limb.written.clone()).collect();
         self.limbs.into_iter().for_each(|limb| drop(limb.end()));
-        let told = &self.head.running.told;
-        wait_for("the end", || KEYS.iter().all(|key| told.has(&format!("zenoh:{key}: the limb has ended"))));
+        let reported = &self.head.running.reported;
+        wait_for("the end", || KEYS.iter().all(|key| reported.has(&format!("zenoh:{key}: the limb has ended"))));
         let stamped = self.head.running.out.clone();
         let (lines, _, accounts) = self.head.end(&[0, 3]);
         let stamped = stamped.0.lock().unwrap();
@@ -158,7 +161,9 @@ fn a_link_that_stalls_delivers_late_what_still_waits() {
     relays[1].set(Link::Up);
     let rows = play(&mut limbs, row, |now| now == row + 50);
     limbs.into_iter().for_each(|limb| drop(limb.end()));
-    wait_for("the end", || KEYS.iter().all(|key| head.running.told.has(&format!("zenoh:{key}: the limb has ended"))));
+    wait_for("the end", || {
+        KEYS.iter().all(|key| head.running.reported.has(&format!("zenoh:{key}: the limb has ended")))
+    });
     let (lines, _, accounts) = head.end(&[0]);
     eprintln!("a link stalled:");
     for (field, key) in LIMBS.iter().zip(KEYS) {
@@ -184,10 +189,12 @@ fn a_limb_that_dies_is_stale_and_comes_back_under_its_key() {
     let config = place.config("again.json5", None, Some(relays[3].port));
     limbs.push(Limb::start(LIMBS[3], KEYS[3], &config));
     let back = row;
-    let row = play(&mut limbs, row, |_| head.running.told.has("zenoh:ring: the limb has started again"));
+    let row = play(&mut limbs, row, |_| head.running.reported.has("zenoh:ring: the limb has started again"));
     let rows = play(&mut limbs, row, |now| now == row + 50);
     limbs.into_iter().for_each(|limb| drop(limb.end()));
-    wait_for("the end", || KEYS.iter().all(|key| head.running.told.has(&format!("zenoh:{key}: the limb has ended"))));
+    wait_for("the end", || {
+        KEYS.iter().all(|key| head.running.reported.has(&format!("zenoh:{key}: the limb has ended")))
+    });
     // The second start may have been heard from its first frame on.
     let (lines, _, accounts) = head.end(&[0, 3]);
     eprintln!("a limb killed and started again:");
@@ -229,7 +236,9 @@ fn a_clock_that_runs_fast_is_followed() {
         row += 1;
     }
     limbs.into_iter().for_each(|limb| drop(limb.end()));
-    wait_for("the end", || KEYS.iter().all(|key| head.running.told.has(&format!("zenoh:{key}: the limb has ended"))));
+    wait_for("the end", || {
+        KEYS.iter().all(|key| head.running.reported.has(&format!("zenoh:{key}: the limb has ended")))
+    });
     let (lines, _, accounts) = head.end(&[0]);
     for (index, (field, key)) in LIMBS.iter().zip(KEYS).enumerate() {
         let account = &accounts[key];
@@ -271,11 +280,13 @@ fn a_router_that_starts_again_loses_frames_that_are_counted() {
     let row = play(&mut limbs, row, |now| now == row + frames_of(5, 2));
     running = Some(router());
     let row = play(&mut limbs, row, |_| {
-        KEYS.iter().all(|key| head.running.told.has(&format!("zenoh:{key}: the limb sends again")))
+        KEYS.iter().all(|key| head.running.reported.has(&format!("zenoh:{key}: the limb sends again")))
     });
     let rows = play(&mut limbs, row, |now| now == row + 50);
     limbs.into_iter().for_each(|limb| drop(limb.end()));
-    wait_for("the end", || KEYS.iter().all(|key| head.running.told.has(&format!("zenoh:{key}: the limb has ended"))));
+    wait_for("the end", || {
+        KEYS.iter().all(|key| head.running.reported.has(&format!("zenoh:{key}: the limb has ended")))
+    });
     let (lines, _, accounts) = head.end(&[3]);
     eprintln!("a router started again:");
     for (field, key) in LIMBS.iter().zip(KEYS) {
@@ -295,8 +306,8 @@ struct Space {
 
 fn ip(arguments: &str) -> Result<(), String> {
     let output = Command::new("ip").args(arguments.split(' ')).output().map_err(|e| format!("ip: {e}"))?;
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    if output.status.success() { Ok(()) } else { Err(format!("ip {arguments}: {told}")) }
+    let reported = String::from_utf8_lossy(&output.stderr).into_owned();
+    if output.status.success() { Ok(()) } else { Err(format!("ip {arguments}: {reported}")) }
 }
 
 impl Space {
@@ -350,10 +361,12 @@ fn limbs_in_network_namespaces_behind_a_link_that_goes_down() {
     ip(&format!("link set {down} down")).unwrap();
     let row = play(&mut rest, row, |now| now == row + frames_of(5, 2));
     ip(&format!("link set {down} up")).unwrap();
-    let row = play(&mut rest, row, |_| head.running.told.has("zenoh:thumb: the limb sends again"));
+    let row = play(&mut rest, row, |_| head.running.reported.has("zenoh:thumb: the limb sends again"));
     let rows = play(&mut rest, row, |now| now == row + 100);
     rest.into_iter().for_each(|limb| drop(limb.end()));
-    wait_for("the end", || KEYS.iter().all(|key| head.running.told.has(&format!("zenoh:{key}: the limb has ended"))));
+    wait_for("the end", || {
+        KEYS.iter().all(|key| head.running.reported.has(&format!("zenoh:{key}: the limb has ended")))
+    });
     // What TCP still had may have come after all.
     let (lines, _, accounts) = head.end(&[0, 3]);
     eprintln!("a link in a namespace down:");

@@ -20,16 +20,16 @@ fn frames_of_four_limbs_are_merged_and_every_one_is_accounted_for() {
         LIMBS.iter().zip(keys).map(|(field, key)| Limb::start(field, key, &limb_config)).collect();
     let row = play(&mut limbs, 0, |_| limbs_are_read(&head));
     let rows = play(&mut limbs, row, |now| now == row + 100);
-    let told: Vec<Vec<String>> = limbs.into_iter().map(Limb::end).collect();
+    let reported: Vec<Vec<String>> = limbs.into_iter().map(Limb::end).collect();
     wait_for("the end of all limbs", || {
-        keys.iter().all(|key| head.running.told.has(&format!("zenoh:{key}: the limb has ended")))
+        keys.iter().all(|key| head.running.reported.has(&format!("zenoh:{key}: the limb has ended")))
     });
     let (lines, messages, accounts) = head.end(&[0]);
     for (field, key) in LIMBS.iter().zip(keys) {
         let account = &accounts[key];
         let (sent, delivered, lost) =
             (number(&account["sent"]), number(&account["delivered"]), number(&account["lost"]));
-        assert_eq!((sent, lost), (delivered, 0), "{account} {messages:?} {told:?}");
+        assert_eq!((sent, lost), (delivered, 0), "{account} {messages:?} {reported:?}");
         // From the first that was understood on: the last rows of them all.
         let seen = compared(&lines, field, &undistributed(&place, field, rows));
         let expected: BTreeSet<u64> = (rows - sent..rows).collect();
@@ -68,7 +68,7 @@ fn percepts_of_limbs_pass_by_the_engine_as_they_are() {
     let rows = play(&mut limbs, row, |now| now == row + 50);
     limbs.into_iter().for_each(|limb| drop(limb.end()));
     wait_for("the end", || {
-        ["thumb", "index"].iter().all(|key| head.running.told.has(&format!("{key}: the limb has ended")))
+        ["thumb", "index"].iter().all(|key| head.running.reported.has(&format!("{key}: the limb has ended")))
     });
     let (lines, messages, accounts) = head.end(&[0]);
     assert!(
@@ -111,8 +111,8 @@ fn a_limb_of_another_body_and_one_with_another_s_taxels_are_reported() {
         &[&["run", "-q", "--body", "mat", "--source", &source, "--speed", "1"], &sink[..]].concat(),
     );
     play(&mut limbs, 0, |_| {
-        let told = &head.running.told;
-        told.has("another limb sends taxel") && told.has("zenoh:mat: the body has no taxel 2000")
+        let reported = &head.running.reported;
+        reported.has("another limb sends taxel") && reported.has("zenoh:mat: the body has no taxel 2000")
     });
     drop(strange);
     limbs.into_iter().for_each(|limb| drop(limb.end()));

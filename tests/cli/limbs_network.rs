@@ -87,7 +87,7 @@ impl Lines {
 pub struct Running {
     child: Child,
     pub out: Lines,
-    pub told: Lines,
+    pub reported: Lines,
     readers: Vec<JoinHandle<()>>,
 }
 
@@ -102,8 +102,8 @@ impl Running {
         }
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let (out, first) = Lines::read(child.stdout.take().unwrap());
-        let (told, second) = Lines::read(child.stderr.take().unwrap());
-        Self { child, out, told, readers: vec![first, second] }
+        let (reported, second) = Lines::read(child.stderr.take().unwrap());
+        Self { child, out, reported, readers: vec![first, second] }
     }
 
     pub fn take_input(&mut self) -> ChildStdin {
@@ -113,9 +113,9 @@ impl Running {
     /// Waits for its end; gives what it has printed.
     pub fn end(mut self, codes: &[i32]) -> (Vec<String>, Vec<String>) {
         let code = code_of(&mut self.child);
-        assert!(code.is_some_and(|code| codes.contains(&code)), "{code:?}: {:?}", self.told.all());
+        assert!(code.is_some_and(|code| codes.contains(&code)), "{code:?}: {:?}", self.reported.all());
         self.readers.drain(..).for_each(|reader| reader.join().unwrap());
-        (self.out.all(), self.told.all())
+        (self.out.all(), self.reported.all())
     }
 }
 
@@ -274,11 +274,11 @@ impl Head {
         let id = self.running.child.id().to_string();
         assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
         let summary = PathBuf::from(&self.summary);
-        let (out, told) = self.running.end(codes);
+        let (out, reported) = self.running.end(codes);
         let summary: Value = serde_json::from_str(&std::fs::read_to_string(summary).unwrap()).unwrap();
         let limbs = summary["boards"].as_array().unwrap();
         let by_key = limbs.iter().map(|limb| (limb["limb"].as_str().unwrap().to_owned(), limb.clone())).collect();
-        (super::frames(&out.join("\n")), told, by_key)
+        (super::frames(&out.join("\n")), reported, by_key)
     }
 }
 

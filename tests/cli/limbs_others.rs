@@ -123,7 +123,7 @@ fn with_tls_a_limb_sends_what_its_certificate_allows_and_a_stranger_nothing() {
     );
     let stranger = config("limb-tls.json5", &[("left_arm.", "stranger.")]);
     let seconds = |count: u64| Instant::now() + Duration::from_secs(count);
-    let heard = |key: &str| head.running.out.has("\"contact\":true") && head.running.told.has(key);
+    let heard = |key: &str| head.running.out.has("\"contact\":true") && head.running.reported.has(key);
     for (sender, key, why) in [
         (&without, keys[0], "it shows no certificate"),
         (&stranger, keys[0], "its name is in no rule"),
@@ -137,7 +137,7 @@ fn with_tls_a_limb_sends_what_its_certificate_allows_and_a_stranger_nothing() {
         assert!(
             !head.running.out.has("\"contact\":true") && !heard("the limb"),
             "{why}: {:?}",
-            head.running.told.all()
+            head.running.reported.all()
         );
     }
     // The same head hears the one that may.

@@ -74,7 +74,7 @@ fn limbs_that_send_frames_are_one_skin_whose_touches_are_found_once() {
     press(&mut limbs, 0.0, || last().is_some_and(|line: Value| line["touches"].as_array().unwrap().is_empty()));
     limbs.into_iter().for_each(|limb| drop(limb.end()));
     wait_for("the end of both", || {
-        SIDES.iter().all(|(_, key)| head.running.told.has(&format!("{key}: the limb has ended")))
+        SIDES.iter().all(|(_, key)| head.running.reported.has(&format!("{key}: the limb has ended")))
     });
     let (lines, messages, accounts) = head.end(&[0]);
     for (_, key) in SIDES {
@@ -123,7 +123,7 @@ fn ids_of_touches_of_limbs_that_send_percepts_say_which_limb_they_are_of() {
         super::frames(&out.all().join("\n"))
     });
     wait_for("the end of both", || {
-        SIDES.iter().all(|(_, key)| head.running.told.has(&format!("{key}: the limb has ended")))
+        SIDES.iter().all(|(_, key)| head.running.reported.has(&format!("{key}: the limb has ended")))
     });
     let (lines, ..) = head.end(&[0]);
     let mut ids: Vec<BTreeSet<String>> = Vec::new();

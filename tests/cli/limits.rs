@@ -31,9 +31,9 @@ fn inputs_without_end_are_refused() {
         &["simulate", "/dev/zero", "-o", "x.csv"],
     ] {
         let started = Instant::now();
-        let told = output(arguments);
-        let text = stderr(&told);
-        assert_ne!(told.status.code(), Some(0), "{arguments:?}");
+        let reported = output(arguments);
+        let text = stderr(&reported);
+        assert_ne!(reported.status.code(), Some(0), "{arguments:?}");
         assert!(text.contains("a device may have at most 1 MiB"), "{arguments:?}: {text}");
         assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
         assert!(started.elapsed() < Duration::from_secs(20), "{arguments:?} took {:?}", started.elapsed());

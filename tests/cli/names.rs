@@ -76,7 +76,7 @@ fn what_a_terminal_would_obey_reaches_none() {
             if colours {
                 command.env("CLICOLOR_FORCE", "1");
             }
-            let told = command.output().unwrap();
+            let reported = command.output().unwrap();
             // The command's own colours are no harm.
             let own = |bytes: &[u8]| {
                 let text = String::from_utf8_lossy(bytes).into_owned();
@@ -84,10 +84,10 @@ fn what_a_terminal_would_obey_reaches_none() {
                     .iter()
                     .fold(text, |text, code| text.replace(&format!("\u{1b}[{code}m"), ""))
             };
-            for bytes in [own(&told.stdout), own(&told.stderr)] {
+            for bytes in [own(&reported.stdout), own(&reported.stderr)] {
                 assert!(!is_obeyed(bytes.as_bytes()), "{arguments:?}, colours {colours}: {bytes:?}");
             }
-            assert_ne!(told.status.code(), Some(101), "{arguments:?}");
+            assert_ne!(reported.status.code(), Some(101), "{arguments:?}");
         }
     }
 }
@@ -155,10 +155,10 @@ fn what_xml_cannot_hold_is_written_so_that_people_can_read_it() {
     let (folder, table) = file("skin.csv", &skin("a\u{1b}\0b"));
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     done(&["author", "--csv-skin", text_of(&table), "-o", &at("a.glb")]);
-    let told = output(&["convert", &at("a.glb"), "-o", &at("a.urdf")]);
-    assert_eq!(told.status.code(), Some(0));
-    let told = stderr(&told);
-    assert!(told.contains("XML has no place for some characters in the names of 1 links"), "{told}");
+    let reported = output(&["convert", &at("a.glb"), "-o", &at("a.urdf")]);
+    assert_eq!(reported.status.code(), Some(0));
+    let reported = stderr(&reported);
+    assert!(reported.contains("XML has no place for some characters in the names of 1 links"), "{reported}");
     let text = std::fs::read_to_string(at("a.urdf")).unwrap();
     let urdf = roxmltree::Document::parse(&text).unwrap();
     assert!(urdf.descendants().any(|node| node.attribute("name") == Some("a\\u001b\\u0000b")), "{text}");
@@ -170,7 +170,7 @@ fn what_xml_cannot_hold_is_written_so_that_people_can_read_it() {
 /// A flag, an output, a table or a way under the name that it had before.
 #[test]
 fn an_old_name_is_reported_with_the_new_one_in_one_line() {
-    let told = |code: i32, arguments: &[&str], new: &str| {
+    let reported = |code: i32, arguments: &[&str], new: &str| {
         let said = fails(code, arguments);
         assert!(said.trim_end().ends_with(new) && said.lines().count() == 1, "{arguments:?}: {said}");
     };
@@ -190,10 +190,10 @@ fn an_old_name_is_reported_with_the_new_one_in_one_line() {
         (&["calibrate", "--body", "hand", "--skin=touches.csv"], "`--skin` is `--gains-from` now"),
         (&["tune", "--source", "serial:a", "--tap", "3"], "`--tap` is `--wiper` now"),
     ] {
-        told(2, arguments, new);
+        reported(2, arguments, new);
     }
     #[cfg(unix)]
-    told(2, &["board", "--taps", "ignored"], "`--taps` is `--wipers` now");
+    reported(2, &["board", "--taps", "ignored"], "`--taps` is `--wipers` now");
     // What another command was never called so is not said to be.
     assert!(!fails(2, &["author", "--skin", "a.csv"]).contains("now"));
 
@@ -208,7 +208,7 @@ fn an_old_name_is_reported_with_the_new_one_in_one_line() {
             word => word.to_owned(),
         };
         let words: Vec<String> = arguments.iter().map(of).collect();
-        told(code, &words.iter().map(String::as_str).collect::<Vec<_>>(), new);
+        reported(code, &words.iter().map(String::as_str).collect::<Vec<_>>(), new);
     };
     for (key, new) in [
         ("in = \"hand\"", "line 1, column 1: `in` is `relative_to` now"),
@@ -260,8 +260,8 @@ fn a_recording_with_a_calibration_of_old_names_is_read_with_a_line() {
         done(&["convert", &touches, &at(recording), "--body", "hand", "--calibration", &at("calibration.toml")]);
         let run = output(&["run", "--backend", "cpu", "--source", &at(recording), "--sink", "-"]);
         assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
-        let told = stderr(&run);
-        (String::from_utf8(run.stdout).unwrap(), told)
+        let reported = stderr(&run);
+        (String::from_utf8(run.stdout).unwrap(), reported)
     };
     let (old, said) = of_names("old.mcap", "skin", "upkeep", "tap");
     let (new, silent) = of_names("new.mcap", "layer", "drift", "wiper");

@@ -160,8 +160,8 @@ fn the_schema_that_is_shipped_is_the_one_that_is_printed() {
         assert!(documented.contains(&format!("`{key}`")) && says["description"].is_string(), "{key}");
     }
     // Two tolerances have one flag, and when touches begin and end has none.
-    let told = documented.lines().filter(|line| line.contains("` | `--")).count();
-    assert_eq!(told, keys.len() + accuracy.len() - 2);
+    let reported = documented.lines().filter(|line| line.contains("` | `--")).count();
+    assert_eq!(reported, keys.len() + accuracy.len() - 2);
     assert!(documented.contains(include_str!("../../examples/scenes/palm.toml")));
 }
 
@@ -189,8 +189,8 @@ fn a_plan_says_how_far_centroids_are_off_and_what_it_leaves_out() {
         (got_u - u).hypot(got_v - v)
     });
     let apart = apart.fold(0.0, f64::max);
-    let told = bill["worst_errors"]["centroid"].as_f64().unwrap();
-    assert!((told - apart).abs() <= 1e-3 * apart, "{told} told, {apart} found");
+    let reported = bill["worst_errors"]["centroid"].as_f64().unwrap();
+    assert!((reported - apart).abs() <= 1e-3 * apart, "{reported} reported, {apart} found");
     let text = done(&[&["plan"][..], &flags].concat());
     assert!(text.contains("° (1 tie left out)") || text.contains(&format!("° ({ties} ties left out)")), "{text}");
 }

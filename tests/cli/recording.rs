@@ -348,7 +348,7 @@ fn survive(rounds: u64, end: Option<Instant>, seed: u64) -> u64 {
             assert!(e.to_string().lines().count() == 1, "{e}");
         }
         let lossless = done.is_ok() && reader.losses().is_empty() && reader.taxels() == ids;
-        assert!(!lossless || count >= kept.len(), "round {round} of {seed}: {count} frames, and no loss told");
+        assert!(!lossless || count >= kept.len(), "round {round} of {seed}: {count} frames, and no loss reported");
         assert!(reader.losses().iter().all(|loss| loss.lines().count() == 1));
         read_in_part += u64::from(count > 0 && count < kept.len());
         let attached = reader.attached().to_vec();
@@ -440,8 +440,8 @@ fn damage_is_placed_in_time_whoever_reads() {
         assert!(said.contains(&format!("{left} frames are intact")), "{left}: {said}");
         let (count, losses) = count_of(&path);
         assert!(count == left && said.contains(&losses[0]), "{losses:?}");
-        let (_, told) = json(&path);
-        assert_eq!(told["frames"].as_u64().unwrap() as usize, left);
+        let (_, reported) = json(&path);
+        assert_eq!(reported["frames"].as_u64().unwrap() as usize, left);
     }
 }
 

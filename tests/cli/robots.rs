@@ -176,13 +176,14 @@ fn pressed_taxels_of_robots_are_in_the_world_where_pinocchio_and_yourdfpy_have_t
         let line = |index: usize| {
             let positions: Vec<f64> = joints.iter().map(|_| 6.0 * (random.unit() - 0.5)).collect();
             let link = (random.unit() * links.len() as f64) as usize;
-            let told: serde_json::Map<String, Value> = joints
+            let reported: serde_json::Map<String, Value> = joints
                 .iter()
                 .zip(&positions)
                 .map(|(joint, &position)| ((*joint).to_owned(), position.into()))
                 .collect();
             touches.push((positions, link));
-            let line = serde_json::json!({"t": 0.01 * index as f64, "values": {link.to_string(): 5.0}, "joints": told});
+            let line =
+                serde_json::json!({"t": 0.01 * index as f64, "values": {link.to_string(): 5.0}, "joints": reported});
             format!("{line}\n")
         };
         let lines: String = (0..TOUCHES).map(line).collect();
@@ -230,7 +231,7 @@ fn links_are_where_pinocchio_and_yourdfpy_have_them() {
             let mut bytes = Vec::new();
             for _ in 0..configurations {
                 let mut positions: Vec<f64> = (0..joints).map(|_| 6.0 * (random.unit() - 0.5)).collect();
-                let told = positions.clone();
+                let reported = positions.clone();
                 positions[1] += off_rad;
                 let poses = kinematics.link_poses(&positions);
                 let rows = poses.iter().flat_map(|(_, pose)| {
@@ -240,7 +241,7 @@ fn links_are_where_pinocchio_and_yourdfpy_have_them() {
                         [x, y, z, pose.translation[row]]
                     })
                 });
-                bytes.extend(told.into_iter().chain(rows).flat_map(f64::to_le_bytes));
+                bytes.extend(reported.into_iter().chain(rows).flat_map(f64::to_le_bytes));
             }
             std::fs::write(&numbers, bytes).unwrap();
             serde_json::from_str(&compare(&["compare", urdf, text_of(&names), text_of(&numbers)]).unwrap()).unwrap()
@@ -443,48 +444,51 @@ fn states_that_cannot_be_meant_are_reported() {
             .unwrap();
         (output.status.code(), stderr(&output))
     };
-    let (code, told) = said(URDF, "t,shoulder,elbow,grip\n0,28.6,0,0\n0.99,28.6,0,0\n");
-    assert!(code == Some(0) && told.matches("are these degrees?").count() == 1, "{told}");
-    assert!(told.contains("joint `shoulder` is at 28.6 rad"), "{told}");
+    let (code, reported) = said(URDF, "t,shoulder,elbow,grip\n0,28.6,0,0\n0.99,28.6,0,0\n");
+    assert!(code == Some(0) && reported.matches("are these degrees?").count() == 1, "{reported}");
+    assert!(reported.contains("joint `shoulder` is at 28.6 rad"), "{reported}");
     // In ms instead of s; the states come too late again and again.
-    let (code, told) = said(URDF, "t,shoulder,elbow,grip\n0,0,0,0\n250,0,0,0\n500,0,0,0\n");
-    assert!(code == Some(0) && told.contains("89 of 100 frames lack poses"), "{told}");
-    assert!(told.contains("states are of 0 to 500 s on the frames' clock, frames of 0 to 0.99 s"), "{told}");
+    let (code, reported) = said(URDF, "t,shoulder,elbow,grip\n0,0,0,0\n250,0,0,0\n500,0,0,0\n");
+    assert!(code == Some(0) && reported.contains("89 of 100 frames lack poses"), "{reported}");
+    assert!(reported.contains("states are of 0 to 500 s on the frames' clock, frames of 0 to 0.99 s"), "{reported}");
     let slow: String = (0..5).map(|state| format!("{},0,0,0\n", f64::from(state) * 0.25)).collect();
-    let (_, told) = said(URDF, &format!("t,shoulder,elbow,grip\n{slow}"));
-    assert_eq!(told.matches("from here on").count(), 2, "{told}");
+    let (_, reported) = said(URDF, &format!("t,shoulder,elbow,grip\n{slow}"));
+    assert_eq!(reported.matches("from here on").count(), 2, "{reported}");
     for (text, why) in [
         ("t,shoulder,elbow,grip\n", "it has no states, only a header"),
         ("t,shoulder,elbow,grip\n0,0,0,0\n1,0\n", "line 3: 2 cells, and the header has 4"),
         ("t,shoulder,elbwo,grip\n0,0,0,0\n", "no state has joint `elbow`, which moves `fore_arm`; is `elbwo` meant?"),
     ] {
-        let (code, told) = said(URDF, text);
-        assert!(code == Some(1) && told.contains(why), "{told}");
+        let (code, reported) = said(URDF, text);
+        assert!(code == Some(1) && reported.contains(why), "{reported}");
     }
-    let (_, told) = said(URDF, "t,joint1,joint2\n0,0,0\n");
+    let (_, reported) = said(URDF, "t,joint1,joint2\n0,0,0\n");
     assert!(
-        told.contains("no state has joint `elbow`, which moves `fore_arm`; add it to its `joint1`, `joint2`"),
-        "{told}"
+        reported.contains("no state has joint `elbow`, which moves `fore_arm`; add it to its `joint1`, `joint2`"),
+        "{reported}"
     );
     // Degrees that are less than a whole turn, and millimetres.
     for (row, what) in [
         ("6,0,0", "joint `shoulder` is at 6 rad, and its limits in the URDF are "),
         ("0,0,19.48", "joint `grip` is at 19.48 m, and its limits in the URDF are 0 to "),
     ] {
-        let (code, told) = said(URDF, &format!("t,shoulder,elbow,grip\n0,{row}\n0.99,{row}\n"));
-        assert!(code == Some(0) && told.matches(what).count() == 1 && told.contains("are its states in "), "{told}");
+        let (code, reported) = said(URDF, &format!("t,shoulder,elbow,grip\n0,{row}\n0.99,{row}\n"));
+        assert!(
+            code == Some(0) && reported.matches(what).count() == 1 && reported.contains("are its states in "),
+            "{reported}"
+        );
     }
     // Two clocks.
-    let (_, told) = said(URDF, "t,shoulder,elbow,grip\n1700000000,0,0,0\n1700000001,0,0,0\n");
+    let (_, reported) = said(URDF, "t,shoulder,elbow,grip\n1700000000,0,0,0\n1700000001,0,0,0\n");
     assert!(
-        told.contains("100 of 100 frames lack poses") && told.contains("two clocks, give --joints-delay"),
-        "{told}"
+        reported.contains("100 of 100 frames lack poses") && reported.contains("two clocks, give --joints-delay"),
+        "{reported}"
     );
     // The base of another robot is called alike.
     let other = folder.path().join("other.urdf");
     let urdf = "<robot name=\"other\"><link name=\"base\"/><link name=\"tool\"/><joint name=\"turn\" type=\"continuous\">\
                 <parent link=\"base\"/><child link=\"tool\"/></joint></robot>";
     std::fs::write(&other, urdf).unwrap();
-    let (code, told) = said(text_of(&other), "t,turn\n0,0\n");
-    assert!(code == Some(1) && told.contains("is it the URDF of this robot?"), "{told}");
+    let (code, reported) = said(text_of(&other), "t,turn\n0,0\n");
+    assert!(code == Some(1) && reported.contains("is it the URDF of this robot?"), "{reported}");
 }

@@ -84,9 +84,9 @@ fn another_node_receives_what_ndjson_has_also_after_a_new_start() {
         // The writers have yet to find their readers.
         std::thread::sleep(Duration::from_millis(500));
         feed(&mut child, &lines, Duration::from_millis(10));
-        let (told, said) = ended(child);
+        let (reported, said) = ended(child);
         assert!(!said.contains("left out") && !said.contains("not sent"), "{said}");
-        percepts.push(frames(&told));
+        percepts.push(frames(&reported));
         peer.wait_for("unmatched");
     }
     assert_eq!(percepts[0], percepts[1]);
@@ -229,7 +229,7 @@ fn frames_from_a_topic_are_those_from_standard_input() {
         peer.say(&cloud(1.0 + frame as f64 * 0.25, values).to_string());
         std::thread::sleep(Duration::from_millis(10));
     }
-    let (told, _) = ended(child);
+    let (reported, _) = ended(child);
     let mut standard = run(&domain, &["run", "--source", "-", "--backend", "reference", "--sink", "-"]);
     let lines: Vec<String> = frames_sent
         .iter()
@@ -241,8 +241,8 @@ fn frames_from_a_topic_are_those_from_standard_input() {
         .collect();
     feed(&mut standard, &lines, Duration::ZERO);
     let (expected, _) = ended(standard);
-    assert_eq!(frames(&told), frames(&expected));
-    assert!(frames(&told).len() == 40 && told.contains("hand/"), "{told}");
+    assert_eq!(frames(&reported), frames(&expected));
+    assert!(frames(&reported).len() == 40 && reported.contains("hand/"), "{reported}");
 }
 
 #[test]
@@ -323,19 +323,19 @@ fn joint_states_of_a_topic_put_percepts_into_the_world() {
         std::thread::sleep(Duration::from_millis(10));
         feed(&mut child, std::slice::from_ref(line), Duration::ZERO);
     }
-    let (told, said) = ended(child);
-    let told = frames(&told);
-    assert_eq!(told.len(), expected.len());
+    let (reported, said) = ended(child);
+    let reported = frames(&reported);
+    assert_eq!(reported.len(), expected.len());
     // The first states may come after the first frames.
-    let late = told.iter().zip(&expected).filter(|(own, other)| own != other).count();
+    let late = reported.iter().zip(&expected).filter(|(own, other)| own != other).count();
     assert!(late <= 5, "{late} frames differ: {said}");
-    assert!(told.iter().any(|frame| frame["fields"][0]["link"] == "world"));
+    assert!(reported.iter().any(|frame| frame["fields"][0]["link"] == "world"));
     // Nobody sends: positions stay in links.
     let mut silent = run(&domain, &[&flags[..], &["--joint-states", "ros2:/nobody"]].concat());
     std::thread::sleep(Duration::from_secs(1));
     feed(&mut silent, &without, Duration::ZERO);
-    let (told, said) = ended(silent);
-    assert!(said.contains("no state so far") && !told.contains("\"link\":\"world\""), "{said}");
+    let (reported, said) = ended(silent);
+    assert!(said.contains("no state so far") && !reported.contains("\"link\":\"world\""), "{said}");
     let about = "joint states `ros2:/nobody`: no state has come in ";
     assert!(said.matches(about).count() == 1 && said.contains("; there is /joint_states"), "{said}");
 }
@@ -394,11 +394,11 @@ fn states_of_a_topic_are_those_of_the_clouds_stamps() {
                 std::thread::sleep(Duration::from_millis(15));
             }
         }
-        let (told, said) = ended(child);
-        let told = frames(&told);
+        let (reported, said) = ended(child);
+        let reported = frames(&reported);
         // How far each place is from where the recordings have it at that time.
         let mut apart_m: Vec<f64> = Vec::new();
-        for (frame, other) in told
+        for (frame, other) in reported
             .iter()
             .filter_map(|frame| expected.iter().find(|other| other["t"] == frame["t"]).map(|other| (frame, other)))
         {
@@ -485,15 +485,15 @@ fn another_node_hears_how_a_board_is_doing_until_it_falls_silent() {
     peer.wait_for("matched");
     let sent = boards.end()[0];
     ended(child);
-    let told = peer.received();
-    let status: Vec<&Value> = told.iter().map(|(_, _, array)| &array["status"][0]).collect();
+    let reported = peer.received();
+    let status: Vec<&Value> = reported.iter().map(|(_, _, array)| &array["status"][0]).collect();
     let value = |status: &Value, key: &str| -> Option<f64> {
         let pair = status["values"].as_array().unwrap().iter().find(|pair| pair["key"] == key)?;
         pair["value"].as_str().unwrap().parse().ok()
     };
     let frames: Vec<f64> = status.iter().map(|status| value(status, "frames").unwrap()).collect();
-    println!("{sent} frames, {} messages, the last {}", told.len(), status.last().unwrap());
-    assert!(frames.is_sorted() && told.windows(2).all(|pair| stamp_ns(&pair[0].2) <= stamp_ns(&pair[1].2)));
+    println!("{sent} frames, {} messages, the last {}", reported.len(), status.last().unwrap());
+    assert!(frames.is_sorted() && reported.windows(2).all(|pair| stamp_ns(&pair[0].2) <= stamp_ns(&pair[1].2)));
     assert!(status.iter().all(|status| status["name"].as_str().unwrap().starts_with("somatic: ")), "{status:?}");
     // OK while it speaks, at its rate; STALE from when it is silent, with its last count.
     let [ok, stale] = [0, 3].map(|level| status.iter().filter(|status| status["level"] == level).collect::<Vec<_>>());

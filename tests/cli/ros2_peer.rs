@@ -106,7 +106,7 @@ impl Drop for Peer {
 /// The command in `domain`. What it prints is read as it comes: a full pipe would hold it up.
 pub struct Running {
     pub child: Child,
-    told: JoinHandle<String>,
+    reported: JoinHandle<String>,
 }
 
 pub fn run(domain: &str, arguments: &[&str]) -> Running {
@@ -114,12 +114,12 @@ pub fn run(domain: &str, arguments: &[&str]) -> Running {
     command.env("ROS_DOMAIN_ID", domain).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
     let mut output = child.stdout.take().unwrap();
-    let told = std::thread::spawn(move || {
+    let reported = std::thread::spawn(move || {
         let mut text = String::new();
         output.read_to_string(&mut text).unwrap();
         text
     });
-    Running { child, told }
+    Running { child, reported }
 }
 
 /// Sends `lines` to the command's standard input, one every `period`.
@@ -134,9 +134,9 @@ pub fn feed(running: &mut Running, lines: &[String], period: Duration) {
 
 /// What the command prints until its end, with its standard input closed; on standard error too.
 pub fn ended(running: Running) -> (String, String) {
-    let Running { mut child, told } = running;
+    let Running { mut child, reported } = running;
     drop(child.stdin.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    (told.join().unwrap(), stderr(&output))
+    (reported.join().unwrap(), stderr(&output))
 }

@@ -476,8 +476,8 @@ fn letters_and_signals_are_reported_where_there_are_several() {
     let run = ["run", "--quiet", "--backend", "cpu", "--source", text_of(&path), "--fields", "hand/palm"];
     let seen = |more: &[&str]| -> Vec<Vec<String>> {
         let text = done(&[&run[..], &["--outputs", "total"], more].concat());
-        let told = |field: &Value| format!("{} {} {}", field["letter"], field["signal"], field["total"]);
-        frames(&text).iter().map(|frame| fields(frame).iter().map(told).collect()).collect()
+        let reported = |field: &Value| format!("{} {} {}", field["letter"], field["signal"], field["total"]);
+        frames(&text).iter().map(|frame| fields(frame).iter().map(reported).collect()).collect()
     };
     let plain = seen(&[]);
     assert_eq!(plain[1], ["null null 5.0"]);

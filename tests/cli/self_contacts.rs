@@ -81,14 +81,14 @@ impl Plates {
         let (urdf, body) = (folder.path().join("plates.urdf"), folder.path().join("plates.glb"));
         std::fs::write(&urdf, URDF).unwrap();
         done(&["author", "--urdf-skin", text_of(&urdf), "-o", text_of(&body)]);
-        let told: Value = serde_json::from_str(&done(&["inspect", text_of(&body), "--json"])).unwrap();
-        assert_eq!(told["near_at_rest"], serde_json::json!([]));
+        let reported: Value = serde_json::from_str(&done(&["inspect", text_of(&body), "--json"])).unwrap();
+        assert_eq!(reported["near_at_rest"], serde_json::json!([]));
         let taxel = |taxel: &Value| {
             let axis = |axis: usize| taxel["position"][axis].as_f64().unwrap();
             let link = taxel["link"].as_str().unwrap().to_owned();
             (taxel["id"].as_u64().unwrap(), link, DVec3::new(axis(0), axis(1), axis(2)))
         };
-        let taxels: Vec<_> = told["taxels"].as_array().unwrap().iter().map(taxel).collect();
+        let taxels: Vec<_> = reported["taxels"].as_array().unwrap().iter().map(taxel).collect();
         assert_eq!(taxels.len(), 128);
         Self { _folder: folder, urdf, body, taxels }
     }
@@ -211,7 +211,7 @@ fn a_table_of_contacts_has_what_ndjson_has() {
     let folder = tempfile::tempdir().unwrap();
     let sink = folder.path().join("a.csv");
     let lines = plates.lines(&truth, 0.0);
-    let told = plates.jointed(&lines, &["--sink", text_of(&sink), "--sink", "-"]);
+    let reported = plates.jointed(&lines, &["--sink", text_of(&sink), "--sink", "-"]);
     let table = std::fs::read_to_string(folder.path().join("a.self_contacts.csv")).unwrap();
     let mut rows = table.lines();
     assert_eq!(
@@ -229,7 +229,7 @@ fn a_table_of_contacts_has_what_ndjson_has() {
         cells.extend(["distance", "angle"].map(|key| contact[key].to_string()));
         cells.join(",")
     };
-    let wanted: Vec<String> = told.iter().flat_map(|f| self_contacts(f).iter().map(move |c| row(f, c))).collect();
+    let wanted: Vec<String> = reported.iter().flat_map(|f| self_contacts(f).iter().map(move |c| row(f, c))).collect();
     assert_eq!(rows.collect::<Vec<_>>(), wanted);
     assert_eq!(wanted.len(), 11);
     assert!(Path::new(&folder.path().join("a.touches.csv")).is_file());
@@ -244,16 +244,16 @@ fn links_that_are_near_at_rest_are_reported() {
     let body = folder.path().join("near.glb");
     done(&["author", "--urdf-skin", text_of(&urdf), "-o", text_of(&body)]);
     let near = |flags: &[&str]| {
-        let told = done(&[&["inspect", text_of(&body), "--json"], flags].concat());
-        serde_json::from_str::<Value>(&told).unwrap()["near_at_rest"].clone()
+        let reported = done(&[&["inspect", text_of(&body), "--json"], flags].concat());
+        serde_json::from_str::<Value>(&reported).unwrap()["near_at_rest"].clone()
     };
-    let told = near(&[]);
-    assert_eq!(told[0]["links"], serde_json::json!(["lower", "upper"]));
-    assert!((told[0]["nearest"].as_f64().unwrap() - 0.015).abs() < 1e-6, "{told}");
-    assert!((told[0]["tolerance"].as_f64().unwrap() - (0.005 + 0.02 / 2.0_f64.sqrt())).abs() < 1e-6, "{told}");
+    let reported = near(&[]);
+    assert_eq!(reported[0]["links"], serde_json::json!(["lower", "upper"]));
+    assert!((reported[0]["nearest"].as_f64().unwrap() - 0.015).abs() < 1e-6, "{reported}");
+    assert!((reported[0]["tolerance"].as_f64().unwrap() - (0.005 + 0.02 / 2.0_f64.sqrt())).abs() < 1e-6, "{reported}");
     // Each taxel faces the one above it and the four beside that.
-    assert_eq!(told[0]["taxels"][0].as_array().unwrap().len(), 64);
-    assert_eq!(told[0]["facing"], 64 + 4 * 56);
+    assert_eq!(reported[0]["taxels"][0].as_array().unwrap().len(), 64);
+    assert_eq!(reported[0]["facing"], 64 + 4 * 56);
     assert_eq!(near(&["--contact-tolerance", "0.0149"]), serde_json::json!([]));
     assert!(done(&["inspect", text_of(&body)]).contains("near at rest"));
 }

@@ -18,7 +18,7 @@ const CHANNELS: usize = 16;
 /// A running `somatic board --json`, each board with a link in a folder of its own.
 pub struct Boards {
     child: Child,
-    told: BufReader<ChildStdout>,
+    reported: BufReader<ChildStdout>,
     pub ports: Vec<String>,
     folder: tempfile::TempDir,
 }
@@ -34,19 +34,19 @@ impl Boards {
         let mut all = vec!["board", "--json", "--link", text_of(&link)];
         all.extend(arguments);
         let mut child = somatic(&all).stdout(Stdio::piped()).spawn().unwrap();
-        let mut told = BufReader::new(child.stdout.take().unwrap());
+        let mut reported = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
-        told.read_line(&mut line).unwrap();
+        reported.read_line(&mut line).unwrap();
         let playing: Value = serde_json::from_str(&line).unwrap();
         let port = |board: &Value| board["link"].as_str().unwrap().to_owned();
         let ports = playing["playing"].as_array().unwrap().iter().map(port).collect();
-        Self { child, told, ports, folder }
+        Self { child, reported, ports, folder }
     }
 
     /// Frames that each board sent, when it has ended.
     pub fn end(mut self) -> Vec<u64> {
         let mut line = String::new();
-        self.told.read_line(&mut line).unwrap();
+        self.reported.read_line(&mut line).unwrap();
         assert!(self.child.wait().unwrap().success());
         let sent: Value = serde_json::from_str(&line).unwrap();
         sent["sent"].as_array().unwrap().iter().map(|board| board["frames"].as_u64().unwrap()).collect()
@@ -223,12 +223,12 @@ fn what_happens_again_and_again_is_reported_once_and_counted() {
     let source = format!("serial:{}", boards.ports[0]);
     let arguments = ["run", "--backend", "cpu", "--sink", "-", "--for", "4s", "--summary", text_of(&summary)];
     let output = somatic(&[&arguments[..], &["--source", &source]].concat()).output().unwrap();
-    let told = stderr(&output);
-    let again: Vec<&str> = told.lines().filter(|line| line.contains("board 1 has started again")).collect();
-    let [first, last] = again[..] else { panic!("{told}") };
+    let reported = stderr(&output);
+    let again: Vec<&str> = reported.lines().filter(|line| line.contains("board 1 has started again")).collect();
+    let [first, last] = again[..] else { panic!("{reported}") };
     let times: u64 = last.split(": ").last().unwrap().trim_end_matches(" times in all").parse().unwrap();
     let at_s: f64 = first.split_whitespace().nth(1).unwrap().parse().unwrap();
-    assert!(times > 10 && (0.0..4.5).contains(&at_s), "{told}");
+    assert!(times > 10 && (0.0..4.5).contains(&at_s), "{reported}");
     // It was unplugged, and is not any more.
     let summary: Value = serde_json::from_str(&std::fs::read_to_string(summary).unwrap()).unwrap();
     let (state, unplugs) = (&summary["boards"][0]["state"], &summary["boards"][0]["unplugs"]);
@@ -309,8 +309,8 @@ fn named(sources: &[&str], more: &[&str]) -> (String, Option<i32>) {
     let mut child = somatic(&arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let start = Instant::now();
     let mut line = String::new();
-    let mut told = BufReader::new(child.stderr.take().unwrap());
-    told.read_line(&mut line).unwrap();
+    let mut reported = BufReader::new(child.stderr.take().unwrap());
+    reported.read_line(&mut line).unwrap();
     // Less than two seconds from when the line is open, which a unit test adds up; a busy machine may take longer than that
     // to start a program.
     assert!(start.elapsed() < Duration::from_secs(8), "{line}");
@@ -389,10 +389,10 @@ fn another_device_and_nobody_are_distinguished() {
     let percepts = folder.path().join("percepts.ndjson");
     let sink = format!("ndjson:{}", percepts.display());
     let run = ["run", "--source", &format!("serial:{name}"), "--for", "1s", "--sink", &sink];
-    let told = stderr(&somatic(&run).output().unwrap());
+    let reported = stderr(&somatic(&run).output().unwrap());
     assert!(!percepts.exists(), "an empty file would be in the way of the next run");
-    let last = told.lines().last().unwrap_or_default();
-    assert!(last.contains("no board has answered") && !told.contains("no packets from"), "{told}");
+    let last = reported.lines().last().unwrap_or_default();
+    assert!(last.contains("no board has answered") && !reported.contains("no packets from"), "{reported}");
 }
 
 /// Resident memory of this process, kB.

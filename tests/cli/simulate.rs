@@ -85,9 +85,9 @@ fn without_a_driver_auto_says_so_once_and_runs_on_the_cpu() {
     let output = somatic(&["run"]).env("VK_DRIVER_FILES", "/nonexistent").output().unwrap();
     assert_eq!(output.status.code(), Some(0));
     assert_eq!(frames(&String::from_utf8_lossy(&output.stdout)).len(), 280);
-    let told = stderr(&output);
+    let reported = stderr(&output);
     if cfg!(target_os = "linux") {
-        assert_eq!(told.matches("no GPU driver answers").count(), 1, "{told}");
+        assert_eq!(reported.matches("no GPU driver answers").count(), 1, "{reported}");
         let refused = somatic(&["run", "--backend", "gpu"]).env("VK_DRIVER_FILES", "/nonexistent").output().unwrap();
         assert_eq!(refused.status.code(), Some(1));
         assert!(stderr(&refused).contains("no GPU driver answers") && refused.stdout.is_empty());

@@ -14,15 +14,15 @@ fn arm() -> (tempfile::TempDir, PathBuf) {
     (folder, body)
 }
 
-/// Runs these: without the flag an error that says `wrong`; with it what `expected` is, and that says each of `told`.
-fn check(arguments: &[&str], wrong: &str, expected: &str, told: &[&str]) {
+/// Runs these: without the flag an error that says `wrong`; with it what `expected` is, and that says each of `reported`.
+fn check(arguments: &[&str], wrong: &str, expected: &str, reported: &[&str]) {
     let why = refused(1, arguments);
     assert!(why.contains(wrong), "{why}");
     let run = output(&[arguments, &["--skip-bad"]].concat());
     let said = stderr(&run);
     assert_eq!(run.status.code(), Some(3), "{said}");
-    for told in told {
-        assert!(said.contains(told), "{told}: {said}");
+    for reported in reported {
+        assert!(said.contains(reported), "{reported}: {said}");
     }
     assert!(String::from_utf8_lossy(&run.stdout) == expected, "{said}");
 }
@@ -48,8 +48,8 @@ fn wrong_rows_of_tables_and_joint_states_are_left_out() {
     let text = fs::read_to_string(&whole).unwrap();
     fs::write(&wrong, with_lines(&text, &[(3, "0.01,5"), (5, "0.02,5"), (9, "now")])).unwrap();
     let expected = done(&run_of(&body, &whole));
-    let told = ["wrong.csv: 3 rows skipped, more or fewer values than columns; the first one: line 4"];
-    check(&run_of(&body, text_of(&wrong)), "wrong.csv: line 4: 2 values where", &expected, &told);
+    let reported = ["wrong.csv: 3 rows skipped, more or fewer values than columns; the first one: line 4"];
+    check(&run_of(&body, text_of(&wrong)), "wrong.csv: line 4: 2 values where", &expected, &reported);
 
     // Joint states as NDJSON, with one that is null.
     let urdf = format!("{ROBOT}/arm.urdf");
@@ -68,8 +68,8 @@ fn wrong_rows_of_tables_and_joint_states_are_left_out() {
         run_of(&body, &whole).into_iter().chain(more).map(str::to_owned).collect()
     };
     let expected = done(&with(&jointed(&whole_states), &[]));
-    let told = ["wrong.ndjson: 2 lines skipped, not a joint state; the first one: line 3"];
-    check(&with(&jointed(&states), &[]), "wrong.ndjson: line 3", &expected, &told);
+    let reported = ["wrong.ndjson: 2 lines skipped, not a joint state; the first one: line 3"];
+    check(&with(&jointed(&states), &[]), "wrong.ndjson: line 3", &expected, &reported);
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn frames_of_several_lines_are_left_out_whole() {
         ];
         run.map(str::to_owned).to_vec()
     };
-    let told = |text: &str| -> Vec<(String, String)> {
+    let reported = |text: &str| -> Vec<(String, String)> {
         frames(text).iter().map(|frame| (frame["t"].to_string(), frame["fields"].to_string())).collect()
     };
     // A wrong cell within a frame, and a row too few, which the next frame shows.
@@ -122,7 +122,7 @@ fn frames_of_several_lines_are_left_out_whole() {
     {
         let whole = format!("{examples}/{name}");
         let text = fs::read_to_string(&whole).unwrap();
-        let mut expected = told(&done(&with(&run(&whole), &[])));
+        let mut expected = reported(&done(&with(&run(&whole), &[])));
         expected.remove(number);
         let start = text.match_indices(mark).nth(number).unwrap().0;
         let row = start + text[start..].find(wrong).unwrap();
@@ -136,7 +136,7 @@ fn frames_of_several_lines_are_left_out_whole() {
             let said = stderr(&skipping);
             assert_eq!(skipping.status.code(), Some(3), "{said}");
             assert!(said.contains("1 frame skipped, a line that does not fit"), "{said}");
-            assert_eq!(told(&String::from_utf8_lossy(&skipping.stdout)), expected, "{name}, {what}: {said}");
+            assert_eq!(reported(&String::from_utf8_lossy(&skipping.stdout)), expected, "{name}, {what}: {said}");
         }
     }
 }
@@ -158,8 +158,8 @@ fn messages_of_bags_that_do_not_fit_are_left_out() {
     write_mcap(&at("short.mcap"), &messages, "cdr");
     let name = |file: &str| format!("ros2-mcap:{}", text_of(&at(file)));
     let expected = done(&run_of(&body, &name("whole.mcap")));
-    let told = ["1 message skipped, values that do not fit: "];
-    check(&run_of(&body, &name("short.mcap")), "short.mcap: /numbers: the message of ", &expected, &told);
+    let reported = ["1 message skipped, values that do not fit: "];
+    check(&run_of(&body, &name("short.mcap")), "short.mcap: /numbers: the message of ", &expected, &reported);
 }
 
 #[test]

@@ -17,7 +17,7 @@ const FORGOTTEN: u32 = 7;
 /// A running `somatic board` whose sensors a person touches: the paper's, recorded at wiper 38.
 struct Touched {
     child: Child,
-    told: BufReader<ChildStdout>,
+    reported: BufReader<ChildStdout>,
     skin: ChildStdin,
     port: String,
     time_s: f64,
@@ -30,9 +30,9 @@ impl Touched {
         let arguments = [&first[..], &["--wiring", wiring, "--link", text_of(&link)], more].concat();
         let mut child = somatic(&arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         let skin = child.stdin.take().unwrap();
-        let mut told = BufReader::new(child.stdout.take().unwrap());
-        told.read_line(&mut String::new()).unwrap();
-        let mut touched = Self { child, told, skin, port: format!("serial:{}", link.display()), time_s: 0.0 };
+        let mut reported = BufReader::new(child.stdout.take().unwrap());
+        reported.read_line(&mut String::new()).unwrap();
+        let mut touched = Self { child, reported, skin, port: format!("serial:{}", link.display()), time_s: 0.0 };
         touched.touch(|_| None);
         touched
     }
@@ -51,7 +51,7 @@ impl Touched {
     fn wipers(mut self) -> Vec<u64> {
         interrupt(&self.child);
         let mut line = String::new();
-        self.told.read_line(&mut line).unwrap();
+        self.reported.read_line(&mut line).unwrap();
         let account: Value = serde_json::from_str(&line).unwrap();
         account["sent"][0]["wipers"].as_array().unwrap().iter().map(|wiper| wiper.as_u64().unwrap()).collect()
     }
@@ -77,9 +77,9 @@ fn firm(id: u32) -> Option<f64> {
 /// standard error, exit code.
 fn guided(arguments: &[&str], boards: &mut [Touched], until: Option<&str>) -> (String, String, Option<i32>) {
     let mut child = somatic(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let (mut told, mut said) = (BufReader::new(child.stderr.take().unwrap()), String::new());
+    let (mut reported, mut said) = (BufReader::new(child.stderr.take().unwrap()), String::new());
     let mut line = String::new();
-    while told.read_line(&mut line).unwrap() > 0 {
+    while reported.read_line(&mut line).unwrap() > 0 {
         if until.is_some_and(|until| line.contains(until)) {
             interrupt(&child);
         } else if line.contains("now press every sensor") {

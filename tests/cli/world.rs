@@ -62,10 +62,10 @@ fn speed_in_the_world_is_that_of_the_skin_and_the_link_together() {
             let of = |index: usize| percept(&found[index], field);
             assert!(of(0).get("speed_in_world").is_none() && of(0)["flags"].to_string().contains("no_previous"));
             for index in 1..truth.len() {
-                let told = of(index)["speed_in_world"].as_f64().unwrap();
+                let reported = of(index)["speed_in_world"].as_f64().unwrap();
                 let moved = position(of(index)).distance(position(of(index - 1))) / 0.05;
-                assert!((told - moved).abs() < 1e-9, "{told} is not {moved}");
-                assert!((told - expected).abs() < 0.05 * 0.02, "{field} {flags:?}: {told}, not {expected}");
+                assert!((reported - moved).abs() < 1e-9, "{reported} is not {moved}");
+                assert!((reported - expected).abs() < 0.05 * 0.02, "{field} {flags:?}: {reported}, not {expected}");
                 let speed = of(index)["speed"].as_f64().unwrap();
                 assert!((speed - over_skin).abs() < 0.05 * 0.02, "{field}: {speed}, not {over_skin}");
             }

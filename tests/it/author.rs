@@ -580,10 +580,10 @@ fn what_a_recipe_may_not_say_is_named_with_its_line() {
         ("seed = \n".into(), 1, ""),
         ("bare = [\"palm\"]\n[regions.palm]\n[[place]]\ntaxels = 5\n".into(), 4, "are `bare`"),
     ] {
-        let told = why(&file, &text);
+        let reported = why(&file, &text);
         assert!(
-            told.starts_with(&format!("recipe.toml: line {line}, column ")) && told.contains(word),
-            "{text}\n{told}"
+            reported.starts_with(&format!("recipe.toml: line {line}, column ")) && reported.contains(word),
+            "{text}\n{reported}"
         );
     }
     assert!(why(&file, "").contains("no taxels"));

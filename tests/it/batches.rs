@@ -161,6 +161,10 @@ fn percepts_do_not_depend_on_the_order_of_channels() {
     for kind in backends() {
         let straight = run(&body, kind, &frames, 10, None);
         assert_eq!(run(&body, kind, &mixed, 10, Some(&mixed_ids)), straight, "{kind:?}");
-        assert_ne!(run(&body, kind, &mixed, 10, None), straight, "{kind:?}: the order should matter if it is not told");
+        assert_ne!(
+            run(&body, kind, &mixed, 10, None),
+            straight,
+            "{kind:?}: the order should matter if it is not reported"
+        );
     }
 }

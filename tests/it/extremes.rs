@@ -485,15 +485,15 @@ fn a_taxel_that_measures_something_else_is_left_out_and_named() {
     body.taxels[2].modality = Modality::Temperature;
     body.taxels[3].modality = Modality::Proximity;
     // What it measures is neither in sums nor in flags, not even where it is faulty.
-    let mut told = frame(0.0, &[3.0, 1.0, 37.0, 0.2]);
-    told.values[3] = RawValue::FAULTY;
+    let mut reported = frame(0.0, &[3.0, 1.0, 37.0, 0.2]);
+    reported.values[3] = RawValue::FAULTY;
     let untold = frame(0.0, &[3.0, 1.0, 0.0, 0.0]);
     for backend in backends() {
         let scene = Scene::default().touches(touch::Options::default());
         let engine = |body: &Body| Engine::new(body, Options::default().backend(backend).scene(scene.clone())).unwrap();
         let (mut mixed, mut pressures) = (engine(&body), engine(&plain));
         assert_eq!(mixed.plan().fields().map(|field| field.name.to_owned()).collect::<Vec<_>>(), ["field"]);
-        let (percepts, agreement) = mixed.process_and_compare(std::slice::from_ref(&told)).unwrap();
+        let (percepts, agreement) = mixed.process_and_compare(std::slice::from_ref(&reported)).unwrap();
         assert!(agreement.holds(), "{agreement}");
         let (found, right) = (percepts.get(0, 0), pressures.process_one(&untold).unwrap().get(0, 0));
         let of = |p: &Percept| (p.total, p.peak, p.active, p.area, p.centroid, p.orientation, p.flags);
@@ -564,8 +564,8 @@ fn drift_that_no_taxel_can_tell_is_named_at_the_start() {
         Engine::new(&flat.body(), options).unwrap().remarks()
     };
     let drift = "[drift]\ntime_constant_s = 2\n";
-    let told = remarks(std::slice::from_ref(&(0..6)), drift);
-    assert!(told.len() == 1 && told[0].contains("no taxel can tell the drift"), "{told:?}");
+    let reported = remarks(std::slice::from_ref(&(0..6)), drift);
+    assert!(reported.len() == 1 && reported[0].contains("no taxel can tell the drift"), "{reported:?}");
     // Three others can, two cannot.
     assert!(
         remarks(&[0..2, 2..5], drift).is_empty()

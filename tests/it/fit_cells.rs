@@ -29,7 +29,7 @@ struct Cell {
     /// Of the sensors' gains; the calibration says it, too.
     gains: f64,
     /// How many gains differ by in the calibration, where it understates them.
-    told: Option<f64>,
+    stated: Option<f64>,
     /// Where presses are, and within what.
     at: [f64; 2],
     within: [f64; 2],
@@ -48,7 +48,7 @@ impl Cell {
             sigma_m: 2e-3,
             believed: 1.0,
             gains: 0.0,
-            told: None,
+            stated: None,
             at,
             within,
             two: false,
@@ -74,7 +74,7 @@ impl Cell {
             .map(|(name, gains)| Self { rod: true, gains, ..Self::new(name) })
             .into();
         cells.extend(rods);
-        cells.push(Self { gains: 0.2, told: Some(0.05), ..Self::new("gains ± 20 %, said to be ± 5 %") });
+        cells.push(Self { gains: 0.2, stated: Some(0.05), ..Self::new("gains ± 20 %, said to be ± 5 %") });
         cells
     }
 
@@ -117,7 +117,7 @@ impl Cell {
 
     /// Squares of errors of a seed: of the moments, of the fit; for those that have one, and how many there were.
     fn errors(&self, body: &Body, seed: u64, layer: &str) -> Errors {
-        let spread = self.told.unwrap_or(self.gains.max(0.05));
+        let spread = self.stated.unwrap_or(self.gains.max(0.05));
         let (percepts, truths) = found(body, &self.text(seed, layer), (self.sigma_m * self.believed, spread));
         let of = |truth: &Truth| (DVec2::from_array(truth.uv.unwrap()), truth.angle);
         let truths: Vec<Vec<_>> = truths.iter().map(|truths| truths.iter().map(of).collect()).collect();
@@ -269,7 +269,7 @@ fn a_fit_that_is_given_is_not_worse_than_the_moments() {
                 of(all.fitted)
             );
             // What is understated is reported, not promised.
-            if under > WORSE && cell.told.is_none() && all.given > 0 {
+            if under > WORSE && cell.stated.is_none() && all.given > 0 {
                 worse.push(format!("{}, {model}: {ratio:.2}", cell.name));
             }
         }

@@ -71,15 +71,15 @@ fn estimated(body: &Body, source: &mut SimulatedSource, onset: &str) -> GainsEst
 
 /// Root mean squares of log gains as they are, and of what is wrong with the estimate, both without their means.
 fn off(estimate: &GainsEstimate, gains: &[f64]) -> [f64; 2] {
-    let told: Vec<[f64; 2]> = estimate
+    let reported: Vec<[f64; 2]> = estimate
         .gains
         .iter()
         .zip(gains)
-        .filter_map(|(told, gain)| Some([gain.ln(), gain.ln() - told.as_ref()?.ln()]))
+        .filter_map(|(reported, gain)| Some([gain.ln(), gain.ln() - reported.as_ref()?.ln()]))
         .collect();
     [0, 1].map(|column| {
-        let mean = told.iter().map(|row| row[column]).sum::<f64>() / told.len() as f64;
-        (told.iter().map(|row| (row[column] - mean).powi(2)).sum::<f64>() / told.len() as f64).sqrt()
+        let mean = reported.iter().map(|row| row[column]).sum::<f64>() / reported.len() as f64;
+        (reported.iter().map(|row| (row[column] - mean).powi(2)).sum::<f64>() / reported.len() as f64).sqrt()
     })
 }
 
@@ -128,7 +128,7 @@ fn gains_are_found_from_a_finger_that_wanders() {
         let estimate = estimated(&body, &mut source, "hard");
         let gains = source.gains().to_vec();
         let [before, after] = off(&estimate, &gains);
-        let told = estimate.gains.iter().flatten().count();
+        let reported = estimate.gains.iter().flatten().count();
         let mut other = SimulatedSource::on_body("finger", &wandering(layer, noise, 40, 2), body.clone()).unwrap();
         let layer_m = 2.3e-3;
         let none = places(&body, &mut other, &|_| 1.0, layer_m, 0.2);
@@ -137,7 +137,7 @@ fn gains_are_found_from_a_finger_that_wanders() {
         other.seek(0);
         let known = places(&body, &mut other, &|index| gains[index], layer_m, 0.05);
         println!(
-            "{layer:?}, noise {noise}: {} touches, {told} taxels; gains off by {:.1} % before and {:.1} % after; width {:.2} mm, σ {:.2} mm, left {:.3}; \
+            "{layer:?}, noise {noise}: {} touches, {reported} taxels; gains off by {:.1} % before and {:.1} % after; width {:.2} mm, σ {:.2} mm, left {:.3}; \
              places without gains {none:?}, with those found {own:?}, with the true ones {known:?}",
             estimate.touches,
             100.0 * before,

@@ -170,15 +170,15 @@ fn two_fingers_are_two_touches_only_when_asked_for() {
                 seen.extend((0..part.len()).map(|frame| percepts.touches(frame).unwrap().touches.clone()));
                 several.extend((0..part.len()).map(|frame| percepts.get(frame, 0).flags.contains(Flags::SEVERAL)));
             }
-            let told = |touches: &[Touch]| -> Vec<(u64, f64, u32, f64)> {
+            let reported = |touches: &[Touch]| -> Vec<(u64, f64, u32, f64)> {
                 touches.iter().map(|t| (t.id, t.total, t.active, t.centre.x)).collect()
             };
-            assert_eq!(told(&seen[0]), [(1, 6.0, 1, 4.0), (2, 4.0, 2, -3.5)]);
+            assert_eq!(reported(&seen[0]), [(1, 6.0, 1, 4.0), (2, 4.0, 2, -3.5)]);
             // One that shares no taxel with those before is another.
-            assert_eq!(told(&seen[1]), [(2, 4.0, 1, -3.0), (3, 6.0, 1, 3.0)]);
-            assert_eq!(told(&seen[2]), [(3, 6.0, 1, 3.0)]);
+            assert_eq!(reported(&seen[1]), [(2, 4.0, 1, -3.0), (3, 6.0, 1, 3.0)]);
+            assert_eq!(reported(&seen[2]), [(3, 6.0, 1, 3.0)]);
             assert!(seen[3].is_empty());
-            assert_eq!(told(&seen[4]), [(4, 6.0, 1, 3.0)]);
+            assert_eq!(reported(&seen[4]), [(4, 6.0, 1, 3.0)]);
             assert_eq!(several, [true, true, false, false, false]);
             assert!(seen[0][0].position.distance(glam::DVec3::new(4.0, 0.0, 0.0)) < 1e-9);
         }

@@ -60,8 +60,8 @@ fn six_postures_on_the_mat() {
                 assert!(p.contact && p.active.unwrap() > 1000, "{p:?}");
                 // A value beyond the sensor's range is reported: as such, or as implausible if it is alone.
                 let beyond = frames[frame].values.iter().any(|v| v.number().unwrap() > 1000.0);
-                let told = p.flags.intersects(Flags::OUT_OF_RANGE | Flags::FAULTY_INPUT);
-                assert!(told || !beyond, "posture {posture}, frame {frame}");
+                let is_flagged = p.flags.intersects(Flags::OUT_OF_RANGE | Flags::FAULTY_INPUT);
+                assert!(is_flagged || !beyond, "posture {posture}, frame {frame}");
                 assert!(beyond || !p.flags.contains(Flags::OUT_OF_RANGE), "posture {posture}, frame {frame}");
                 ranged += u32::from(p.flags.contains(Flags::OUT_OF_RANGE));
                 // The body lies along the mat.

@@ -60,16 +60,16 @@ fn what_a_scene_finds_out_is_reported_once_and_in_keys() {
     let folder = tempfile::tempdir().unwrap();
     let export = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/exports/insoles.csv");
     std::fs::write(folder.path().join("cal.toml"), "[all]\ndead_band = 2\n").unwrap();
-    let told = Arc::new(Mutex::new(Vec::new()));
-    let to = Arc::clone(&told);
+    let reported = Arc::new(Mutex::new(Vec::new()));
+    let to = Arc::clone(&reported);
     let tell = Tell::new(move |line| to.lock().unwrap().push(line.to_owned()));
     let text = format!("source = {:?}\ncalibration = \"cal.toml\"\n", export.display().to_string());
     drop(Run::of(scene(folder.path(), &format!("{text}quiet = true\n")), &tell).unwrap());
-    assert!(told.lock().unwrap().is_empty());
+    assert!(reported.lock().unwrap().is_empty());
     drop(Run::of(scene(folder.path(), &text), &tell).unwrap());
-    let told = told.lock().unwrap();
-    let stays = told.iter().filter(|line| line.contains("this stays under `calibration`: unit = \"mmHg\""));
-    assert_eq!(stays.count(), 1, "{told:?}");
+    let reported = reported.lock().unwrap();
+    let stays = reported.iter().filter(|line| line.contains("this stays under `calibration`: unit = \"mmHg\""));
+    assert_eq!(stays.count(), 1, "{reported:?}");
 }
 
 #[test]
