@@ -158,8 +158,9 @@ fn fingerprint(body: &Body) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use somatic_bodies as bundled;
+
     use super::*;
-    use crate::bundled;
 
     #[test]
     fn a_value_is_made_once_for_a_shape_and_again_for_another() {
