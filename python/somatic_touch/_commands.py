@@ -31,6 +31,7 @@ class _Reading(TypedDict, total=False):
     unit: str | None
     layout: _Path | None
     skip_bad: bool
+    map: str | None
 
 
 def _of(body: _native.Body | _Path) -> _native.Body:
@@ -46,13 +47,17 @@ def info(
     pitch: str | None = None,
     unit: str | None = None,
     layout: _Path | None = None,
+    map: str | None = None,
+    threshold: str | None = None,
+    shortest_s: float = 0.05,
 ) -> dict[str, Any]:
     """What is in the recording at `source`, as `somatic info` tells it.
 
     Of a recording `kind`, `bytes`, `taxels`, `frames`, `start` and `duration` in seconds, `rate_hz`, `gaps`, `longest_gap`, `backwards`, `losses`; of an MCAP
     `topics` and `attached` too, of an export `unit` and `panels`; of a ROS 2 bag its `topics`. Where the body comes with it, `fields` has those
-    that are touched, a dict each: `contacts`, the `longest` and the mean one, `stance` (s), `load_mean` and `load_peak` in `load_unit`. The keywords
-    are those of `read`.
+    that are touched, a dict each: `contacts`, the `longest` and the mean one, `stance` (s), `mean` and `peak` of the `quantity`, force or total,
+    in `unit`. A contact begins over `threshold`, a force such as "20N" or a share of the peak such as "5%", ends at half of it, and lasts
+    `shortest_s` or more. The other keywords are those of `read`.
 
     >>> import pathlib, tempfile
     >>> import somatic_touch as st
@@ -62,7 +67,9 @@ def info(
     >>> known["kind"], known["frames"], known["duration"], [file["name"] for file in known["attached"]]
     ('MCAP', 280, 5.58, ['hand'])
     """
-    known: dict[str, Any] = json.loads(_native._info(os.fspath(source), rate_hz, format, grid, pitch, unit, layout))
+    known: dict[str, Any] = json.loads(
+        _native._info(os.fspath(source), rate_hz, format, grid, pitch, unit, layout, map, threshold, shortest_s)
+    )
     return known
 
 

@@ -519,6 +519,7 @@ def read(
     unit: str | None = None,
     layout: _Path | None = None,
     skip_bad: bool = False,
+    map: str | None = None,
     dataset: str | None = None,
     time: str | None = None,
 ) -> Recording: ...
@@ -536,6 +537,7 @@ def open(
     unit: str | None = None,
     layout: _Path | None = None,
     skip_bad: bool = False,
+    map: str | None = None,
     progress: _Progress | None = None,
 ) -> Parts: ...
 def render(
@@ -625,6 +627,7 @@ def convert(
     pitch: str | None = None,
     unit: str | None = None,
     layout: _Path | None = None,
+    map: str | None = None,
     force: bool = False,
 ) -> int: ...
 def _body(body: Body | _Path) -> Body: ...
@@ -661,6 +664,9 @@ def _info(
     pitch: str | None,
     unit: str | None,
     layout: _Path | None,
+    map: str | None,
+    threshold: str | None,
+    shortest_s: float | None,
 ) -> str: ...
 def _inspect(
     body: Body, contact_tolerance_m: float | None, errors: bool, joints: _Path | None, up: str | None

@@ -10,13 +10,13 @@ use somatic::body::Up;
 use somatic::field::FieldSet;
 use somatic::internal::author::{DrawnPoses, lint_with_progress};
 use somatic::internal::contents::{
-    Contacts, Contents, FoundContacts, Quantity, Rule, bag_as_json, of_fields, of_touches,
+    Contacts, Contents, FoundContacts, Quantity, Rule, Threshold, bag_as_json, of_fields, of_touches,
 };
 use somatic::internal::expected::{TestTouches, compare_layouts, expected_and_ideal_errors};
 use somatic::internal::field::{ContactTolerance, TaxelGraph, rest_overlaps};
 use somatic::internal::recording::BagSurvey;
 use somatic::internal::robot::drawn_poses;
-use somatic::internal::setup::{Tell, source_of};
+use somatic::internal::setup::{Tell, open_mapped, source_of};
 use somatic::recording::Reader;
 use somatic::robot::Kinematics;
 use somatic::source::{CsvSource, Source, SourceSpec, VendorOptions, VendorSource};
@@ -51,19 +51,29 @@ fn of_frames(
 }
 
 /// The contacts in the MCAP at `path`, if it has its body; what is damaged is a loss of `known`.
-fn of_mcap(path: &Path, known: &mut Contents, raised: &mut Option<PyErr>) -> Option<FoundContacts> {
+fn of_mcap(path: &Path, known: &mut Contents, rule: Rule, raised: &mut Option<PyErr>) -> Result<Option<FoundContacts>> {
     let goes_on = |frames: u64| !frames.is_multiple_of(FRAMES_BETWEEN) || goes_on(raised);
-    Contacts::of_mcap(path, &Tell::default(), Rule::default(), goes_on).unwrap_or_else(|e| {
-        known.losses.push(e.to_string());
-        None
-    })
+    match Contacts::of_mcap(path, &Tell::default(), rule, goes_on) {
+        Err(e) if !e.is_usage() => {
+            known.losses.push(e.to_string());
+            Ok(None)
+        }
+        contacts => contacts,
+    }
 }
 
-fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Result<Value> {
-    let (known, contacts) = match &source_of(text, &["csv", "mcap", "ros2-mcap", "export"], options)? {
+fn known(text: &str, options: &VendorOptions, rule: Rule, raised: &mut Option<PyErr>) -> Result<Value> {
+    let mapped = options.map.is_some();
+    let kinds: &[&str] =
+        if mapped { &["ndjson", "mcap", "ros2-mcap"] } else { &["csv", "mcap", "ros2-mcap", "export"] };
+    let (known, contacts) = match &source_of(text, kinds, options)? {
+        spec @ (SourceSpec::Ros2Mcap(_) | SourceSpec::Ndjson(_)) if mapped => {
+            let path = spec.file().unwrap_or(Path::new(""));
+            (of_frames("messages", path, &mut open_mapped(spec, options)?, None, raised)?, None)
+        }
         SourceSpec::Mcap(path) => {
             let mut known = Contents::of_mcap(path, &mut Reader::open(path)?, |_| {})?;
-            let contacts = of_mcap(path, &mut known, raised);
+            let contacts = of_mcap(path, &mut known, rule, raised)?;
             (Some(known), contacts)
         }
         SourceSpec::Ros2Mcap(bag) => {
@@ -79,7 +89,7 @@ fn known(text: &str, options: &VendorOptions, raised: &mut Option<PyErr>) -> Res
             let calibration = source.calibration().map(|text| Calibration::parse(&text, &ids)).transpose()?;
             let mut contacts = Contacts::new(&body, calibration, &source)?;
             let known = of_frames(kind, path, &mut source, Some(&mut contacts), raised)?;
-            (known.map(|known| Contents { layout, ..known }), Some(contacts.finish(Rule::default())?))
+            (known.map(|known| Contents { layout, ..known }), Some(contacts.finish(rule)?))
         }
         spec => {
             let path = spec.file().unwrap_or(Path::new(""));
@@ -105,9 +115,14 @@ pub(crate) fn info(
     pitch: Option<&str>,
     unit: Option<&str>,
     layout: Option<PathBuf>,
+    map: Option<&str>,
+    threshold: Option<&str>,
+    shortest_s: Option<f64>,
 ) -> PyResult<String> {
-    let keys = Keys { rate_hz, format, grid, pitch, unit, layout, ..Keys::default() };
+    let keys = Keys { rate_hz, format, grid, pitch, unit, layout, map, ..Keys::default() };
     let options = keys.options().or_raise(py)?;
+    let threshold = threshold.map(str::parse::<Threshold>).transpose().or_raise(py)?;
+    let rule = Rule { threshold, shortest_s: shortest_s.unwrap_or(Rule::default().shortest_s) };
     let mut raised = None;
     let known = free(py, || known(source, &options, &mut raised)).or_raise_of(py, Path::new(source))?;
     if raised.is_some() { Err(interrupted(raised)) } else { Ok(known.to_string()) }

@@ -95,7 +95,7 @@ fn skin(body: &PyBody, path: &Path, force: bool) -> Result<(u64, Vec<String>)> {
 ///     Of a recording a .csv or a .mcap, of a body a .csv or a .urdf.
 /// body, calibration : Body or path, and Calibration, optional
 ///     What an MCAP gets beside its frames; by default what comes with the recording.
-/// rate_hz, format, grid, pitch, unit, layout : optional
+/// rate_hz, format, grid, pitch, unit, layout, map : optional
 ///     How a table or a pressure system's export is read, as for `read`.
 /// force : bool
 ///     Whether a file that exists is replaced.
@@ -115,7 +115,7 @@ fn skin(body: &PyBody, path: &Path, force: bool) -> Result<(u64, Vec<String>)> {
 /// >>> len(st.read(folder / "touch.mcap").body.taxels)
 /// 40
 #[pyfunction]
-#[pyo3(signature = (source, to, *, body = None, calibration = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, force = false))]
+#[pyo3(signature = (source, to, *, body = None, calibration = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, map = None, force = false))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn convert(
     py: Python<'_>,
@@ -129,6 +129,7 @@ pub(crate) fn convert(
     pitch: Option<&str>,
     unit: Option<&str>,
     layout: Option<PathBuf>,
+    map: Option<&str>,
     force: bool,
 ) -> PyResult<u64> {
     let to = text_of(to)?;
@@ -155,7 +156,7 @@ pub(crate) fn convert(
             (None, Copied { source: Box::new(InMemory::from_recording(py, known)?), body: own, calibration: text })
         }
         Err(_) => {
-            let keys = Keys { rate_hz, format, grid, pitch, unit, layout, ..Keys::default() };
+            let keys = Keys { rate_hz, format, grid, pitch, unit, layout, map, ..Keys::default() };
             let options = keys.options().or_raise(py)?;
             let from = text_of(source)?.parse::<SourceSpec>().or_raise(py)?.with_content(&options);
             let file = from.file().map(Path::to_owned);

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use pyo3::prelude::*;
 use somatic::internal::recording::{BODY, CALIBRATION};
 use somatic::internal::robot::BagSource;
+use somatic::internal::setup::open_mapped;
 use somatic::internal::signal::UnitOfP;
+use somatic::internal::source::ArrayMap;
 use somatic::recording::Reader;
 use somatic::source::{CsvSource, Cut, Replay, Source, SourceSpec, VendorFormat, VendorOptions, VendorSource};
 use somatic::{Calibration, Error, bundled};
@@ -60,6 +62,7 @@ pub(crate) fn open(
     cut: Cut,
 ) -> somatic::Result<Opened> {
     let (own, calibration) = match spec {
+        _ if options.map.is_some() => return open_by_map(spec, body, options, cut),
         SourceSpec::Mcap(path) if options.skip_bad => {
             let what = "skip_bad is for CSV, exports and ROS 2 bags; leave it out here";
             return Err(Error::usage(what).at(path.display()));
@@ -105,6 +108,24 @@ pub(crate) fn open(
     Ok((source, own, calibration))
 }
 
+/// The same by the map of `options`, with the body that the map describes where none is given.
+fn open_by_map(spec: &SourceSpec, body: Option<&PyBody>, options: &VendorOptions, cut: Cut) -> somatic::Result<Opened> {
+    let own = match body {
+        None => Some(PyBody::of_bytes("map.glb", &open_mapped(spec, options)?.body()?)?),
+        Some(_) => None,
+    };
+    let (ids, again, kept) = (body.map(PyBody::ids), spec.clone(), options.clone());
+    let open = move || -> somatic::Result<Box<dyn Source + Send>> {
+        let mapped = open_mapped(&again, &kept)?;
+        Ok(Box::new(match &ids {
+            Some(ids) => mapped.for_body(ids)?,
+            None => mapped,
+        }))
+    };
+    let source = if cut == Cut::WHOLE { open()? } else { Box::new(Replay::new(open, cut)?) };
+    Ok((source, own, None))
+}
+
 /// The keywords of `read`, `open`, `info` and `convert`.
 #[derive(Default)]
 pub(crate) struct Keys<'a, 'py> {
@@ -118,6 +139,7 @@ pub(crate) struct Keys<'a, 'py> {
     pub(crate) unit: Option<&'a str>,
     pub(crate) layout: Option<PathBuf>,
     pub(crate) skip_bad: bool,
+    pub(crate) map: Option<&'a str>,
 }
 
 impl Keys<'_, '_> {
@@ -129,7 +151,7 @@ impl Keys<'_, '_> {
 
     /// How tables and exports are read.
     pub(crate) fn options(&self) -> somatic::Result<VendorOptions> {
-        let Self { rate_hz, format, grid, pitch, unit, layout, skip_bad, .. } = self;
+        let Self { rate_hz, format, grid, pitch, unit, layout, skip_bad, map, .. } = self;
         Ok(VendorOptions {
             format: format.map(str::parse::<VendorFormat>).transpose().map_err(|e| e.at("format"))?,
             rate_hz: *rate_hz,
@@ -138,6 +160,7 @@ impl Keys<'_, '_> {
             unit: unit.map(str::parse::<UnitOfP>).transpose().map_err(|e| e.at("unit"))?,
             layout: layout.clone(),
             skip_bad: *skip_bad,
+            map: map.map(ArrayMap::named).transpose().map_err(|e| e.at("map"))?,
             ..VendorOptions::default()
         })
     }

@@ -205,7 +205,7 @@ impl PyParts {
 /// >>> [(len(part), float(part.t[0])) for part in st.open("hand", seconds=4)]
 /// [(200, 0.0), (80, 4.0)]
 #[pyfunction]
-#[pyo3(signature = (source, *, seconds = 10.0, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, skip_bad = false, progress = None))]
+#[pyo3(signature = (source, *, seconds = 10.0, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, skip_bad = false, map = None, progress = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn open(
     py: Python<'_>,
@@ -221,12 +221,13 @@ pub(crate) fn open(
     unit: Option<&str>,
     layout: Option<PathBuf>,
     skip_bad: bool,
+    map: Option<&str>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyParts> {
     if !(seconds.is_finite() && seconds > 0.0) {
         return Err(usage(py, format!("seconds should be a positive number; this is {seconds}")));
     }
-    let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout, skip_bad };
+    let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout, skip_bad, map };
     let opening = Opening::new(py, source, keys)?;
     let about = Py::new(py, opening.recording(py, Frames::default())?)?;
     let progress = Progress::new(py, progress, None, "frames")?;

@@ -334,8 +334,9 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 /// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' is the bundled touch. `body` is the robot, for
 /// recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
 /// after its start. Of an HDF5 file `dataset` is the path of the values, such as 'tactile/left', and `time` that of their times; h5py
-/// reads it. With `skip_bad` bad rows of a CSV, an export or a bag are skipped and counted in `losses`; else the first is an error. The
-/// other keywords are those of docs/reference/exports.md.
+/// reads it. With `skip_bad` bad rows of a CSV, an export or a bag are skipped and counted in `losses`; else the first is an error.
+/// `map` is a TOML file, or a name such as 'dex3', that says which arrays of messages are sensors. The other keywords are those of
+/// docs/reference/exports.md.
 ///
 /// >>> import somatic_touch as st
 /// >>> st.read("no-such.csv")
@@ -343,7 +344,7 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 ///     ...
 /// somatic_touch.InputError: no-such.csv: no such file or directory
 #[pyfunction]
-#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, skip_bad = false, dataset = None, time = None))]
+#[pyo3(signature = (source, *, body = None, from_s = None, to_s = None, rate_hz = None, format = None, grid = None, pitch = None, unit = None, layout = None, skip_bad = false, map = None, dataset = None, time = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn read(
     py: Python<'_>,
@@ -358,6 +359,7 @@ pub(crate) fn read(
     unit: Option<&str>,
     layout: Option<PathBuf>,
     skip_bad: bool,
+    map: Option<&str>,
     dataset: Option<&str>,
     time: Option<&str>,
 ) -> PyResult<Py<PyRecording>> {
@@ -377,7 +379,7 @@ pub(crate) fn read(
     if dataset.or(time).is_some() {
         return Err(usage(py, format!("{text}: dataset and time are for HDF5 (.h5, .hdf5); leave them out")));
     }
-    let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout, skip_bad };
+    let keys = Keys { body, from_s, to_s, rate_hz, format, grid, pitch, unit, layout, skip_bad, map };
     let mut opened = Opening::new(py, source, keys)?;
     let frames = gather(py, &mut *opened.source, &opened.file)?;
     Py::new(py, opened.recording(py, frames)?)

@@ -26,10 +26,10 @@ def test_all_that_the_command_lists_is_callable(somatic) -> None:
 
 
 ELSEWHERE = {
-    "info": "json",
+    "info": "json contacts force",
     "convert": "output",
     "plot": "output calibration",
-    "author": "output force json errors compare grid pitch ids cells",
+    "author": "output force json errors compare grid pitch ids cells zones",
     "inspect": "json strict",
     "render": "output force source",
     "calibrate": "output force json plot",
@@ -74,7 +74,11 @@ def test_info_is_the_commands(somatic, touch: st.Recording, tmp_path: pathlib.Pa
         assert known["fields"] == told["fields"]
     assert known["frames"] == 280 and known["fields"] is None
     (palm,) = [field for field in st.info(tmp_path / "touch.mcap")["fields"] if field["field"] == "hand/palm"]
-    assert palm["contacts"] > 0 and palm["load_peak"] >= palm["load_mean"] > 0 and palm["load_unit"] == "count"
+    assert palm["contacts"] > 0 and palm["peak"] >= palm["mean"] > 0 and palm["unit"] == "count"
+    many = st.info(tmp_path / "touch.mcap", threshold="1%", shortest_s=0.0)["fields"]
+    assert sum(field["contacts"] for field in many) >= palm["contacts"]
+    with pytest.raises(st.UsageError, match="no newtons here"):
+        st.info(tmp_path / "touch.mcap", threshold="20N")
     with pytest.raises(st.InputError, match="no-such"):
         st.info("no-such.csv")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pathlib
 from typing import Any
 
 import numpy as np
@@ -157,3 +158,22 @@ def test_the_same_numbers_give_the_same_percepts_however_they_lie(values: np.nda
         there = wanted.present(name)
         assert np.isfinite(wanted[name][there]).all() and np.isnan(wanted[name][~there]).all()
     assert np.array_equal(got.flags, wanted.flags)
+
+
+@pytest.mark.once
+def test_arrays_in_messages_are_read_by_a_map(tmp_path: pathlib.Path) -> None:
+    (tmp_path / "pads.toml").write_text('values = "pads[*].force"\ngrid = "2x2"\npitch = "5mm"\nmissing = [-1]\n')
+    lines = tmp_path / "pads.ndjson"
+    lines.write_text('{"t":0,"pads":[{"force":[0,9]},{"force":[3,4]}]}\n{"t":0.1,"pads":[{"force":[0,7]},{"force":[-1,4]}]}\n')
+    keys = {"map": str(tmp_path / "pads.toml")}
+    recording = st.read(f"ndjson:{lines}", **keys)
+    assert recording.body is not None and len(recording.body.taxels) == 4
+    assert recording.values[0].tolist() == [0, 9, 3, 4] and np.isnan(recording.values[1, 2])
+    (part,) = st.open(f"ndjson:{lines}", **keys)
+    assert part.values[1, 3] == 4
+    assert st.convert(f"ndjson:{lines}", tmp_path / "pads.mcap", **keys) == 2
+    known = st.info(f"ndjson:{lines}", **keys)
+    assert (known["kind"], known["frames"]) == ("messages", 2)
+    with pytest.raises(st.SomaticError, match="pads"):
+        (tmp_path / "wrong.toml").write_text('values = "pad[*].force"\ngrid = "2x2"\npitch = "5mm"\n')
+        st.read(f"ndjson:{lines}", map=str(tmp_path / "wrong.toml"))
