@@ -500,6 +500,7 @@ const READ: &[&str] = &[
     "--mjcf-skin",
     "--csv-skin",
     "--layout",
+    "--map",
     "<IN>",
     "<FILE.toml>",
     "<FILE>",
