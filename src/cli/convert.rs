@@ -98,7 +98,8 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     };
     let from = source_of(&arguments.from, kinds, &options);
     let from = from.map_err(|e| e.at(format!("recording `{}`", arguments.from)))?;
-    if Path::new(to_name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("glb")) {
+    let is_kind = ["csv:", "mcap:"].iter().any(|kind| to_name.starts_with(kind));
+    if !is_kind && Path::new(to_name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("glb")) {
         if arguments.body.is_some() || arguments.calibration.is_some() {
             return Err(Error::usage("a body has no place for --body and --calibration; leave them out").at(to_name));
         }
