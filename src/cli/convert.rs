@@ -116,29 +116,10 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     let read = FilesRead::default().named(slice::from_ref(&arguments.from)).files(&arguments.calibration);
     let read = read.files(&arguments.export.layout).files(&arguments.export.map);
     let output = read.bodies(&arguments.body).outputs(arguments.force).add(to_path)?;
-    let (mut source, attached): (Box<dyn Source + Send>, _) = match &from {
-        SourceSpec::Vendor(path) => {
-            let export = VendorSource::open(path, &options)?;
-            let attached = files(arguments, &from, Some(&export))?;
-            (Box::new(export), attached)
-        }
-        _ if options.map.is_some() => {
-            let mut mapped = open_mapped(&from, &options).map_err(in_flags)?;
-            let mut attached = files(arguments, &from, None)?;
-            if let Some(name) = &arguments.body {
-                let ids: Vec<u32> = load_body(name)?.taxels.iter().map(|taxel| taxel.id).collect();
-                mapped = mapped.for_body(&ids)?;
-            } else if matches!(to, SourceSpec::Mcap(_)) {
-                say(&mapped.about_body());
-                attached.push(("map.glb".to_owned(), BODY.to_owned(), mapped.body()?));
-            }
-            (Box::new(mapped), attached)
-        }
-        _ => (from.open(&[], &options)?, files(arguments, &from, None)?),
-    };
+    let is_csv = matches!(to, SourceSpec::Csv(_));
+    let (mut source, attached) = opened(arguments, &from, &options, is_csv)?;
     source.report_stale();
     let place = output.name().display().to_string();
-    let is_csv = matches!(to, SourceSpec::Csv(_));
     if is_csv && (arguments.body.is_some() || arguments.calibration.is_some()) {
         return Err(Error::usage("a CSV has no place for --body and --calibration").at(to_path.display()));
     }
@@ -167,13 +148,41 @@ pub(super) fn convert(arguments: &Arguments) -> Result<u8> {
     Ok(tell_losses(&source.losses()))
 }
 
-/// What is to lie beside the frames: name, media type, bytes. What is named comes before what the recording or the
-/// simulation has.
-fn files(
+/// The recording that is converted, and what is to lie beside its frames.
+fn opened(
     arguments: &Arguments,
     from: &SourceSpec,
-    export: Option<&VendorSource>,
-) -> Result<Vec<(String, String, Vec<u8>)>> {
+    options: &VendorOptions,
+    is_csv: bool,
+) -> Result<(Box<dyn Source + Send>, Vec<Beside>)> {
+    Ok(match from {
+        SourceSpec::Vendor(path) => {
+            let export = VendorSource::open(path, options)?;
+            let attached = files(arguments, from, Some(&export))?;
+            (Box::new(export), attached)
+        }
+        _ if options.map.is_some() => {
+            let mut mapped = open_mapped(from, options).map_err(in_flags)?;
+            let mut attached = files(arguments, from, None)?;
+            if let Some(name) = &arguments.body {
+                let ids: Vec<u32> = load_body(name)?.taxels.iter().map(|taxel| taxel.id).collect();
+                mapped = mapped.for_body(&ids)?;
+            } else if !is_csv {
+                say(&mapped.about_body());
+                attached.push(("map.glb".to_owned(), BODY.to_owned(), mapped.body()?));
+            }
+            (Box::new(mapped), attached)
+        }
+        _ => (from.open(&[], options)?, files(arguments, from, None)?),
+    })
+}
+
+/// What lies beside frames: its name, its media type, its bytes.
+type Beside = (String, String, Vec<u8>);
+
+/// What is to lie beside the frames. What is named comes before what the recording or the
+/// simulation has.
+fn files(arguments: &Arguments, from: &SourceSpec, export: Option<&VendorSource>) -> Result<Vec<Beside>> {
     let mut files = Vec::new();
     if let Some(body) = &arguments.body {
         files.push((file_name(body), BODY.to_owned(), body_bytes(body)?));
