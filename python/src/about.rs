@@ -124,7 +124,7 @@ pub(crate) fn info(
     let threshold = threshold.map(str::parse::<Threshold>).transpose().or_raise(py)?;
     let rule = Rule { threshold, shortest_s: shortest_s.unwrap_or(Rule::default().shortest_s) };
     let mut raised = None;
-    let known = free(py, || known(source, &options, &mut raised)).or_raise_of(py, Path::new(source))?;
+    let known = free(py, || known(source, &options, rule, &mut raised)).or_raise_of(py, Path::new(source))?;
     if raised.is_some() { Err(interrupted(raised)) } else { Ok(known.to_string()) }
 }
 

@@ -111,7 +111,7 @@ pub(crate) fn open(
 /// The same by the map of `options`, with the body that the map describes where none is given.
 fn open_by_map(spec: &SourceSpec, body: Option<&PyBody>, options: &VendorOptions, cut: Cut) -> somatic::Result<Opened> {
     let own = match body {
-        None => Some(PyBody::of_bytes("map.glb", &open_mapped(spec, options)?.body()?)?),
+        None => Some(PyBody::of_bytes("map.glb", open_mapped(spec, options)?.body()?)?),
         Some(_) => None,
     };
     let (ids, again, kept) = (body.map(PyBody::ids), spec.clone(), options.clone());

@@ -28,6 +28,7 @@ mod ray_tree;
 mod read;
 mod referenced_files;
 mod repair;
+mod shape;
 mod sheet;
 mod skin_weights;
 mod stored_edges;
