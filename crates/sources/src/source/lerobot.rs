@@ -369,7 +369,7 @@ mod tests {
             for &(episode, frame) in &all {
                 for row in 0..2 {
                     (0..3).for_each(|at| {
-                        builder.values().values().append_value(value(episode, frame, 3 * row + at) as u16)
+                        builder.values().values().append_value(value(episode, frame, 3 * row + at) as u16);
                     });
                     builder.values().append(true);
                 }

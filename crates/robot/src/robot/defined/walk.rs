@@ -167,7 +167,7 @@ impl Walk<'_> {
             let end = (*end).min(count);
             match own.take {
                 Some(Take::Values(path)) if *first < end => {
-                    self.numbers(base, &bytes[first * size..end * size], path)?
+                    self.numbers(base, &bytes[first * size..end * size], path)?;
                 }
                 Some(Take::Time) if *first < end => {
                     let own = &bytes[first * size..(first + 1) * size];

@@ -115,7 +115,7 @@ impl Decoder {
                 std::str::from_utf8(bytes).map_err(|_| Error::failed("its bytes are not text; decoder says digits"))?;
             return self.text(text.trim_end_matches('\0'), each);
         };
-        if bytes.len() % size != 0 {
+        if !bytes.len().is_multiple_of(size) {
             return Err(failed!("{} bytes are not a multiple of {size}; decoder says numbers of {size}", bytes.len()));
         }
         for own in bytes.chunks_exact(size) {

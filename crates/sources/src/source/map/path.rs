@@ -81,7 +81,7 @@ impl FromStr for ArrayPath {
         let mut steps = Vec::new();
         for part in text.trim().trim_start_matches("$.").split('.') {
             let (name, mut rest) = part.split_at(part.find('[').unwrap_or(part.len()));
-            if name.trim().is_empty() && !(steps.is_empty() && !rest.is_empty()) {
+            if name.trim().is_empty() && (rest.is_empty() || !steps.is_empty()) {
                 return Err(bad());
             }
             if !name.trim().is_empty() {
