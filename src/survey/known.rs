@@ -101,7 +101,7 @@ impl Findings {
             (PressedOn::Field, forces) => {
                 let wholes: Vec<f64> = clear(self.presses.iter().map(|press| press.whole), forces).collect();
                 let (scale, remark) = scale_of(&wholes, forces)?;
-                (self.scale, self.known) = (Some(scale), Some(remark));
+                (self.scale, self.forces_agree) = (Some(scale), Some(remark));
             }
         }
         self.unit = "N".parse::<UnitOfP>()?;

@@ -151,7 +151,7 @@ pub struct Findings {
     /// Curves of sensors that several known forces pressed, the last one the middle of them.
     pub curves: Vec<KnownCurve>,
     /// How well known forces agree, in words.
-    pub known: Option<String>,
+    pub forces_agree: Option<String>,
 }
 
 impl Survey {
@@ -275,8 +275,8 @@ impl Survey {
         let raw_range = raw_range.or_else(|| end.filter(|_| !invert).map(|end| range_to(end, lowest)));
         let pressed: Vec<Option<f64>> =
             (0..self.ids.len()).map(|sensor| clear(sensor, side).then(|| travels[sensor][side])).collect();
-        let mut known: Vec<f64> = pressed.iter().copied().flatten().collect();
-        let usual = median(&mut known);
+        let mut travels_of_pressed: Vec<f64> = pressed.iter().copied().flatten().collect();
+        let usual = median(&mut travels_of_pressed);
         let sensors = (0..self.ids.len()).map(|sensor| {
             let rest = at_rest[sensor];
             let noise = rest.map_or(0.0, |(_, noise)| noise);
@@ -311,7 +311,7 @@ impl Survey {
             presses: self.presses.all(),
             scale: None,
             curves: Vec::new(),
-            known: None,
+            forces_agree: None,
         })
     }
 
@@ -425,7 +425,7 @@ impl Findings {
             .filter(|(_, ids)| !ids.is_empty())
             .map(|(what, ids)| format!("{} of {} sensors {what}: {}", ids.len(), self.sensors.len(), several(&ids)))
             .chain(self.crosstalk.map(|found| found.to_string()))
-            .chain(self.known.clone())
+            .chain(self.forces_agree.clone())
             .collect()
     }
 

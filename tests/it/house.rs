@@ -410,6 +410,7 @@ fn files_are_read_whole_within_limits_only() {
             // Recordings, line by line or record by record; and a file that is only locked.
             let streams = [
                 "source/csv.rs",
+                "source/gzip.rs",
                 "source/lerobot.rs",
                 "source/map/json_lines.rs",
                 "source/ndjson.rs",
