@@ -9,6 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DAffine3, DVec3};
 
+/// A body whose fields are changed again and again would keep the surfaces of all that it ever had: with so many values it begins anew.
+const MOST_VALUES: usize = 4096;
+
 type Values = HashMap<(TypeId, u64), Arc<dyn Any + Send + Sync>>;
 
 /// What was worked out of a body, with the fingerprint of the shape that it was worked out of. Clones of a body share it.
@@ -46,7 +49,7 @@ impl KeptOfShape<'_> {
         }
         let value = Arc::new(make());
         let mut now = lock();
-        if now.0 != fingerprint {
+        if now.0 != fingerprint || now.1.len() >= MOST_VALUES {
             *now = (fingerprint, Values::new());
         }
         now.1.insert(key, value.clone());
