@@ -162,6 +162,7 @@ fn sound_body() -> Vec<u8> {
         normal_in_link: DVec3::Z,
         area: 1e-4,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     glb.taxels("base.taxels", Some(base), &[taxel(0, 0.02), taxel(1, 0.04)], None);
     glb.taxels("sleeve.taxels", None, &[taxel(10, 0.02), taxel(11, 0.06)], Some((skin, &halves(2))));

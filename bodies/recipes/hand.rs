@@ -170,6 +170,7 @@ fn taxels(sensors: &[Sensor], origin_in_hand: DVec3) -> Vec<Taxel> {
             normal_in_link: sensor.normal,
             area: std::f64::consts::PI * SENSOR_RADIUS * SENSOR_RADIUS,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         })
         .collect()
 }

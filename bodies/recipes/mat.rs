@@ -182,6 +182,7 @@ pub(crate) fn make() -> Glb {
             normal_in_link: DVec3::Y,
             area: PITCH * PITCH,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         })
         .collect();
     glb.taxels("mat taxels", Some(mat), &taxels, None);

@@ -72,6 +72,7 @@ impl ArrayBody {
                 normal_in_link: normals[row].normalize(),
                 area: areas[row],
                 modality: Modality::Pressure,
+                tangent_in_link: None,
             };
             match links.iter_mut().find(|(known, _)| *known == link) {
                 Some((_, taxels)) => taxels.push(taxel),

@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use somatic::field::FieldSet;
 use somatic::internal::body::{LinkMotion, Original, WORLD_FROM_BODY};
 use somatic::internal::error::suggestion;
+use somatic::internal::signal::Channel;
 use somatic::signal::Pose;
 use somatic::{Body, OutputPath, bundled};
 
@@ -52,6 +53,11 @@ impl PyBody {
         // A .glb may refer to buffers in other files; writing it anew embeds them.
         let file = Original::from_bytes(&path.display().to_string(), &bytes, path.parent())?;
         Ok(Self { inner, bytes: Arc::new(file.to_glb()?) })
+    }
+
+    /// The channels of its frames: every taxel's own, then the tangential ones.
+    pub(crate) fn channels(&self) -> Vec<u32> {
+        Channel::all_of(&self.inner)
     }
 
     pub(crate) fn ids(&self) -> Vec<u32> {

@@ -101,7 +101,7 @@ pub(crate) fn open(
     // A recording's calibration is that of its body.
     let calibration = calibration.filter(|_| body.is_none() || matches!(spec, SourceSpec::Vendor(_)));
     let own = own.filter(|_| body.is_none()).map(|(name, bytes)| PyBody::of_bytes(&name, bytes)).transpose()?;
-    let ids = body.or(own.as_ref()).map(PyBody::ids).unwrap_or_default();
+    let ids = body.or(own.as_ref()).map(PyBody::channels).unwrap_or_default();
     let (again, kept) = (spec.clone(), options.clone());
     let open = move || again.open(&ids, &kept);
     let source = if cut == Cut::WHOLE { open()? } else { Box::new(Replay::new(open, cut)?) };

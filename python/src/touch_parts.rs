@@ -1,7 +1,6 @@
 //! What touches have more than one of: links that they lie on, and taxels.
 
 use pyo3::prelude::*;
-use somatic::body::Modality;
 use somatic::percept::{LinkShare, Wrench};
 use somatic::{Body, TouchFrame};
 
@@ -37,7 +36,7 @@ pub(crate) fn taxels<'a>(
     body: &Body,
     frames: impl Iterator<Item = &'a TouchFrame>,
 ) -> PyResult<Vec<Py<PyAny>>> {
-    let can_touch = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Pressure);
+    let can_touch = body.taxels.iter().filter(|taxel| taxel.modality.is_pressed());
     let ids: Vec<u32> = can_touch.map(|taxel| taxel.id).collect();
     let of_touch = |found: &'a TouchFrame| found.touches.iter().map(move |touch| found.taxels(touch));
     let of_nodes = |nodes: &[u32]| nodes.iter().map(|&node| ids[node as usize]).collect::<Vec<u32>>();

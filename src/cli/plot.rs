@@ -11,6 +11,7 @@ use somatic::internal::scene_file::seconds;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::RECORDED_BATCH;
 use somatic::internal::setup::Setup;
+use somatic::internal::signal::Channel;
 use somatic::percept::Unit;
 use somatic::signal::Quantity;
 use somatic::{BackendKind, COLUMNS, Engine, Error, Frame, Outputs, Result};
@@ -148,7 +149,7 @@ fn gather(asked: &Setup, wanted: Outputs, stop: &AtomicBool, to: &Path) -> Resul
     }
     let body = input.body(asked)?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let mut source = input.open(&ids, asked)?;
+    let mut source = input.open(&Channel::all_of(&body), asked)?;
     source.report_stale();
     let mut engine = Engine::new(&body, asked.options(&body, &ids, RECORDED_BATCH)?)?;
     engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;

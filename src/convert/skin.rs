@@ -44,7 +44,7 @@ impl SkinFormat {
 
     /// How many taxels of `body` it has.
     pub fn taxels(self, body: &Body) -> usize {
-        let is_written = |modality| self == Self::Table || modality == Modality::Pressure;
+        let is_written = |modality: Modality| self == Self::Table || modality.is_pressed();
         body.taxels.iter().filter(|taxel| is_written(taxel.modality)).count()
     }
 

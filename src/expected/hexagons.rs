@@ -57,6 +57,7 @@ fn sheet(spacing_m: f64) -> Body {
         normal_in_link: DVec3::Y,
         area: spacing_m * spacing_m,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     let link = Link {
         name: "sheet".to_owned(),

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::layout_errors::{LayoutErrors, TestTouches, TouchError};
 use super::presses::{SIGMA_SPACINGS, presses};
 use crate::backend::BackendKind;
-use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Modality};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec};
 use crate::engine::{Engine, Options};
 use crate::error::{Error, Result};
 use crate::parallel;
@@ -48,7 +48,7 @@ impl<'a> Trial<'a> {
         if body.surfaces.iter().all(|surface| surface.triangles.is_empty()) {
             return Err(untouchable(body, "it has no surface; author its taxels on a mesh"));
         }
-        let pressure = || body.taxels.iter().filter(|taxel| taxel.modality == Modality::Pressure);
+        let pressure = || body.taxels.iter().filter(|taxel| taxel.modality.is_pressed());
         let ids: Vec<u32> = pressure().map(|taxel| taxel.id).collect();
         if ids.is_empty() {
             return Err(untouchable(body, "it has no pressure taxels; give it some with `somatic author`"));

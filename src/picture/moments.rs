@@ -1,7 +1,7 @@
 //! Pictures of recorded touches: which of its frames they show, and what is drawn of each.
 
 use super::{ChartPicture, MarkedTouch, Moment, Options, Picture, TouchPicture, View};
-use crate::body::{Body, Modality};
+use crate::body::Body;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::Field;
@@ -84,7 +84,7 @@ impl Moments {
     ) -> Result<Self> {
         times.check()?;
         engine.keep_touch_taxels(true);
-        let is_of_skin = |taxel: &usize| body.taxels[*taxel].modality == Modality::Pressure;
+        let is_of_skin = |taxel: &usize| body.taxels[*taxel].modality.is_pressed();
         let of_skin: Vec<usize> = (0..body.taxels.len()).filter(is_of_skin).collect();
         let mut trails = TouchTrails::default();
         let (from_s, to_s) = match times {

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::percept::Precision;
 use crate::scene_file::SceneFile;
 use crate::setup::{FilesRead, Input, RECORDED_BATCH, Setup, Tell, attachments};
-use crate::signal::{Quantity, Wiring};
+use crate::signal::{Channel, Quantity, Wiring};
 use crate::sink::{FieldNames, Session, Sink, SinkSpec, SinkTarget};
 use crate::source::{Lines, Source};
 
@@ -72,7 +72,8 @@ impl Opened {
         options: impl FnOnce(&Body) -> Result<(Options, Option<String>)>,
     ) -> Result<Self> {
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        let recorded = if input.is_merged() { None } else { Some(input.open(&ids, setup)?) };
+        let channels = Channel::all_of(&body);
+        let recorded = if input.is_merged() { None } else { Some(input.open(&channels, setup)?) };
         let (options, why) = options(&body)?;
         setup.line_keys().check_wipers(options.calibration.as_ref(), &ids)?;
         let mut engine = Engine::new(&body, options)?;
@@ -83,7 +84,7 @@ impl Opened {
                 (source, None, None)
             }
             None => {
-                let opened = input.open_lines(&ids, setup)?;
+                let opened = input.open_lines(&channels, setup)?;
                 engine.track_stale();
                 opened.wiring.iter().for_each(|wiring| engine.wire(wiring));
                 (opened.source, Some(opened.lines), opened.wiring)

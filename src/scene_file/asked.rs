@@ -66,7 +66,6 @@ impl SceneFile {
     /// # Errors
     /// A usage error: the filter of motion is not a filter.
     pub fn engine_options(&self, calibration: Option<Calibration>, is_placed: bool, batch: usize) -> Result<Options> {
-        let letters = if self.letters.is_empty() { &[Receptor::Sustained][..] } else { &self.letters };
         let usual = Scene::default();
         // Boards' values have their age where frames are put together.
         let is_merged =
@@ -76,7 +75,7 @@ impl SceneFile {
             .fields(self.fields.clone())
             .max_age_s(self.max_age_s.filter(|_| !is_merged).unwrap_or(usual.max_age_s))
             .max_gap_s(self.max_gap_s.unwrap_or(usual.max_gap_s))
-            .letters(Letter::all_of(letters, &self.signal))
+            .letters(self.letters_read())
             .filter(self.filter()?)
             .knobs(self.accuracy.knobs())
             .contact_tolerance_m(self.contact_tolerance_m)
@@ -90,6 +89,15 @@ impl SceneFile {
             .backend(self.backend.unwrap_or_default())
             .tare(self.tare)
             .batch(batch))
+    }
+
+    /// The letters that it names, in its signals; none where it names neither, which means those that the taxels have.
+    fn letters_read(&self) -> Vec<Letter> {
+        match (self.letters.is_empty(), self.signal.is_empty()) {
+            (true, true) => Vec::new(),
+            (true, false) => Letter::all_of(&[Receptor::Sustained], &self.signal),
+            (false, _) => Letter::all_of(&self.letters, &self.signal),
+        }
     }
 
     /// The outputs that are asked for; if none are, those that `calibration` and what is read can give.

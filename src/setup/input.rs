@@ -8,7 +8,7 @@ use crate::body::Body;
 use crate::bundled;
 use crate::error::{Error, Result};
 use crate::robot::BagSource;
-use crate::signal::Wiring;
+use crate::signal::{Channel, Wiring};
 use crate::source::{
     CsvSource, Cut, Lines, NdjsonSource, Replay, SimulatedSource, Source, SourceSpec, TextOptions, VendorOptions,
 };
@@ -186,8 +186,7 @@ impl Input {
 
     /// Opens it, or the requested part, for `body`, with poses of its links where joints are asked for.
     pub fn open_posed(&self, body: &Body, setup: &Setup) -> Result<Box<dyn Source + Send>> {
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        setup.jointed(self.open(&ids, setup)?, body)
+        setup.jointed(self.open(&Channel::all_of(body), setup)?, body)
     }
 
     /// Opens it, or the requested part, for a body whose taxels have `ids`.

@@ -106,6 +106,7 @@ fn what_was_put_right_on_reading_is_reported_by_inspect_and_by_run() {
         normal_in_link: DVec3::Z,
         area: 1e-5,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     let mut glb = Glb::new();
     let arm = glb.node("arm", None, DVec3::ZERO);
@@ -158,6 +159,7 @@ fn joints_of_a_urdf_uncover_taxels() {
         normal_in_link: DVec3::Z,
         area: 1e-4,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     glb.taxels("taxels", Some(slider), &[taxel], None);
     let body = folder.path().join("a.glb");

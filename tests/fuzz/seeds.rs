@@ -133,6 +133,7 @@ pub(super) fn glb() -> Vec<u8> {
         normal_in_link: DVec3::Z,
         area: 1e-4,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     glb.taxels("taxels", Some(arm), &[taxel(1), taxel(2), taxel(3)], None);
     let members = |ids: &[u32]| ids.iter().map(|&id| (id, MemberSpec::default())).collect();

@@ -111,6 +111,7 @@ impl Flat {
                 normal_in_link: DVec3::Y,
                 area: 1e-4,
                 modality: Modality::Pressure,
+                tangent_in_link: None,
             })
             .collect();
         glb.taxels("taxels", Some(link), &taxels, None);

@@ -297,6 +297,7 @@ fn the_extreme_weights_hold() {
         normal_in_link: DVec3::Y,
         area: 0.0,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     glb.taxels("taxels", Some(link), &[taxel(0, -1.0), taxel(1, 1.0)], None);
     let weights = [1.0 / 1_048_576.0, 1_048_576.0];
@@ -390,6 +391,7 @@ fn a_field_around_a_limb_has_no_chart_and_says_where_it_is() {
                 normal_in_link: DVec3::new(cos, 0.0, sin),
                 area: 1e-4,
                 modality: Modality::Pressure,
+                tangent_in_link: None,
             }
         })
         .collect();

@@ -51,6 +51,7 @@ fn on_tube(id: u32, from: f64, step: f64, angle: f64, y: f64) -> Taxel {
         normal_in_link: DVec3::new(middle.sin(), 0.0, middle.cos()),
         area: 1e-5,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     }
 }
 
@@ -218,6 +219,7 @@ fn real_and_hostile_meshes_are_survived() {
                     normal_in_link: placed.point.normal,
                     area: placed.point.area,
                     modality: Modality::Pressure,
+                    tangent_in_link: None,
                 })
                 .collect();
             // Patches around some of them, small and large, and all of it.

@@ -61,7 +61,15 @@ fn body(meshes: &[(&str, &MeshData)], taxels: &[Taxel]) -> Body {
 }
 
 fn taxel(id: u32, position_in_link: DVec3, normal_in_link: DVec3) -> Taxel {
-    Taxel { id, link: 0, position_in_link, normal_in_link, area: 1e-5, modality: Modality::Pressure }
+    Taxel {
+        id,
+        link: 0,
+        position_in_link,
+        normal_in_link,
+        area: 1e-5,
+        modality: Modality::Pressure,
+        tangent_in_link: None,
+    }
 }
 
 /// Squares of 2 mm in the plane y = 0, looking up, where `is_there` (of their columns and rows); a taxel in every second.

@@ -81,7 +81,15 @@ fn rod() -> MeshData {
 }
 
 fn taxel(id: u32, position_in_link: DVec3, normal_in_link: DVec3) -> Taxel {
-    Taxel { id, link: 0, position_in_link, normal_in_link, area: 1e-4, modality: Modality::Pressure }
+    Taxel {
+        id,
+        link: 0,
+        position_in_link,
+        normal_in_link,
+        area: 1e-4,
+        modality: Modality::Pressure,
+        tangent_in_link: None,
+    }
 }
 
 /// Taxels in the middle of each side of a box about `at`.

@@ -23,7 +23,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("setters", vec![]),
         ("words", vec!["error"]),
         ("parallel", vec![]),
-        ("signal", vec!["error", "keys"]),
+        ("signal", vec!["error", "keys", "body"]),
         ("body", vec!["error", "output"]),
         ("field", vec!["error", "body"]),
         ("author", vec!["error", "keys", "length", "body", "field", "parallel"]),

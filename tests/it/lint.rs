@@ -55,6 +55,7 @@ impl Plate {
                     normal_in_link: normal(x),
                     area: 1e-4,
                     modality: Modality::Pressure,
+                    tangent_in_link: None,
                 }
             })
             .collect();

@@ -45,6 +45,7 @@ mod recordings;
 mod scene_runs;
 // The skins of `somatic bench`.
 mod drift;
+mod senses;
 mod simulated;
 mod skipped;
 mod slow;

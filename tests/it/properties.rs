@@ -37,6 +37,7 @@ fn body(touches: &[Touch], order: &[usize], charts: &[ChartSpec]) -> Body {
             normal_in_link: DVec3::Y,
             area: 1e-4,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         })
         .collect();
     glb.taxels("taxels", Some(link), &taxels, None);

@@ -127,6 +127,7 @@ fn fingertips(layout: &str) -> Body {
                 normal_in_link: DVec3::new(row[1], row[2], row[3]),
                 area: 0.0,
                 modality: Modality::Pressure,
+                tangent_in_link: None,
             })
             .collect();
         glb.taxels(&format!("{name}_taxels"), Some(link), &taxels, None);

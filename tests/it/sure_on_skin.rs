@@ -44,7 +44,15 @@ fn skin(radius_m: Option<f64>) -> Body {
     let rows = || (-HALF..=HALF).flat_map(|row| (-HALF..=HALF).map(move |column| (column, row)));
     let taxel = |(id, (column, row)): (u32, (i32, i32))| {
         let (position_in_link, normal_in_link) = place(radius_m, f64::from(column) * PITCH, f64::from(row) * PITCH);
-        Taxel { id, link: 0, position_in_link, normal_in_link, area: PITCH * PITCH, modality: Modality::Pressure }
+        Taxel {
+            id,
+            link: 0,
+            position_in_link,
+            normal_in_link,
+            area: PITCH * PITCH,
+            modality: Modality::Pressure,
+            tangent_in_link: None,
+        }
     };
     let taxels: Vec<Taxel> = (0..).zip(rows()).map(taxel).collect();
     glb.taxels("taxels", Some(link), &taxels, None);

@@ -33,6 +33,10 @@ test("an address shows the same view again, without the token", async () => {
   await page.evaluate(() => window.somatic.span.setLoop(2, 3.5));
   await page.locator(".touch").click();
   await page.locator(".field-name", { hasText: "hand/palm/radial_distal" }).click();
+  // The panel follows with the next drawing.
+  await page.waitForFunction(
+    () => document.querySelector("#percept-title").textContent === "hand/palm/radial_distal",
+  );
   // It may be plotted already, as a field that was touched while the recording played: then the first click takes it away.
   const plot = page.locator(".plot-button").first();
   await plot.click();

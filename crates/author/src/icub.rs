@@ -149,7 +149,7 @@ impl IcubFile {
         let mut children: BTreeMap<String, BTreeMap<u32, MemberSpec>> = BTreeMap::new();
         let mut alone = BTreeMap::new();
         let width = (self.rows.len().saturating_sub(1)).to_string().len();
-        for (channel, taxel) in self.taxels().filter(|(_, taxel)| taxel.modality == Modality::Pressure) {
+        for (channel, taxel) in self.taxels().filter(|(_, taxel)| taxel.modality.is_pressed()) {
             let name = match taxel.group {
                 Some(group) => Some(format!("{part}/group_{group:0width$}")),
                 None if channel as usize >= self.ids => {
@@ -182,6 +182,7 @@ impl IcubFile {
             normal_in_link: taxel.normal_in_link,
             area: 0.0,
             modality: taxel.modality,
+            tangent_in_link: None,
         };
         let taxels: Vec<Taxel> = self.taxels().map(taxel).collect();
         glb.taxels(&format!("{} taxels", self.part), Some(link), &taxels, None);

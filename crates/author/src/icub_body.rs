@@ -42,6 +42,7 @@ pub fn author_icub(files: &[impl AsRef<Path>]) -> Result<Authored> {
             normal_in_link: taxel.normal_in_link,
             area: 0.0,
             modality: taxel.modality,
+            tangent_in_link: None,
         };
         let taxels: Vec<Taxel> = file.taxels().map(taxel).collect();
         let (low, high) = taxels.iter().fold((DVec3::MAX, DVec3::MIN), |(low, high), taxel| {

@@ -182,7 +182,7 @@ impl<'a> RestSurface<'a> {
         let stretch = (DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * normal).length();
         let area = if stretch > 0.0 { placed.point.area / stretch } else { 0.0 };
         let position_in_link = at(0) + at(1) + at(2);
-        let taxel = Taxel { id, link, position_in_link, normal_in_link: normal, area, modality };
+        let taxel = Taxel { id, link, position_in_link, normal_in_link: normal, area, modality, tangent_in_link: None };
         MeshTaxel { part, taxel, carriers }
     }
 }

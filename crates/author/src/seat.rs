@@ -12,7 +12,7 @@ use super::recipe::{PlaceSpec, Recipe};
 use super::region::Regions;
 use super::report::{PlaceReport, report};
 use super::rest_surface::{MeshTaxel, RestSurface};
-use crate::body::{MAX_TAXEL_ID, Modality};
+use crate::body::MAX_TAXEL_ID;
 use crate::error::{Result, failed};
 use crate::field::Divided;
 
@@ -96,7 +96,7 @@ impl Seated {
         let ids: Vec<u32> = filled.iter().zip(place.first_id..).map(|(one, next)| one.id.unwrap_or(next)).collect();
         used.take(ids.iter().copied(), &format!("place `{}`", place.name), &place.at)?;
         self.notes.extend(without_area(place, &filled, &ids));
-        let is_whole = is_alone && place.modality == Modality::Pressure && !region.contains(&false);
+        let is_whole = is_alone && place.modality.is_pressed() && !region.contains(&false);
         self.divided = cells.filter(|_| is_whole).map(|cells| (ids.clone(), cells));
         let first = self.taxels.len();
         let links = rest_surface.link.iter().zip(region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();

@@ -50,6 +50,7 @@ fn place(rows: &[TaxelRow], path: &Path) -> Result<Authored> {
             normal_in_link,
             area: row.area_m2.unwrap_or(0.0),
             modality: row.modality.unwrap_or_default(),
+            tangent_in_link: None,
         });
     }
     let mut glb = Glb::new();

@@ -8,6 +8,7 @@ mod dominated;
 mod drift_state;
 mod ids;
 mod input;
+mod letters;
 mod links;
 mod on_skin;
 mod options;
@@ -37,7 +38,7 @@ use crate::error::{Error, Result};
 use crate::field::{FieldSet, NoChart, Recharted, neighbours};
 use crate::percept::{LinkShare, Percepts};
 use crate::scene::{Cadence, Plan};
-use crate::signal::{Calibration, Frame, FrameTime, Intake, RawValue, Receptor, Unfit, Wiring};
+use crate::signal::{Axis, Calibration, Channel, Frame, FrameTime, Intake, RawValue, Receptor, Unfit, Wiring};
 use crate::stage::{Pressed, calibrate};
 use crate::touch::Skin;
 
@@ -62,6 +63,10 @@ pub struct Engine {
     why: String,
     intake: Intake,
     raw: Vec<RawValue>,
+    /// The values that letters are made of which the host makes, frame by frame.
+    sensed: Vec<RawValue>,
+    /// Where those are in a frame whose values pass as they are.
+    sensed_at: Vec<Option<u32>>,
     /// Where frames have the plan's values, if those pass as they are; `raw` stays empty then.
     picks: Option<Picks>,
     steps: Vec<Step>,
@@ -129,6 +134,7 @@ impl Engine {
         let plan = Plan::new(body, &recharted.fields, &scene, &calibration)?;
         // Of a large skin these take as much memory as the plan.
         drop(recharted.fields);
+        let channels = Channel::all_of(body);
         let drift = DriftState::new(&plan, calibration.drift, body);
         if drift.is_some() && plan.letters().iter().all(|letter| letter.receptor != Receptor::Sustained) {
             return Err(Error::usage(
@@ -144,7 +150,7 @@ impl Engine {
             max_gap_s: scene.max_gap_s,
             percepts: Percepts::new(plan.outputs, plan.fields.len(), kind.precision())
                 .with_columns(plan.columns, plan.kept_pressures())
-                .with_letters(plan.letters().len())
+                .with_letters(plan.letter_by_field())
                 .with_touch_frames(plan.touched_from.is_some())
                 .with_names((0..plan.fields.len()).map(|field| plan.label(field)).collect()),
             check: None,
@@ -154,16 +160,18 @@ impl Engine {
             cadence: (scene.knobs.cadence == Cadence::OnChange).then(|| OnChange::new(&plan, scene.max_gap_s)),
             backend: chosen.backend,
             why: chosen.why,
-            intake: Intake::new(calibration, beside, scene.max_age_s),
+            intake: Intake::new(calibration, beside, scene.max_age_s, taxels_of(body, &channels)),
             raw: Vec::new(),
+            sensed: Vec::new(),
+            sensed_at: Vec::new(),
             picks: None,
             tare,
             frames_done: 0,
             heads: Vec::new(),
-            ids: body.taxels.iter().map(|taxel| taxel.id).collect(),
-            channel_of_taxel: (0..body.taxels.len())
+            channel_of_taxel: (0..channels.len())
                 .map(|taxel| plan.body_taxels.binary_search(&taxel).ok().and_then(|channel| channel.try_into().ok()))
                 .collect(),
+            ids: channels,
             links: Links::new(body, &scene),
             pressed: Vec::with_capacity(
                 plan.fields.iter().map(|field| plan.members_of(field).len()).max().unwrap_or(0),
@@ -197,7 +205,8 @@ impl Engine {
         self.kept_charts.iter().map(|(name, why)| (name.as_str(), why))
     }
 
-    /// Says which taxels a source's frames hold, in their order. Until then, it is all of the body's, by ascending id.
+    /// Says which taxels a source's frames hold, in their order: by id, and the tangential values of those with three axes by
+    /// [`Channel`]. Until then, it is all of the body's, ascending.
     ///
     /// # Errors
     /// An id that the body does not have, or one twice.
@@ -207,12 +216,13 @@ impl Engine {
         for id in ids {
             let taxel = self.ids.binary_search(id).map_err(|_| {
                 Error::failed(format!(
-                    "taxel id {id} is not in the body, whose ids are {}; is it the right body?",
-                    ranges(&self.ids)
+                    "taxel id {} is not in the body, whose ids are {}; is it the right body?",
+                    Channel(*id),
+                    ranges(self.taxel_ids())
                 ))
             })?;
             if std::mem::replace(&mut taken[taxel], true) {
-                return Err(Error::failed(format!("taxel id {id} appears twice")));
+                return Err(Error::failed(format!("taxel id {} appears twice", Channel(*id))));
             }
             taxel_of_value.push(taxel);
         }
@@ -248,18 +258,33 @@ impl Engine {
         let picks = self.intake.picks(&self.plan.body_taxels).filter(|picks| !picks.is_empty());
         let (width, calibrated) = (self.intake.width(), self.plan.calibrated());
         self.picks = picks.filter(|_| self.drift.is_none()).map(|picks| Picks::new(&picks, calibrated, width));
+        self.sensed_at = self.intake.places(&self.plan.senses.channels);
     }
 
-    /// A frame for all of the body's taxels by ascending id, every value missing.
+    /// The ids of the body's taxels, ascending.
+    fn taxel_ids(&self) -> &[u32] {
+        let taxels = self.ids.partition_point(|&id| Channel(id).axis() == Axis::Normal);
+        &self.ids[..taxels]
+    }
+
+    /// A frame for all of the body's taxels by ascending id, then for the tangential values of those with three axes
+    /// ([`Channel::all_of`]), every value missing.
     #[must_use]
     pub fn frame(&self, t_s: f64) -> Frame {
         Frame::missing(t_s, self.ids.len())
     }
 
-    /// The index of the taxel with `id` in the values of [`Engine::frame`].
+    /// The index of the taxel with `id`, or of a [`Channel`], in the values of [`Engine::frame`].
     #[must_use]
     pub fn index_of_taxel(&self, id: u32) -> Option<usize> {
         self.ids.binary_search(&id).ok()
+    }
+
+    /// The index of the value called `name` in those of [`Engine::frame`]: a taxel's id, such as `4`, or of one with three axes
+    /// `4.u` and `4.v`, its forces along t and n × t.
+    #[must_use]
+    pub fn index_of(&self, name: &str) -> Option<usize> {
+        self.ids.binary_search(&Channel::named(name)?.0).ok()
     }
 
     /// Sets the value of the taxel with `id` in `frame`, which is one of [`Engine::frame`].
@@ -413,4 +438,9 @@ impl Engine {
         let judged = self.drift.iter().flat_map(|kept| kept.compensation.taxels());
         judged.zip(&self.plan.body_taxels).filter_map(|((_, unfit), &taxel)| Some((self.ids[taxel], unfit?)))
     }
+}
+
+/// By channel of `body`, the place of its taxel among the body's.
+fn taxels_of(body: &Body, channels: &[u32]) -> Vec<usize> {
+    channels.iter().filter_map(|&channel| body.taxel_index(Channel(channel).taxel())).collect()
 }

@@ -113,6 +113,7 @@ impl Shape {
             normal_in_link: DVec3::Y,
             area: PITCH_M * PITCH_M,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         });
         let taxels = taxels.collect();
         let mut order: Vec<u32> = (0..self.sensors as u32).collect();

@@ -226,6 +226,7 @@ mod tests {
             normal_in_link: DVec3::Y,
             area,
             modality: crate::body::Modality::Pressure,
+            tangent_in_link: None,
         };
         let taxels =
             [taxel(0, 0.0, 1e-4), taxel(1, 0.010, 0.0), taxel(2, 0.014, 0.0), taxel(3, 1.0, 0.0), taxel(4, 1.0, 0.0)];

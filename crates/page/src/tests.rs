@@ -57,6 +57,7 @@ fn body() -> Body {
         normal_in_link: DVec3::Y,
         area: if id == 7 { 0.0 } else { 1e-4 },
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     let field = |name: &str, parent: Option<&str>, ids: &[u32], kind| FieldSpec {
         name: name.to_owned(),

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::encode::{Writer, no_link};
-use crate::body::{Body, Modality};
+use crate::body::Body;
 use somatic_engine::percept::{Touch, TouchFrame, TouchTrails};
 use somatic_engine::scene::Plan;
 
@@ -21,7 +21,7 @@ pub(super) struct TouchPlaces {
 impl TouchPlaces {
     /// Of touches of `body` under `plan`.
     pub(super) fn new(body: &Body, plan: &Plan, origin: DVec3) -> Self {
-        let of_skin = body.taxels.iter().zip(0..).filter(|(taxel, _)| taxel.modality == Modality::Pressure);
+        let of_skin = body.taxels.iter().zip(0..).filter(|(taxel, _)| taxel.modality.is_pressed());
         Self {
             taxels: of_skin.map(|(_, index)| index).collect(),
             world: plan.relative_to().and_then(|link| body.link_index(link)),

@@ -93,13 +93,16 @@ fn words_of(ids: &[u32]) -> String {
     runs.map(word).collect::<Vec<_>>().join(",")
 }
 
+/// The highest channel that a body can have.
+const LAST_CHANNEL: u32 = (2 << 25) | body::MAX_TAXEL_ID;
+
 /// The ids that [`words_of`] wrote; `None` where it did not, or where there are more than a body can have.
 fn ids_of(words: &str) -> Option<Vec<u32>> {
     let mut ids = Vec::new();
     for word in words.split(',').filter(|word| !word.is_empty()) {
         let (first, last) = word.split_once('-').unwrap_or((word, word));
         let (first, last): (u32, u32) = (first.parse().ok()?, last.parse().ok()?);
-        if last < first || last > body::MAX_TAXEL_ID || ids.len() > body::MAX_TAXEL_ID as usize {
+        if last < first || last > LAST_CHANNEL || (last - first) as usize + ids.len() > body::MAX_TAXEL_ID as usize {
             return None;
         }
         ids.extend(first..=last);

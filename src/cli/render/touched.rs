@@ -6,6 +6,7 @@ use clap::Args;
 use somatic::field::Field;
 use somatic::internal::scene_file::{hertz, seconds};
 use somatic::internal::setup::Setup;
+use somatic::internal::signal::Channel;
 use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture};
 use somatic::scene::Coordinates;
 use somatic::scene::file::SceneFile;
@@ -100,13 +101,13 @@ impl Flags {
             },
         };
         times.check().map_err(|e| e.at("--rate"))?;
-        let channels: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let taxels: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let input = crate::cli::scene::input(asked)?;
         if !input.is_recording() {
             return Err(Error::usage("a picture is of a recording; record the touch first").at(&input.name));
         }
-        let mut source = input.open(&channels, asked)?;
-        let engine_options = asked.options(body, &channels, 1)?;
+        let mut source = input.open(&Channel::all_of(body), asked)?;
+        let engine_options = asked.options(body, &taxels, 1)?;
         // Pictures are of the body at rest, and show touches whatever else is computed.
         let scene: Scene = engine_options.scene.clone().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor);
         let touches = scene.touches.unwrap_or_default();

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::grouper::Grouper;
 use super::rule::{Each, FieldRule};
-use crate::body::Modality;
 use crate::error::{Error, Result, failed, suggestion};
 use crate::field::LinkSurface;
 use crate::recipe_values::{Globs, Ids};
@@ -99,8 +98,8 @@ impl Grouper<'_> {
                 return Err(unknown("modality", wanted, "modality of its taxels", names.iter().map(String::as_str)));
             }
             chosen.retain(|&taxel| modality(taxel).name() == *wanted);
-        } else if rule.taxels.is_none() && chosen.iter().any(|&taxel| modality(taxel) == Modality::Pressure) {
-            chosen.retain(|&taxel| modality(taxel) == Modality::Pressure);
+        } else if rule.taxels.is_none() && chosen.iter().any(|&taxel| modality(taxel).is_pressed()) {
+            chosen.retain(|&taxel| modality(taxel).is_pressed());
         }
         Ok(())
     }

@@ -53,6 +53,7 @@ fn place(robot: &Robot, path: &Path, options: &MeshOptions) -> Result<Authored> 
                 normal_in_link: taxel.link_from_taxel.transform_vector3(DVec3::Z),
                 area: taxel.area_m2,
                 modality: Modality::Pressure,
+                tangent_in_link: None,
             });
         }
         places.push(PlaceReport {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
-use crate::body::{Body, Modality, Taxel};
+use crate::body::{Body, Taxel};
 use crate::plain;
 
 /// The depth of a taxel's box, which says nothing, m.
@@ -41,7 +41,7 @@ pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
         );
     }
     let mut taxels_of: Vec<Vec<&Taxel>> = vec![Vec::new(); body.links.len()];
-    let felt = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Pressure);
+    let felt = body.taxels.iter().filter(|taxel| taxel.modality.is_pressed());
     felt.for_each(|taxel| taxels_of[taxel.link].push(taxel));
     for (link, own) in body.links.iter().zip(taxels_of).filter(|(_, own)| !own.is_empty()) {
         let name = escaped(&link.name);
@@ -54,7 +54,7 @@ pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
         text += "    </tactile>\n  </sensor>\n";
     }
     text += "</robot>\n";
-    let others = body.taxels.iter().filter(|taxel| taxel.modality != Modality::Pressure).count();
+    let others = body.taxels.iter().filter(|taxel| !taxel.modality.is_pressed()).count();
     let mut notes = Vec::new();
     if others > 0 {
         notes.push(format!(

@@ -8,6 +8,7 @@ use super::cadence::step;
 use super::check::Check;
 use super::dominated::orient_again;
 use super::input::{GoOn, Input};
+use super::letters::SensedValues;
 use super::post::{Post, flag_stale, flag_stale_poses};
 use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
@@ -83,10 +84,16 @@ impl Engine {
             }
         }
         self.raw.clear();
+        self.sensed.clear();
         self.intake.forget_stale();
-        if self.picks.is_none() {
-            for (index, frame) in frames.iter().enumerate() {
-                self.intake.take(frame.t_s, values.row(index), &self.plan.body_taxels, &mut self.raw);
+        for (index, frame) in frames.iter().enumerate() {
+            let row = values.row(index);
+            if self.picks.is_none() {
+                self.intake.take(frame.t_s, row, &self.plan.body_taxels, &mut self.raw);
+                self.intake.take_more(&self.plan.senses.channels, &mut self.sensed);
+            } else {
+                let value = |at: &Option<u32>| at.map_or(RawValue::MISSING, |at| row[at as usize]);
+                self.sensed.extend(self.sensed_at.iter().map(value));
             }
         }
         self.steps.clear();
@@ -176,7 +183,8 @@ impl Engine {
             cadence.look(&raw, frames);
         }
         self.backend.run(&raw, &mut self.percepts)?;
-        let post = Post { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref(), kept };
+        let sensed = SensedValues { values: &self.sensed, width: self.plan.senses.channels.len() };
+        let post = Post { plan: &self.plan, links: &self.links, cadence: self.cadence.as_ref(), kept, sensed };
         post.flag_restart(&raw, 0, &mut self.percepts);
         orient_again(&self.plan, &raw, &mut self.percepts, &mut self.pressed);
         let first_bound = check.as_ref().map_or(0, |check| check.bounds.len());

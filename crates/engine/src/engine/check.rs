@@ -10,7 +10,7 @@ use crate::backend::bounds::{BoundedReference, CellBound};
 use crate::backend::{BackendState, FieldState, RawBatch};
 use crate::error::Result;
 use crate::percept::{Flags, Outputs, Percepts, Precision};
-use crate::scene::Plan;
+use crate::scene::{Plan, outputs_of};
 use crate::signal::Frame;
 use crate::stage::limit::Limit;
 use crate::stage::world_motion;
@@ -34,7 +34,7 @@ impl Check {
     pub(super) fn new(plan: &Plan, backend: &BackendState, post: &PostState) -> Result<Self> {
         let right = Percepts::new(plan.outputs, plan.fields.len(), Precision::F64)
             .with_columns(plan.columns, plan.kept_pressures())
-            .with_letters(plan.letters().len());
+            .with_letters(plan.letter_by_field());
         let last = post.last.as_ref().map(|last| {
             let mut widened = right.clone();
             widened.take_frame(last, 0);
@@ -87,6 +87,14 @@ impl Check {
                 && bound.limit(Outputs::POSITION) != Limit::TooClose
             {
                 bound.set([(Outputs::POSITION, Limit::Within(0.0))]);
+            }
+        }
+        for (field, bound) in post.plan.fields.iter().zip(&mut bounds) {
+            // What the host makes of raw values is alike on both sides.
+            if !field.sensed.is_empty() {
+                let outputs = outputs_of(post.plan.letters()[field.letter].receptor);
+                bound.set(outputs.iter().map(|output| (output, Limit::Within(0.0))));
+                bound.in_doubt = Flags::empty();
             }
         }
         post.frame(offset, frame, raw, &mut self.right, &mut self.post);

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::cadence::{self, OnChange};
+use super::letters::{Cell, SensedValues};
 use super::links::Links;
 use super::place;
 use super::spread::{Frames, Now};
@@ -11,6 +12,7 @@ use crate::percept::{Flags, Host, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
+use crate::stage::window::Window;
 use crate::stage::{difference, filter, force, motion, world_motion};
 
 /// What post-processing keeps from frame to frame.
@@ -33,6 +35,8 @@ pub(super) struct PostFieldState {
     pub(super) world_motion: world_motion::Memory,
     /// Whether the last frame was in contact, so that there is something to release.
     pub(super) contact: bool,
+    /// What its letter measures, where the host makes it.
+    pub(super) window: Window,
 }
 
 impl PostState {
@@ -50,6 +54,8 @@ pub(super) struct Post<'a> {
     pub(super) cadence: Option<&'a OnChange>,
     /// By field, whether it was in contact before the batch, where time starts again with that.
     pub(super) kept: Option<&'a [bool]>,
+    /// What letters are made of that the host makes.
+    pub(super) sensed: SensedValues<'a>,
 }
 
 /// Flags every field that holds a taxel that is stale. `stale` has those of each frame, by their places in the body.
@@ -131,12 +137,19 @@ impl Post<'_> {
     ) {
         let (stages, step, index) = (self.plan.stages(), &raw.steps[offset], raw.first + offset);
         percepts.t_s[index] = frame.t_s;
-        if !(stages.force || stages.filter || stages.world_motion || stages.sigma || self.cadence.is_some()) {
+        let own = stages.force || stages.filter || stages.world_motion || stages.sigma || stages.senses;
+        if !own && self.cadence.is_none() {
             return;
         }
         let (alone, mut now) = (std::slice::from_ref(frame), Now::default());
         for (number, field) in self.plan.fields.iter().enumerate() {
             let cell = index * self.plan.fields.len() + number;
+            if !field.sensed.is_empty() {
+                let frames = self.frames(alone, raw, offset, &state.raw_before);
+                let of = Cell { plan: self.plan, field, frames, frame: index, step, sensed: self.sensed };
+                of.make(cell, percepts, &mut now, &mut state.fields[number]);
+                continue;
+            }
             if let Some(cadence) = self.cadence {
                 match cadence.since(offset, number) {
                     Some(since) => cadence::rates(percepts, cell, step, since),

@@ -50,8 +50,8 @@ pub struct Percepts {
     /// The outputs, and what stages work on.
     columns: Outputs,
     pub(super) fields: usize,
-    /// Letters that every field is there in, one after the other.
-    letters: usize,
+    /// By field, its letter; none where there is one letter.
+    letters: Arc<[u8]>,
     /// Taxels whose pressures are kept, 0 unless a stage works on them.
     pub(super) slots: usize,
     /// By field; none where nobody said them.
@@ -90,7 +90,7 @@ impl Percepts {
             outputs,
             columns: outputs,
             fields,
-            letters: 1,
+            letters: Arc::default(),
             slots: 0,
             names: Arc::default(),
             first_frame: 0,
@@ -112,10 +112,16 @@ impl Percepts {
         }
     }
 
-    /// The same, for fields that each have `letters` letters, one after the other.
-    pub(crate) fn with_letters(mut self, letters: usize) -> Self {
-        self.letters = letters.max(1);
+    /// The same, for fields that are each of the letter that `letters` has for it.
+    pub(crate) fn with_letters(mut self, letters: Arc<[u8]>) -> Self {
+        self.letters = letters;
         self
+    }
+
+    /// Which letter field `field` is of, as [`Plan::letters`](crate::scene::Plan::letters) counts.
+    #[must_use]
+    pub fn letter(&self, field: usize) -> usize {
+        self.letters.get(field).map_or(0, |&letter| letter.into())
     }
 
     /// The same, of fields called so.
@@ -140,7 +146,7 @@ impl Percepts {
     /// Whether both have room for the same columns of the same fields.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
         let shape = |of: &Self| {
-            (of.outputs, of.columns, of.fields, of.letters, of.slots, of.precision(), of.touch_frames.is_some())
+            (of.outputs, of.columns, of.fields, of.letters.clone(), of.slots, of.precision(), of.touch_frames.is_some())
         };
         shape(self) == shape(other) && Arc::ptr_eq(&self.names, &other.names)
     }
@@ -149,7 +155,7 @@ impl Percepts {
     pub(crate) fn empty_like(&self) -> Self {
         Self::new(self.outputs, self.fields, self.precision())
             .with_columns(self.columns, self.slots)
-            .with_letters(self.letters)
+            .with_letters(Arc::clone(&self.letters))
             .with_names(Arc::clone(&self.names))
             .with_touch_frames(self.touch_frames.is_some())
     }
@@ -243,7 +249,7 @@ impl Percepts {
     #[must_use]
     pub fn get(&self, frame: usize, field: usize) -> Percept {
         let cell = frame * self.fields + field;
-        Percept::with((field, field % self.letters), self.flags[cell], self.in_world[cell], |column| {
+        Percept::with((field, self.letter(field)), self.flags[cell], self.in_world[cell], |column| {
             self.present(cell).contains(column.output).then(|| self.components(column, cell))
         })
     }

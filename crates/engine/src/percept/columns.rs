@@ -56,6 +56,14 @@ pub enum Unit {
     Newton,
     /// Pa.
     Pascal,
+    /// The unit of P times m.
+    PMetre,
+    /// °C.
+    Celsius,
+    /// K/m.
+    KelvinPerMetre,
+    /// K/s.
+    KelvinPerSecond,
     /// None: a [`super::ContactKind`], which data files name.
     Kind,
 }
@@ -74,6 +82,10 @@ impl Unit {
             Self::MetrePerSecond => "m/s",
             Self::Newton => "N",
             Self::Pascal => "Pa",
+            Self::PMetre => "P m",
+            Self::Celsius => "°C",
+            Self::KelvinPerMetre => "K/m",
+            Self::KelvinPerSecond => "K/s",
         }
     }
 }
@@ -290,6 +302,54 @@ columns! {
     CENTROID_SIGMA 31 centroid_sigma: [f64; 2], Metre, Vector, sigma, parts [] host [CentroidSigma];
     #[doc = "The standard deviation of the principal axis by the sensors' noise, rad."]
     PRINCIPAL_AXIS_SIGMA 32 principal_axis_sigma: f64, Radian, Number, sigma, parts [] host [PrincipalAxisSigma];
+    #[doc = "s = Σ wᵢsᵢ over the pressed taxels, along u and v of the field's chart; of letter `shear`, as the outputs down to slip_ratio."]
+    SHEAR 39 shear: [f64; 2], P, Vector, shear, parts [] host [Shear];
+    #[doc = "Its direction, rad in (−π, π]."]
+    SHEAR_DIRECTION 40 shear_direction: f64, Radian, Direction, shear, parts [] host [ShearDirection];
+    #[doc = "The same sum in space, each taxel's along its own tangents."]
+    SHEAR_VECTOR 41 shear_vector: [f64; 3], P, Vector, shear, parts [] host [ShearVector];
+    #[doc = "The force on the skin, normal and tangential, unweighted, N."]
+    FORCE_VECTOR 42 force_vector: [f64; 3], Newton, Vector, shear, parts [] host [ForceVector];
+    #[doc = "Σ wᵢ(xᵢ − c) × sᵢ · n about the centroid c: how the touch twists, counter-clockwise seen from outside."]
+    TORSION 43 torsion: f64, PMetre, Number, shear, parts [] host [Torsion];
+    #[doc = "‖s‖ / Σ wᵢPᵢ."]
+    FRICTION 44 friction: f64, One, Number, shear, parts [] host [Friction];
+    #[doc = "The standard deviation of the friction by the sensors' noise; only on request."]
+    FRICTION_SIGMA 45 friction_sigma: f64, One, Number, shear, parts [] host [FrictionSigma];
+    #[doc = "Friction over that at which it slips ([shear] slips_at of the calibration): a slip begins at 0.95."]
+    SLIP_RATIO 62 slip_ratio: f64, One, Number, shear, parts [] host [SlipRatio];
+    #[doc = "Weighted mean of the temperatures, °C; of letter `temperature`, as the outputs down to temperature_rate."]
+    TEMPERATURE 46 temperature: f64, Celsius, Number, temperature, parts [] host [Temperature];
+    #[doc = "The highest temperature, °C."]
+    WARMEST 47 warmest: f64, Celsius, Number, temperature, parts [] host [Warmest];
+    #[doc = "The id of the taxel that has it."]
+    WARMEST_TAXEL 48 warmest_taxel: u32, One, Number, temperature, parts [] host [WarmestTaxel];
+    #[doc = "Where that is, m."]
+    WARMEST_POSITION 49 warmest_position: [f64; 3], Metre, Vector, temperature, parts [] host [WarmestPosition];
+    #[doc = "The lowest temperature, °C."]
+    COLDEST 50 coldest: f64, Celsius, Number, temperature, parts [] host [Coldest];
+    #[doc = "The id of the taxel that has it."]
+    COLDEST_TAXEL 51 coldest_taxel: u32, One, Number, temperature, parts [] host [ColdestTaxel];
+    #[doc = "Where that is, m."]
+    COLDEST_POSITION 52 coldest_position: [f64; 3], Metre, Vector, temperature, parts [] host [ColdestPosition];
+    #[doc = "How the temperature rises along u and v, by a plane of least squares, K/m."]
+    TEMPERATURE_GRADIENT 53 temperature_gradient: [f64; 2], KelvinPerMetre, Vector, temperature, parts [] host [TemperatureGradient];
+    #[doc = "How fast the mean rises, by a line of least squares over [temperature] window_s, K/s."]
+    TEMPERATURE_RATE 54 temperature_rate: f64, KelvinPerSecond, Number, temperature, parts [] host [TemperatureRate];
+    #[doc = "The least distance, m; of letter `proximity`, as the outputs down to proximity_centroid."]
+    NEAREST 55 nearest: f64, Metre, Number, proximity, parts [] host [Nearest];
+    #[doc = "The id of the taxel that has it."]
+    NEAREST_TAXEL 56 nearest_taxel: u32, One, Number, proximity, parts [] host [NearestTaxel];
+    #[doc = "Where that taxel is, m."]
+    NEAREST_POSITION 57 nearest_position: [f64; 3], Metre, Vector, proximity, parts [] host [NearestPosition];
+    #[doc = "The outward unit normal there."]
+    NEAREST_NORMAL 58 nearest_normal: [f64; 3], One, Vector, proximity, parts [] host [NearestNormal];
+    #[doc = "How fast the least distance falls, by a line of least squares over [proximity] window_s, m/s."]
+    APPROACH_SPEED 59 approach_speed: f64, MetrePerSecond, Number, proximity, parts [] host [ApproachSpeed];
+    #[doc = "Number of taxels with something in range."]
+    COVERED 60 covered: u32, One, Number, proximity, parts [] host [Covered];
+    #[doc = "Mean (u, v) of these taxels in the field's chart, each weighing 1/d², m."]
+    PROXIMITY_CENTROID 61 proximity_centroid: [f64; 2], Metre, Vector, proximity, parts [] host [ProximityCentroid];
 }
 
 impl Outputs {
@@ -298,13 +358,19 @@ impl Outputs {
     pub const USUAL: Self = Self::USUAL_AND_MOTION.difference(Self::MOTION);
 
     /// What is computed from a frame and the one before it: all but [`Outputs::SELF_CONTACTS`], [`Outputs::FILTERED`],
-    /// [`Outputs::SIGMAS`], [`Outputs::SPEED_IN_WORLD`] and [`Outputs::FORCE`], which depends on the calibration.
+    /// [`Outputs::SIGMAS`], [`Outputs::SPEED_IN_WORLD`], [`Outputs::FORCE`], which depends on the calibration, and
+    /// [`Outputs::OF_OTHER_LETTERS`], which depend on the taxels.
     pub const USUAL_AND_MOTION: Self = Self::all()
         .difference(Self::SELF_CONTACTS)
         .difference(Self::FILTERED)
         .difference(Self::SIGMAS)
         .difference(Self::SPEED_IN_WORLD)
-        .difference(Self::FORCE);
+        .difference(Self::FORCE)
+        .difference(Self::OF_OTHER_LETTERS);
+
+    /// What letters beside pressure give: of shear, temperature and proximity.
+    pub const OF_OTHER_LETTERS: Self =
+        Self::of_stage("shear").union(Self::of_stage("temperature")).union(Self::of_stage("proximity"));
 
     /// How sure quantities are.
     pub const SIGMAS: Self = Self::of_stage("sigma");

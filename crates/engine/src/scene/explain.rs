@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::{Knobs, Plan, PlanField};
 use crate::percept::{Component, Outputs, TouchOutputs};
-use crate::signal::Letter;
+use crate::signal::{Letter, Receptor};
 
 /// A stage of a plan.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -62,8 +62,8 @@ struct FieldSummary<'a> {
 
 impl<'a> FieldSummary<'a> {
     fn from_field(field: &'a PlanField) -> Self {
-        let PlanField { name, link, letter, count, charted, .. } = field;
-        Self { field: name, link, letter: *letter, members: *count, chart: *charted }
+        let PlanField { name, link, letter, charted, .. } = field;
+        Self { field: name, link, letter: *letter, members: field.taxels(), chart: *charted }
     }
 }
 
@@ -85,7 +85,19 @@ impl Serialize for Plan {
 }
 
 /// The stages that run on the host, whatever the backend.
-const ON_HOST: [&str; 8] = ["position", "world_motion", "touches", "self_contacts", "force", "filter", "sigma", "fit"];
+const ON_HOST: [&str; 11] = [
+    "position",
+    "world_motion",
+    "touches",
+    "self_contacts",
+    "force",
+    "filter",
+    "sigma",
+    "fit",
+    "shear",
+    "temperature",
+    "proximity",
+];
 
 impl Plan {
     /// All stages, in the order that they run in.
@@ -100,6 +112,11 @@ impl Plan {
         };
         let slots = (self.calibrated(), 0);
         let found = (counts(&all).0, 0);
+        let senses = &self.senses;
+        let sensed = |receptor: Receptor| {
+            let own = self.fields.iter().filter(|field| self.letters[field.letter].receptor == receptor);
+            own.fold((0, 0), |(fields, members), field| (fields + 1, members + field.sensed.len()))
+        };
         let found_charted = (counts(&charted).0, 0);
         // Of each stage whether it runs, what it goes over, and why it might not.
         let rows = [
@@ -119,6 +136,14 @@ impl Plan {
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
             ("fit", self.fits(), (self.channels(), 0), ""),
+            ("shear", senses.shear.is_some(), sensed(Receptor::Shear), "no taxel has three axes"),
+            (
+                "temperature",
+                senses.temperature.is_some(),
+                sensed(Receptor::Temperature),
+                "no taxel measures temperature",
+            ),
+            ("proximity", senses.proximity.is_some(), sensed(Receptor::Proximity), "no taxel measures proximity"),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = match name {

@@ -1,27 +1,29 @@
-//! Taxels that measure something else than pressure: no letter reads them, and they are never summed as if they felt a touch.
+//! Taxels that no letter reads, and the fields that have no other.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::body::{Body, Modality};
+use crate::body::Body;
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
+use crate::signal::Letter;
 
 /// What of a plan's fields is left out.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LeftOut {
     /// By the name of a modality, the ids of the taxels, ascending.
     taxels: BTreeMap<String, Vec<u32>>,
-    /// Names of fields that have no taxel of pressure.
+    /// Names of fields that have no taxel that is read.
     fields: Vec<String>,
 }
 
 impl LeftOut {
-    /// What the fields `chosen` of `fields` leave out.
-    pub(super) fn from_fields(body: &Body, chosen: &[usize], fields: &FieldSet) -> Self {
+    /// What the fields `chosen` of `fields` leave out in `letters`.
+    pub(super) fn from_fields(body: &Body, chosen: &[usize], fields: &FieldSet, letters: &[Letter]) -> Self {
         let mut taxels: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+        let is_read = |taxel: usize| letters.iter().any(|letter| letter.receptor.reads(body.taxels[taxel].modality));
         let chosen = || chosen.iter().map(|&field| &fields.fields[field]);
-        for member in chosen().flat_map(|field| &field.members).filter(|member| !is_pressure(body, member.taxel)) {
+        for member in chosen().flat_map(|field| &field.members).filter(|member| !is_read(member.taxel)) {
             let taxel = &body.taxels[member.taxel];
             taxels.entry(taxel.modality.name()).or_default().push(taxel.id);
         }
@@ -29,11 +31,11 @@ impl LeftOut {
             ids.sort_unstable();
             ids.dedup();
         }
-        let feels_nothing = |field: &&Field| !field.members.iter().any(|member| is_pressure(body, member.taxel));
+        let feels_nothing = |field: &&Field| !field.members.iter().any(|member| is_read(member.taxel));
         Self { taxels, fields: chosen().filter(feels_nothing).map(|field| field.name.clone()).collect() }
     }
 
-    /// The fields of `chosen` that have a taxel of pressure.
+    /// The fields of `chosen` that have a taxel that is read.
     ///
     /// # Errors
     /// None has.
@@ -41,7 +43,7 @@ impl LeftOut {
         let left: Vec<usize> =
             chosen.into_iter().filter(|&field| !self.fields.contains(&fields.fields[field].name)).collect();
         if left.is_empty() {
-            let what = format!("no field has a taxel of pressure: {}", self.remark().unwrap_or_default());
+            let what = format!("no field has a taxel that a letter reads: {}", self.remark().unwrap_or_default());
             return Err(Error::failed(what).at(&body.name));
         }
         Ok(left)
@@ -58,7 +60,7 @@ impl LeftOut {
             [] => String::new(),
         };
         let mut line = format!(
-            "{}; percepts are of pressure: left out of every field",
+            "{}; no letter reads that: left out of every field",
             self.taxels.iter().map(kind).collect::<Vec<_>>().join(", ")
         );
         match &self.fields[..] {
@@ -74,7 +76,7 @@ impl LeftOut {
 }
 
 pub(super) fn is_pressure(body: &Body, taxel: usize) -> bool {
-    body.taxels[taxel].modality == Modality::Pressure
+    body.taxels[taxel].modality.is_pressed()
 }
 
 /// `field` with its members of pressure alone. Its chart is the layout's own.

@@ -43,6 +43,7 @@ pub(super) fn thresholds(calibration: &Calibration, field: &str, receptor: Recep
     let contact: ContactThresholds = match receptor {
         Receptor::Sustained => calibration.fields.get(field).copied().unwrap_or(calibration.contact),
         Receptor::Change => calibration.change.contact,
+        Receptor::Shear | Receptor::Temperature | Receptor::Proximity => ContactThresholds::default(),
     };
     Thresholds { on: contact.on, off: contact.off }
 }

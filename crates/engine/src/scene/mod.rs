@@ -11,6 +11,7 @@ mod left_out;
 mod members;
 mod onset;
 mod plan;
+mod senses;
 mod slots;
 mod stages;
 
@@ -21,6 +22,7 @@ pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
 pub(crate) use layer::{Around, REACH};
 pub use plan::{Plan, PlanField, PlannedField};
+pub(crate) use senses::{SensedMember, outputs_of};
 pub(crate) use stages::Stages;
 
 use crate::body::Body;
@@ -42,7 +44,8 @@ pub struct Scene {
     pub max_age_s: f64,
     /// The longest step between frames over which motion is measured, s.
     pub max_gap_s: f64,
-    /// What sensors are read as; every field is computed once for each. Usually one, the pressure itself.
+    /// What taxels are read as; every field is computed once for each that its taxels have. None means the usual ones: the pressure
+    /// itself, and shear, temperature and proximity where there are such taxels.
     pub letters: Vec<Letter>,
     /// Which motion counts, for [`Outputs::FILTERED`].
     pub filter: MotionFilter,
@@ -67,7 +70,7 @@ impl Default for Scene {
             fields: Vec::new(),
             max_age_s: 0.0,
             max_gap_s: 10.0,
-            letters: vec![Letter::default()],
+            letters: Vec::new(),
             coordinates: Coordinates::default(),
             relative_to: None,
             filter: MotionFilter::default(),

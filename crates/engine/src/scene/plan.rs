@@ -12,6 +12,7 @@ use super::curves::Curves;
 use super::left_out::LeftOut;
 use super::members::LinkPart;
 use super::onset::SoftOnset;
+use super::senses::{SensedMember, Senses};
 use super::stages::Stages;
 use crate::field::{Chart, NoChart, WORLD};
 use crate::percept::{Outputs, TouchOutputs};
@@ -28,6 +29,8 @@ pub struct Plan {
     /// What percepts have columns for: the outputs, and what stages work on.
     pub(crate) columns: Outputs,
     pub(super) letters: Vec<Letter>,
+    /// What the host reads for letters that are not made of pressures.
+    pub(crate) senses: Senses,
     knobs: Knobs,
     /// The link that stands for the world.
     relative_to: Option<String>,
@@ -63,7 +66,7 @@ pub struct Plan {
     pub(crate) spread_slots: Vec<u32>,
     /// By field, the largest weight of a member.
     pub(crate) heaviest: Vec<f32>,
-    /// Taxels of its fields that measure something else than pressure.
+    /// Taxels of its fields that no letter reads.
     pub(crate) left_out: LeftOut,
     /// Shared by the engine and its backend: of a large skin these are most of what a plan takes.
     #[doc(hidden)]
@@ -117,11 +120,36 @@ pub struct PlanField {
     pub chart: Option<Chart>,
     /// Why there is none.
     pub no_chart: Option<NoChart>,
+    /// Its members in a letter that the host makes; then backends have none.
+    pub(crate) sensed: Arc<[SensedMember]>,
     /// The surface over the chart, where positions are wanted.
     pub surface: Option<Surface>,
 }
 
 impl PlanField {
+    /// The same with the members `sensed` alone, which the host reads: backends have none from `first` on.
+    pub(super) fn of_senses(self, letter: usize, first: usize, sensed: Arc<[SensedMember]>) -> Self {
+        Self {
+            letter,
+            first,
+            count: 0,
+            thresholds: Thresholds::default(),
+            quantity: Quantity::Count,
+            weights: Vec::new(),
+            places: Vec::new(),
+            depths: Vec::new(),
+            parts: Arc::default(),
+            sensed,
+            ..self
+        }
+    }
+
+    /// The number of taxels that its percepts are made of.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.count + self.sensed.len()
+    }
+
     /// Whether it has enough members for the CPU to take sixteen of them side by side.
     pub(crate) fn is_wide(&self) -> bool {
         self.count >= layout::MANY
@@ -239,10 +267,19 @@ impl Plan {
         slot % self.channels()
     }
 
-    /// The letters that every field is read in; what [`Percept::letter`](crate::percept::Percept::letter) counts.
+    /// The letters that fields are read in; what [`Percept::letter`](crate::percept::Percept::letter) counts.
     #[must_use]
     pub fn letters(&self) -> &[Letter] {
         &self.letters
+    }
+
+    /// By field, which of the letters it is of; empty where all are of one.
+    pub(crate) fn letter_by_field(&self) -> Arc<[u8]> {
+        if self.letters.len() < 2 {
+            Arc::default()
+        } else {
+            self.fields.iter().map(|field| field.letter as u8).collect()
+        }
     }
 
     /// Number of (field, taxel) pairs: the work of a frame.
@@ -251,7 +288,8 @@ impl Plan {
         self.members.len()
     }
 
-    /// The fields, in the order of the percepts. A field is in the list once for each of [`Plan::letters`], in their order.
+    /// The fields, in the order of the percepts. A field is in the list once for each of [`Plan::letters`] that its
+    /// taxels have, in their order.
     pub fn fields(&self) -> impl ExactSizeIterator<Item = PlannedField<'_>> {
         self.fields.iter().map(|field| PlannedField { name: &field.name, link: &field.link })
     }

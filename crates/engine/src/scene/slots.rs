@@ -3,21 +3,28 @@
 
 use super::Plan;
 use crate::error::Result;
-use crate::signal::{Calibration, FsrSignal, Receptor, TaxelCalibration};
+use crate::signal::{Calibration, FsrSignal, Letter, Receptor, TaxelCalibration};
 use crate::stage::layout;
 
 impl Plan {
     /// The taxels of field `field` of the percepts, as indices into the body's.
     pub fn taxels_of(&self, field: usize) -> impl Iterator<Item = usize> + '_ {
-        let members = self.fields.get(field).map_or(&[][..], |field| self.members_of(field));
-        members.iter().map(|member| self.body_taxels[self.channel_of(member.slot as usize)])
+        let (members, sensed) =
+            self.fields.get(field).map_or((&[][..], &[][..]), |field| (self.members_of(field), &field.sensed[..]));
+        let pressed = members.iter().map(|member| self.body_taxels[self.channel_of(member.slot as usize)]);
+        pressed.chain(sensed.iter().map(|member| member.taxel))
     }
 
     /// Makes the taxels, slot by slot, and gives each
     /// letter's first slot.
     pub(super) fn lay_out_slots(&mut self, calibration: &Calibration) -> Result<Vec<u32>> {
         let mut signals: Vec<Option<FsrSignal>> = Vec::new();
-        for letter in &self.letters {
+        // Without a letter of pressures there are slots all the same, which nothing reads.
+        let of_pressure = || self.letters.iter().filter(|letter| letter.receptor.is_of_pressure());
+        let no_letter = Letter::default();
+        let read: Vec<Letter> =
+            of_pressure().chain(of_pressure().next().is_none().then_some(&no_letter)).copied().collect();
+        for letter in &read {
             if !signals.contains(&letter.signal) {
                 signals.push(letter.signal);
                 for (channel, (of_taxel, &area)) in self.calibrations.iter().zip(&self.areas).enumerate() {
@@ -30,6 +37,10 @@ impl Plan {
         self.calibrated = self.taxels.len();
         let mut first_slots = Vec::with_capacity(self.letters.len());
         for letter in &self.letters {
+            if !letter.receptor.is_of_pressure() {
+                first_slots.push(0);
+                continue;
+            }
             let signal = signals.iter().position(|&signal| signal == letter.signal).unwrap_or_default();
             let pressures = signal * self.areas.len();
             if letter.receptor == Receptor::Sustained {

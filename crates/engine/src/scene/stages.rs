@@ -18,6 +18,8 @@ pub(crate) struct Stages {
     pub(crate) pressures: bool,
     pub(crate) filter: bool,
     pub(crate) sigma: bool,
+    /// Letters that are not made of pressures.
+    pub(crate) senses: bool,
 }
 
 impl Stages {
@@ -43,6 +45,7 @@ impl Stages {
             pressures: force,
             filter,
             sigma,
+            senses: outputs.intersects(Outputs::OF_OTHER_LETTERS),
         }
     }
 }

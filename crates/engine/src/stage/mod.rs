@@ -25,8 +25,12 @@ pub(crate) mod motion;
 pub(crate) mod orientation;
 pub mod position;
 pub(crate) mod principal_axis;
+pub(crate) mod proximity;
 pub(crate) mod self_contacts;
+pub(crate) mod shear;
 pub(crate) mod sigma;
+pub(crate) mod temperature;
+pub(crate) mod window;
 pub(crate) mod world_motion;
 
 use glam::DVec3;

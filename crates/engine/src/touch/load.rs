@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::skin::{Reading, Skin, SkinParts, SkinTaxel};
-use crate::body::{Body, Modality, point_tree};
+use crate::body::{Body, point_tree};
 use crate::field::{CellSurface, Seated, TaxelGraph, mean_normals_of};
 
 impl Skin {
@@ -15,7 +15,7 @@ impl Skin {
     /// the nearest other taxel of its link.
     #[must_use]
     pub fn new(body: &Body, graph: &TaxelGraph, reading: impl Fn(usize) -> Reading) -> Self {
-        let is_node = |taxel: usize| body.taxels[taxel].modality == Modality::Pressure;
+        let is_node = |taxel: usize| body.taxels[taxel].modality.is_pressed();
         let nodes: Vec<usize> = (0..body.taxels.len()).filter(|&taxel| is_node(taxel)).collect();
         let mut node_of = vec![u32::MAX; body.taxels.len()];
         (0..).zip(&nodes).for_each(|(node, &taxel)| node_of[taxel] = node);

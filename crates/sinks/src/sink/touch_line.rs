@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::json::{key, print};
-use crate::body::{Body, Modality};
+use crate::body::Body;
 use crate::percept::{Touch, TouchFlags, TouchFrame, TouchOutputs, Wrench};
 use crate::scene::Plan;
 
@@ -24,7 +24,7 @@ impl SkinNames {
     /// The names of `body`, whose percepts `plan` makes; `None` if `plan` does not look for touches of the whole body.
     #[must_use]
     pub fn for_plan(body: &Body, plan: &Plan) -> Option<Self> {
-        let is_node = |taxel: &&crate::body::Taxel| taxel.modality == Modality::Pressure;
+        let is_node = |taxel: &&crate::body::Taxel| taxel.modality.is_pressed();
         Some(Self {
             links: body.links.iter().map(|link| link.name.clone()).collect(),
             taxels: body.taxels.iter().filter(is_node).map(|taxel| taxel.id).collect(),

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::axes::Up;
 use super::joint::{JOINT_KEY, LinkJoint};
-use super::layout::{AREA, FIELD_KEY, FieldSpec, MODALITY, NORMAL, TAXEL_ID};
+use super::layout::{AREA, FIELD_KEY, FieldSpec, MODALITY, NORMAL, TANGENT, TAXEL_ID};
 use super::model::Taxel;
 use super::stored_edges::{EDGES_KEY, StoredEdges};
 use super::urdf_root::{self, URDF_KEY};
@@ -264,6 +264,11 @@ impl Glb {
         column(NORMAL[2], &|t| t.normal_in_link.z);
         column(AREA, &|t| t.area);
         column(MODALITY, &|t| t.modality.code().into());
+        if taxels.iter().any(|taxel| taxel.tangent_in_link.is_some()) {
+            for (name, axis) in TANGENT.into_iter().zip(0..) {
+                column(name, &|t| t.tangent_in_link.map_or(0.0, |tangent| tangent[axis]));
+            }
+        }
         let primitive = json!({"attributes": attributes, "mode": 0});
         self.show(node, name, &primitive, skin.map(|(skin, _)| skin));
         node

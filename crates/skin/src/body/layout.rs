@@ -20,6 +20,8 @@ pub(super) const FIELD_KEY: &str = "somatic_field";
 /// The attributes of a taxel primitive, without the underscore that glTF puts before custom names.
 pub(super) const TAXEL_ID: &str = "TAXEL_ID";
 pub(super) const NORMAL: [&str; 3] = ["NX", "NY", "NZ"];
+/// The tangent of a taxel with three axes; absent where no taxel has one of its own.
+pub(super) const TANGENT: [&str; 3] = ["TX", "TY", "TZ"];
 pub(super) const AREA: &str = "AREA";
 pub(super) const MODALITY: &str = "MODALITY";
 

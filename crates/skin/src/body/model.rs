@@ -7,6 +7,7 @@ use super::joint::LinkJoint;
 use super::kept::Kept;
 use super::layout::FieldSpec;
 use super::stored_edges::StoredEdges;
+use super::tangents::tangent_frame;
 
 /// A rigid part of a robot, from a glTF node.
 #[derive(Clone, Debug)]
@@ -124,13 +125,30 @@ pub enum Modality {
     Temperature,
     /// Proximity.
     Proximity,
+    /// Force along three axes: the normal, and two tangents of the skin.
+    Force3,
     /// An unknown modality code.
     Other(u32),
 }
 
 impl Modality {
-    const KNOWN: [(Self, &str); 3] =
-        [(Self::Pressure, "pressure"), (Self::Temperature, "temperature"), (Self::Proximity, "proximity")];
+    const KNOWN: [(Self, &str); 4] = [
+        (Self::Pressure, "pressure"),
+        (Self::Temperature, "temperature"),
+        (Self::Proximity, "proximity"),
+        (Self::Force3, "force3"),
+    ];
+
+    /// The names of all kinds that there are.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        Self::KNOWN.into_iter().map(|(_, name)| name)
+    }
+
+    /// Whether it feels what presses on it: pressure, also as the normal part of a force.
+    #[must_use]
+    pub fn is_pressed(self) -> bool {
+        matches!(self, Self::Pressure | Self::Force3)
+    }
 
     /// The modality with the number that the layout stores.
     #[must_use]
@@ -145,6 +163,7 @@ impl Modality {
             Self::Pressure => 0,
             Self::Temperature => 1,
             Self::Proximity => 2,
+            Self::Force3 => 3,
             Self::Other(code) => code,
         }
     }
@@ -172,6 +191,18 @@ pub struct Taxel {
     pub area: f64,
     /// What it measures.
     pub modality: Modality,
+    /// Of a taxel of [`Modality::Force3`], the unit tangent along which its second value is; the third is along n × t. `None` is
+    /// the link's x as far as it is tangential.
+    pub tangent_in_link: Option<DVec3>,
+}
+
+impl Taxel {
+    /// The directions of its second and third value in the link, units at right angles to the normal and to each other.
+    #[must_use]
+    pub fn tangents_in_link(&self) -> [DVec3; 2] {
+        let [u, v, _] = tangent_frame(self.normal_in_link, self.tangent_in_link);
+        [u, v]
+    }
 }
 
 /// A robot's shape, taxels and fields.

@@ -9,7 +9,7 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 
 use super::document::{Document, refuse_other_formats};
-use super::layout::{AREA, FieldSpec, MAX_TAXEL_ID, MODALITY, NORMAL, TAXEL_ID};
+use super::layout::{AREA, FieldSpec, MAX_TAXEL_ID, MODALITY, NORMAL, TANGENT, TAXEL_ID};
 use super::model::{Body, Home, Link, Modality, Surface, Taxel};
 use super::nodes::{MAX_COORDINATE_M, Nodes, is_in_range, refuse_far};
 use super::primitives::{attribute, custom, finite_positions, has_mode, is_taxels};
@@ -324,6 +324,7 @@ fn read_taxels(
     };
     let ids = column(TAXEL_ID)?.unwrap_or_default();
     let normals = [column(NORMAL[0])?, column(NORMAL[1])?, column(NORMAL[2])?];
+    let tangents = [column(TANGENT[0])?, column(TANGENT[1])?, column(TANGENT[2])?];
     let areas = column(AREA)?;
     let modalities = column(MODALITY)?;
     let mut taxels = Vec::with_capacity(ids.len());
@@ -348,13 +349,20 @@ fn read_taxels(
         }
         let stretch = if normal == DVec3::ZERO { 1.0 } else { stretched.length() };
         let modality = modalities.as_ref().map_or(0.0, |m| m[point]);
+        let tangent = match &tangents {
+            [Some(x), Some(y), Some(z)] => DVec3::new(x[point].into(), y[point].into(), z[point].into()),
+            _ => DVec3::ZERO,
+        };
+        let normal_in_link = stretched.normalize_or_zero();
+        let tangent_in_link = link_from_mesh.transform_vector3(tangent).reject_from(normal_in_link).try_normalize();
         taxels.push(Taxel {
             id: id as u32,
             link,
             position_in_link: link_from_mesh.transform_point3(DVec3::from_array(position.map(f64::from))),
-            normal_in_link: stretched.normalize_or_zero(),
+            normal_in_link,
             area: area * stretch,
             modality: Modality::from_code(if modality >= 0.0 { modality as u32 } else { 0 }),
+            tangent_in_link,
         });
     }
     Ok(taxels)

@@ -33,6 +33,7 @@ fn fingerprint(body: &Body) -> u64 {
         hash.number(taxel.modality.code());
         hash.vector(taxel.position_in_link);
         hash.vector(taxel.normal_in_link);
+        hash.vector(taxel.tangent_in_link.unwrap_or_default());
         hash.numbers([taxel.area]);
     }
     hash.number(body.surfaces.len());

@@ -129,6 +129,7 @@ impl Sheet {
             normal_in_link: DVec3::Y,
             area: cell.area_m2,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         };
         self.cells.iter().map(taxel).collect()
     }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::cells::Cells;
 use super::geodesic::SurfacePlace;
 use super::seats::{Group, Seat, Seated};
-use crate::body::{Body, Modality};
+use crate::body::Body;
 
 /// Which part of a body's surface belongs to which taxel.
 pub struct CellSurface {
@@ -21,7 +21,7 @@ pub struct CellSurface {
 impl CellSurface {
     /// The cells of the pressure taxels of `body`, whose taxels are `seated`.
     pub fn new(body: &Body, seated: &Seated) -> Self {
-        let is_node = |taxel: usize| body.taxels[taxel].modality == Modality::Pressure;
+        let is_node = |taxel: usize| body.taxels[taxel].modality.is_pressed();
         let nodes: Vec<usize> = (0..body.taxels.len()).filter(|&taxel| is_node(taxel)).collect();
         let mut within: Vec<Vec<(usize, SurfacePlace)>> = vec![Vec::new(); seated.groups.len()];
         for &taxel in &nodes {

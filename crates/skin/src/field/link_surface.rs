@@ -153,7 +153,8 @@ mod tests {
         });
         let position_in_link = DVec3::new(0.02, y, 0.02);
         let (normal_in_link, modality) = (DVec3::Y, Modality::Pressure);
-        let taxel = Taxel { id: 0, link: 0, position_in_link, normal_in_link, area: 1e-5, modality };
+        let taxel =
+            Taxel { id: 0, link: 0, position_in_link, normal_in_link, area: 1e-5, modality, tangent_in_link: None };
         glb.taxels("taxels", Some(links[0]), &[taxel], None);
         Body::from_bytes("two", &glb.to_bytes().unwrap()).unwrap()
     }

@@ -108,6 +108,7 @@ mod tests {
             normal_in_link: DVec3::new(slope * x.signum(), 0.0, 1.0).normalize(),
             area: 0.0,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         };
         glb.taxels("taxels", Some(link), &(0..).zip(across).map(taxel).collect::<Vec<_>>(), None);
         Body::from_bytes("roof", &glb.to_bytes().unwrap()).unwrap()

@@ -22,9 +22,9 @@ mod surface_grid;
 mod surface_groups;
 mod unroll;
 
+pub use crate::body::default_u;
 pub use cell_surface::CellSurface;
 pub use cells::{COINCIDENT_M, CellPoint, Divided, Relaxation};
-pub use chart::default_u;
 pub use chart::{Chart, NoChart};
 pub use distortion::Distortion;
 pub use graph::TaxelGraph;

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::chart::{Chart, NoChart, frame};
+use super::chart::{Chart, NoChart};
 use super::distortion::Distortion;
-use crate::body::{BitsHasher, Body, ChartKind, FieldSpec, Hit, KeptOfShape, Nearest};
+use crate::body::{BitsHasher, Body, ChartKind, FieldSpec, Hit, KeptOfShape, Nearest, tangent_frame};
 use crate::error::{Result, failed};
 
 /// cos 75°: maximum angle of a member's normal from the mean.
@@ -144,11 +144,11 @@ fn complete(
         (ChartKind::Geodesic, ..) if unplaced > 0 => Err(NoChart::Unplaced(unplaced)),
         (ChartKind::Geodesic, Some(anchor), _) => {
             let origin = wanted_origin.unwrap_or(mean_position);
-            Ok((origin, frame(normal_at(shape, anchor, origin, &in_anchor), wanted_u)))
+            Ok((origin, tangent_frame(normal_at(shape, anchor, origin, &in_anchor), wanted_u)))
         }
         (ChartKind::Plane, Some(anchor), Some(normal)) if least_cosine >= MIN_NORMAL_COSINE => {
             let on_surface = || shape.0.in_link(anchor, mean_position).unwrap_or(mean_position);
-            Ok((wanted_origin.unwrap_or_else(on_surface), frame(normal, wanted_u)))
+            Ok((wanted_origin.unwrap_or_else(on_surface), tangent_frame(normal, wanted_u)))
         }
         _ => Err(NoChart::Wraps(least_cosine.clamp(-1.0, 1.0).acos())),
     };

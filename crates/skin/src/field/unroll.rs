@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
-use super::chart::{NoChart, frame};
+use super::chart::NoChart;
 use super::distortion::Distortion;
 use super::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
 use super::link_surface::Surfaces;
-use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology, area_vector};
+use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, Topology, area_vector, tangent_frame};
 
 /// Maximum bend of a path at one point, 20°.
 const MAX_BEND: f64 = PI / 9.0;
@@ -129,7 +129,7 @@ impl Patch<'_> {
     ) -> Result<FieldSpec, NoChart> {
         let Self { topology, members, places, ids, u } = self;
         let normal = area_vector(topology.corners(origin.triangle)).normalize_or(DVec3::Z);
-        let [u, ..] = frame(normal, *u);
+        let [u, ..] = tangent_frame(normal, *u);
         let part = |place: &SurfacePlace| topology.part[place.triangle as usize];
         let beyond: Vec<usize> = (0..places.len()).filter(|&i| part(&places[i]) != part(&origin)).collect();
         let id = |i: usize| ids[i];

@@ -7,6 +7,7 @@ mod keys;
 mod layer;
 mod old_names;
 mod overlay;
+mod senses;
 mod sensors;
 mod thresholds;
 
@@ -24,6 +25,7 @@ use super::drift::DriftKeys;
 use super::frame::RawValue;
 use super::fsr::FsrCircuit;
 use super::response::{FsrResponse, FsrSignal, Response};
+use super::sense::{SenseCalibration, ShearCalibration};
 use super::unit::Quantity;
 use crate::error::{Result, failed};
 
@@ -63,6 +65,8 @@ pub struct TaxelCalibration {
     pub response: Response,
     /// What P is. Gain, dead band and P_max are in its SI unit, whatever unit the file is in.
     pub quantity: Quantity,
+    /// SI units to one of the file's.
+    pub unit_factor: f64,
     /// The sensor's size relative to its cell; `None` if it is not given.
     pub sensors: Option<Sensors>,
 }
@@ -81,6 +85,7 @@ impl Default for TaxelCalibration {
             mask: false,
             response: Response::Linear,
             quantity: Quantity::Count,
+            unit_factor: 1.0,
             sensors: None,
         }
     }
@@ -114,7 +119,7 @@ pub struct Checks {
 }
 
 /// A robot's calibration, for the taxels of one body.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// The file name of its body, if given, with or without folder and extension.
     pub body: Option<String>,
@@ -136,6 +141,32 @@ pub struct Calibration {
     pub drift: DriftKeys,
     /// What the layer over the taxels makes of a contact, where that is known.
     pub layer: Option<LayerResponse>,
+    /// Of temperatures.
+    pub temperature: SenseCalibration,
+    /// Of distances.
+    pub proximity: SenseCalibration,
+    /// Of tangential forces.
+    pub shear: ShearCalibration,
+}
+
+impl Default for Calibration {
+    fn default() -> Self {
+        Self {
+            body: None,
+            taxels: Vec::new(),
+            missing: Vec::new(),
+            curves: Vec::new(),
+            contact: ContactThresholds::default(),
+            fields: BTreeMap::new(),
+            change: ChangeCalibration::default(),
+            checks: Checks::default(),
+            drift: DriftKeys::default(),
+            layer: None,
+            temperature: SenseCalibration::of_temperature(),
+            proximity: SenseCalibration::of_proximity(),
+            shear: ShearCalibration::default(),
+        }
+    }
 }
 
 impl Calibration {

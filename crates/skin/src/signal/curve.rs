@@ -132,6 +132,16 @@ impl Curve {
         Self::through(self.written.iter().map(|&[raw, p]| [raw, p - threshold]).collect())
     }
 
+    /// The curve at `raw` in double precision.
+    pub(super) fn value(&self, raw: f64) -> f64 {
+        let after = self.written.partition_point(|knot| knot[0] <= raw);
+        let [start, low] = self.written[after.saturating_sub(1)];
+        match self.written.get(after) {
+            Some(&[end, high]) if after > 0 => low + (high - low) * ((raw - start) / (end - start)),
+            _ => low,
+        }
+    }
+
     /// (raw, P) of every knot, raw rising, in single precision.
     #[must_use]
     pub fn knots(&self) -> &[[f32; 2]] {

@@ -11,10 +11,14 @@ pub struct Intake {
     /// Per taxel its neighbours, for the check of isolated values; empty if that is off.
     neighbours: Vec<Vec<u32>>,
     max_age_s: f64,
-    /// Per value of a source's frame, the taxel it belongs to.
+    /// Per channel of the body, the taxel that it is of. The first ones are the taxels' own, in their order.
+    taxel_of_channel: Vec<usize>,
+    /// Per value of a source's frame, the channel it belongs to.
     taxel_of_value: Vec<usize>,
     state: IntakeState,
-    /// Per taxel its value in this frame.
+    /// Whether the last frame was rejected.
+    is_rejected: bool,
+    /// Per channel its value in this frame.
     now: Vec<RawValue>,
     /// Per taxel its distance from rest, raw units, for the check of isolated values.
     rise: Vec<f64>,
@@ -25,40 +29,47 @@ pub struct Intake {
 /// What it knows of the frames so far.
 #[derive(Clone, Debug)]
 pub struct IntakeState {
-    /// Per taxel, the last value that arrived, and when.
+    /// Per channel, the last value that arrived, and when.
     last: Vec<(RawValue, f64)>,
     frames_seen: u64,
 }
 
 impl IntakeState {
-    /// The number of taxels.
+    /// The number of channels.
     pub fn taxels(&self) -> usize {
         self.last.len()
     }
 }
 
 impl Intake {
-    /// For the taxels of `calibration`; frames have their order until [`Intake::set_channels`] changes it.
-    pub fn new(calibration: Calibration, neighbours: Vec<Vec<u32>>, max_age_s: f64) -> Self {
-        let taxels = calibration.taxels.len();
+    /// For channels that are of these taxels of `calibration`; frames have their order until [`Intake::set_channels`] changes it.
+    pub fn new(
+        calibration: Calibration,
+        neighbours: Vec<Vec<u32>>,
+        max_age_s: f64,
+        taxel_of_channel: Vec<usize>,
+    ) -> Self {
+        let (taxels, channels) = (calibration.taxels.len(), taxel_of_channel.len());
         Self {
             calibration,
             neighbours,
             max_age_s,
-            taxel_of_value: (0..taxels).collect(),
-            state: IntakeState { last: vec![(RawValue::MISSING, 0.0); taxels], frames_seen: 0 },
-            now: vec![RawValue::MISSING; taxels],
+            taxel_of_channel,
+            taxel_of_value: (0..channels).collect(),
+            is_rejected: false,
+            state: IntakeState { last: vec![(RawValue::MISSING, 0.0); channels], frames_seen: 0 },
+            now: vec![RawValue::MISSING; channels],
             rise: vec![0.0; taxels],
             stale: None,
         }
     }
 
-    /// From now on, value i of a frame belongs to taxel `taxel_of_value[i]`.
+    /// From now on, value i of a frame belongs to channel `taxel_of_value[i]`.
     pub fn set_channels(&mut self, taxel_of_value: Vec<usize>) {
         self.taxel_of_value = taxel_of_value;
     }
 
-    /// Per value of a frame the taxel that it belongs to.
+    /// Per value of a frame the channel that it belongs to.
     pub fn taxel_of_value(&self) -> &[usize] {
         &self.taxel_of_value
     }
@@ -102,9 +113,14 @@ impl Intake {
         if checked || self.max_age_s > 0.0 || self.stale.is_some() {
             return None;
         }
+        self.places(slots).into_iter().collect()
+    }
+
+    /// The indices in a frame of the channels `slots`, of those that the source delivers.
+    pub fn places(&self, slots: &[usize]) -> Vec<Option<u32>> {
         let mut value_of = vec![None; self.now.len()];
-        for (value, &taxel) in self.taxel_of_value.iter().enumerate() {
-            value_of[taxel] = u32::try_from(value).ok();
+        for (value, &channel) in self.taxel_of_value.iter().enumerate() {
+            value_of[channel] = u32::try_from(value).ok();
         }
         slots.iter().map(|&slot| value_of[slot]).collect()
     }
@@ -121,7 +137,8 @@ impl Intake {
         self.note_stale();
         let settling = self.state.frames_seen < self.calibration.checks.settle_frames;
         self.state.frames_seen += 1;
-        if settling || self.is_broken() {
+        self.is_rejected = settling || self.is_broken();
+        if self.is_rejected {
             out.extend(
                 slots
                     .iter()
@@ -135,9 +152,18 @@ impl Intake {
         out.extend(slots.iter().map(|&slot| self.now[slot]));
     }
 
-    /// `value` of `taxel`, missing if it is one of those that the calibration calls no reading.
-    pub fn read(&self, taxel: usize, value: RawValue) -> RawValue {
-        if self.calibration.is_no_reading(taxel, value) { RawValue::MISSING } else { value }
+    /// Appends to `out` the values of the channels `slots` in the last frame taken.
+    pub fn take_more(&self, slots: &[usize], out: &mut Vec<RawValue>) {
+        let value = |&slot: &usize| match self.now[slot] {
+            value if self.is_rejected && !value.is_missing() => RawValue::FAULTY,
+            value => value,
+        };
+        out.extend(slots.iter().map(value));
+    }
+
+    /// `value` of channel `channel`, missing if it is one of those that the calibration calls no reading.
+    pub fn read(&self, channel: usize, value: RawValue) -> RawValue {
+        if self.calibration.is_no_reading(self.taxel_of_channel[channel], value) { RawValue::MISSING } else { value }
     }
 
     /// Records stale values, if they are tracked, and makes them missing.
@@ -216,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_missing_value_is_held_for_its_age_and_no_longer() {
-        let mut intake = Intake::new(Calibration::identity(3), Vec::new(), 0.5);
+        let mut intake = Intake::new(Calibration::identity(3), Vec::new(), 0.5, vec![0, 1, 2]);
         take(&mut intake, &frame(1.0, &[Some(7.0), None, Some(9.0)]));
         let held = take(&mut intake, &frame(1.5, &[None, None, Some(10.0)]));
         assert_eq!(numbers(&held), [Some(7.0), None, Some(10.0)]);
@@ -227,7 +253,7 @@ mod tests {
 
     #[test]
     fn what_is_stale_is_missing_and_noted() {
-        let mut intake = Intake::new(Calibration::identity(3), Vec::new(), 0.0);
+        let mut intake = Intake::new(Calibration::identity(3), Vec::new(), 0.0, vec![0, 1, 2]);
         assert!(intake.picks(&[0, 1]).is_some() && intake.stale().is_empty());
         intake.track_stale();
         assert!(intake.picks(&[0, 1]).is_none());
@@ -243,12 +269,12 @@ mod tests {
     #[test]
     fn a_raw_value_that_is_not_a_reading_is_missing_and_held_as_such() {
         let calibration = Calibration::parse("[taxel.2]\nmissing = [30000]", &[1, 2, 3]).unwrap();
-        let mut intake = Intake::new(calibration.clone(), Vec::new(), 0.0);
+        let mut intake = Intake::new(calibration.clone(), Vec::new(), 0.0, vec![0, 1, 2]);
         assert!(intake.picks(&[0, 1, 2]).is_none());
         let codes = frame(0.0, &[Some(30_000.0), Some(30_000.0), None]);
         assert_eq!(numbers(&take(&mut intake, &codes)), [Some(30_000.0), None, None]);
         assert!(take(&mut intake, &codes)[1].is_missing());
-        let mut held = Intake::new(calibration, Vec::new(), 0.5);
+        let mut held = Intake::new(calibration, Vec::new(), 0.5, vec![0, 1, 2]);
         take(&mut held, &frame(0.0, &[None, Some(7.0), None]));
         assert_eq!(take(&mut held, &codes)[1].number(), Some(7.0));
     }
@@ -256,7 +282,7 @@ mod tests {
     #[test]
     fn a_garbled_frame_and_a_settling_one_are_not_believed() {
         let text = "[all]\nraw_range = [0, 100]\n[checks]\nsettle_frames = 1\nbroken_frame_share = 0.4";
-        let mut intake = Intake::new(Calibration::parse(text, &[1, 2, 3]).unwrap(), Vec::new(), 0.0);
+        let mut intake = Intake::new(Calibration::parse(text, &[1, 2, 3]).unwrap(), Vec::new(), 0.0, vec![0, 1, 2]);
         let fine = frame(0.0, &[Some(1.0), Some(200.0), None]);
         assert_eq!(take(&mut intake, &fine), [RawValue::FAULTY, RawValue::FAULTY, RawValue::MISSING]);
         let one_of_three = frame(0.0, &[Some(1.0), Some(200.0), Some(3.0)]);
@@ -269,7 +295,7 @@ mod tests {
     fn a_hot_taxel_without_company_is_not_believed() {
         let text = "[checks]\nisolated_ratio = 5\nisolated_above = 50";
         let calibration = Calibration::parse(text, &[1, 2, 3]).unwrap();
-        let mut intake = Intake::new(calibration, vec![vec![1], vec![0, 2], vec![1]], 0.0);
+        let mut intake = Intake::new(calibration, vec![vec![1], vec![0, 2], vec![1]], 0.0, vec![0, 1, 2]);
         let hot = take(&mut intake, &frame(0.0, &[Some(10.0), Some(100.0), Some(19.0)]));
         assert_eq!(numbers(&hot), [Some(10.0), None, Some(19.0)]);
         let in_company = take(&mut intake, &frame(0.0, &[Some(10.0), Some(100.0), Some(21.0)]));

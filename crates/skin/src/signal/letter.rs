@@ -1,4 +1,4 @@
-//! Letters: combinations of a receptor (the pressure itself, or its change) and one of the paper's two signals.
+//! Letters: what of a kind of taxel is felt, such as the pressure itself or its change; pressures in one of the paper's two signals.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,9 +6,10 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use super::FsrSignal;
+use crate::body::Modality;
 use crate::error::{Error, Result, nearest};
 
-/// The quantity of a sensor's pressure P that a letter is made of.
+/// What of its taxels a letter is made of. Each is for the taxels of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Receptor {
@@ -18,11 +19,40 @@ pub enum Receptor {
     /// |P(t) − P(t − Δt)| / Δt, P per second, like rapidly adapting Meissner corpuscles. Both pressures use the present
     /// calibration.
     Change,
+    /// The tangential forces of taxels with three axes.
+    Shear,
+    /// Temperatures.
+    Temperature,
+    /// Distances of what comes near.
+    Proximity,
 }
 
 impl Receptor {
     /// The receptors' names, as the command line and NDJSON spell them.
-    pub const NAMES: [(&'static str, Self); 2] = [("sustained", Self::Sustained), ("change", Self::Change)];
+    pub const NAMES: [(&'static str, Self); 5] = [
+        ("sustained", Self::Sustained),
+        ("change", Self::Change),
+        ("shear", Self::Shear),
+        ("temperature", Self::Temperature),
+        ("proximity", Self::Proximity),
+    ];
+
+    /// Whether it is made of pressures, which backends compute; the others are the host's, in double precision on every backend.
+    #[must_use]
+    pub fn is_of_pressure(self) -> bool {
+        matches!(self, Self::Sustained | Self::Change)
+    }
+
+    /// Whether it is made of taxels of this kind.
+    #[must_use]
+    pub fn reads(self, modality: Modality) -> bool {
+        match self {
+            Self::Sustained | Self::Change => modality.is_pressed(),
+            Self::Shear => modality == Modality::Force3,
+            Self::Temperature => modality == Modality::Temperature,
+            Self::Proximity => modality == Modality::Proximity,
+        }
+    }
 }
 
 impl fmt::Display for Receptor {
@@ -39,7 +69,7 @@ impl FromStr for Receptor {
         found.map(|(_, receptor)| receptor).ok_or_else(|| {
             let hint = match nearest(name, Self::NAMES.map(|(known, _)| known)) {
                 Some(near) => format!("did you mean `{near}`?"),
-                None => "there are sustained and change".to_owned(),
+                None => format!("there are {}", Self::NAMES.map(|(known, _)| known).join(", ")),
             };
             Error::usage(format!("there is no letter `{name}`; {hint}"))
         })
@@ -58,12 +88,16 @@ pub struct Letter {
 }
 
 impl Letter {
-    /// Every receptor with every signal, receptor by receptor; with the calibration's own signal where `signals` is empty.
+    /// Every receptor with every signal, receptor by receptor; with the calibration's own signal where `signals` is empty. What is not
+    /// made of pressures has no signal.
     #[must_use]
     pub fn all_of(receptors: &[Receptor], signals: &[FsrSignal]) -> Vec<Self> {
         let signals: Vec<Option<FsrSignal>> =
             if signals.is_empty() { vec![None] } else { signals.iter().copied().map(Some).collect() };
-        let with = |&receptor: &Receptor| signals.iter().map(move |&signal| Self { receptor, signal });
+        let with = |&receptor: &Receptor| {
+            let own = if receptor.is_of_pressure() { &signals[..] } else { &[None] };
+            own.iter().map(move |&signal| Self { receptor, signal })
+        };
         receptors.iter().flat_map(with).collect()
     }
 
@@ -139,6 +173,6 @@ mod tests {
         }
         let why = |name: &str| name.parse::<Receptor>().unwrap_err().to_string();
         assert!(why("chnage").ends_with("did you mean `change`?"), "{}", why("chnage"));
-        assert!(why("pain").ends_with("there are sustained and change"));
+        assert!(why("pain").contains("there are sustained, change, shear"), "{}", why("pain"));
     }
 }

@@ -3,6 +3,7 @@
 mod block;
 mod board_health;
 mod calibration;
+mod channel;
 mod curve;
 mod drift;
 mod frame;
@@ -11,6 +12,7 @@ mod fsr;
 mod intake;
 mod letter;
 mod response;
+mod sense;
 mod unit;
 mod wiring;
 
@@ -20,6 +22,7 @@ pub use calibration::{
     Calibration, ChangeCalibration, Checks, ContactThresholds, LaidOver, LayerResponse, Onset, Sensors,
     TaxelCalibration,
 };
+pub use channel::{Axis, Channel};
 pub use curve::Curve;
 pub use curve::slope;
 pub use drift::{DriftCompensation, Kept, MIN_UNTOUCHED};
@@ -30,5 +33,6 @@ pub use fsr::FsrCircuit;
 pub use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};
 pub use response::{FsrResponse, FsrSignal, Response};
+pub use sense::{Reading, Sense, SenseCalibration, SenseResponse, ShearCalibration};
 pub use unit::{Quantity, UnitOfP};
 pub use wiring::{WiredBoard, Wiring};

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write as _};
 
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, OutputPath};
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Channel, Frame, RawValue};
 
 /// Writes a CSV recording; the file appears when it is finished.
 pub struct CsvFile {
@@ -22,7 +22,7 @@ impl CsvFile {
         let file = BufWriter::with_capacity(1 << 16, output.begin()?);
         let mut file = Self { file, line: "t".to_owned() };
         for id in ids {
-            let _ = write!(file.line, ",{id}");
+            let _ = write!(file.line, ",{}", Channel(*id));
         }
         file.write_line()?;
         Ok(file)

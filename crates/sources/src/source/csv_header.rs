@@ -9,6 +9,7 @@ use super::column_names::{grid_of, is_beside_sensors};
 use super::csv_cells::{number, shortened, trimmed};
 use super::time_column::{TimeColumn, calendar, unit_in_head};
 use crate::error::{Error, Result, failed};
+use crate::signal::Channel;
 
 /// Rows below the first that tell whether that is a frame.
 pub(super) const ROWS_BELOW: usize = 3;
@@ -53,7 +54,7 @@ pub(super) fn read(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> 
         notes: Vec::new(),
     };
     let skipped = usize::from(header.time.is_some());
-    let has_ids = first.iter().skip(skipped).any(|cell| word(cell).parse::<u32>().is_ok());
+    let has_ids = first.iter().skip(skipped).any(|cell| Channel::named(&word(cell)).is_some());
     let mut columns = HashMap::new();
     for (index, cell) in first.iter().enumerate().skip(skipped) {
         if has_ids && is_beside_sensors(&word(cell)) {
@@ -64,7 +65,11 @@ pub(super) fn read(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> 
         }
         let id = header_id(index + 1, cell, || way_out(first, below, skipped))?;
         if let Some(before) = columns.insert(id, index + 1) {
-            return Err(failed!("taxel {id} heads columns {before} and {}; give each taxel one column", index + 1));
+            return Err(failed!(
+                "taxel {} heads columns {before} and {}; give each taxel one column",
+                Channel(id),
+                index + 1
+            ));
         }
         header.taxels.push(id);
     }
@@ -190,8 +195,8 @@ fn way_out(first: &ByteRecord, below: &[ByteRecord], skipped: usize) -> String {
 /// The taxel id that heads column `column`, counted from 1.
 fn header_id(column: usize, cell: &[u8], way_out: impl FnOnce() -> String) -> Result<u32> {
     let word = word(cell);
-    if let Ok(id) = word.parse() {
-        return Ok(id);
+    if let Some(channel) = Channel::named(&word) {
+        return Ok(channel.0);
     }
     let remedy = if cell.starts_with(b"\xFF\xFE") || cell.starts_with(b"\xFE\xFF") {
         "the file is UTF-16; save it as UTF-8".to_owned()

@@ -22,7 +22,7 @@ use super::skipped_bad::SkippedBad;
 use super::unknown_taxels::UnknownTaxels;
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_LINE_BYTES;
-use crate::signal::{Frame, Pose, RawValue};
+use crate::signal::{Axis, Channel, Frame, Pose, RawValue};
 
 /// Frames read from NDJSON.
 pub struct NdjsonSource {
@@ -264,7 +264,7 @@ impl<'de> Visitor<'de> for ValuesVisitor<'_> {
         f.write_str("values by taxel id, {\"<taxel id>\":number}")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+    fn visit_map<A: MapAccess<'de>>(mut self, mut map: A) -> Result<(), A::Error> {
         while let Some(id) = map.next_key_seed(Parse(IdVisitor))? {
             let Some(&index) = self.taxels.index.get(&id) else {
                 self.taxels.unknown.check(id).map_err(A::Error::custom)?;
@@ -275,12 +275,43 @@ impl<'de> Visitor<'de> for ValuesVisitor<'_> {
                 continue;
             };
             if std::mem::replace(&mut self.taxels.last_line[index], self.line) == self.line {
-                return Err(A::Error::custom(format!("taxel {id} appears twice; give each taxel once")));
+                return Err(A::Error::custom(format!("taxel {} appears twice; give each taxel once", Channel(id))));
             }
-            self.frame.values[index] = map.next_value_seed(Parse(ValueVisitor { id }))?;
+            match map.next_value_seed(Parse(ValueVisitor { id }))? {
+                Given::One(value) => self.frame.values[index] = value,
+                Given::Three(values) => self.take_three(id, values).map_err(A::Error::custom)?,
+            }
         }
         Ok(())
     }
+}
+
+impl ValuesVisitor<'_> {
+    /// Takes the values of a taxel with three axes: along the normal, t and n × t.
+    fn take_three(&mut self, id: u32, values: [RawValue; 3]) -> Result<(), String> {
+        for (axis, value) in [Axis::Normal, Axis::U, Axis::V].into_iter().zip(values) {
+            let channel = Channel::of_taxel(Channel(id).taxel(), axis);
+            let own = self.taxels.index.get(&channel.0).filter(|_| Channel(id).axis() == Axis::Normal);
+            let Some(&index) = own else {
+                return Err(format!(
+                    "taxel {} has one value, and three are given; its modality is not force3",
+                    Channel(id)
+                ));
+            };
+            if axis != Axis::Normal && std::mem::replace(&mut self.taxels.last_line[index], self.line) == self.line {
+                return Err(format!("taxel {channel} appears twice; give each taxel once"));
+            }
+            self.frame.values[index] = value;
+        }
+        Ok(())
+    }
+}
+
+/// What a taxel has in a line.
+enum Given {
+    One(RawValue),
+    /// Along the normal, t and n × t.
+    Three([RawValue; 3]),
 }
 
 struct IdVisitor;
@@ -293,7 +324,7 @@ impl Visitor<'_> for IdVisitor {
     }
 
     fn visit_str<E: serde::de::Error>(self, key: &str) -> Result<u32, E> {
-        key.parse().map_err(|_| {
+        Channel::named(key).map(|channel| channel.0).ok_or_else(|| {
             E::custom(format!("`{key}` is not a taxel id; ids are whole numbers in quotes, as in {EXAMPLE}"))
         })
     }
@@ -303,38 +334,53 @@ struct ValueVisitor {
     id: u32,
 }
 
-impl Visitor<'_> for ValueVisitor {
-    type Value = RawValue;
+impl<'de> Visitor<'de> for ValueVisitor {
+    type Value = Given;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a number, null, \"nan\" or \"inf\" for taxel {}", self.id)
+        write!(f, "a number, null, \"nan\" or \"inf\" for taxel {}", Channel(self.id))
     }
 
-    fn visit_f64<E>(self, value: f64) -> Result<RawValue, E> {
-        Ok(RawValue::new(value))
+    fn visit_f64<E>(self, value: f64) -> Result<Given, E> {
+        Ok(Given::One(RawValue::new(value)))
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<RawValue, E> {
-        Ok(RawValue::new(value as f64))
+    fn visit_i64<E>(self, value: i64) -> Result<Given, E> {
+        Ok(Given::One(RawValue::new(value as f64)))
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<RawValue, E> {
-        Ok(RawValue::new(value as f64))
+    fn visit_u64<E>(self, value: u64) -> Result<Given, E> {
+        Ok(Given::One(RawValue::new(value as f64)))
     }
 
-    fn visit_unit<E>(self) -> Result<RawValue, E> {
-        Ok(RawValue::MISSING)
+    fn visit_unit<E>(self) -> Result<Given, E> {
+        Ok(Given::One(RawValue::MISSING))
     }
 
-    fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<RawValue, E> {
+    fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Given, E> {
         let unsigned = word.strip_prefix('-').unwrap_or(word);
         if unsigned.eq_ignore_ascii_case("nan") || unsigned.eq_ignore_ascii_case("inf") {
-            return Ok(RawValue::FAULTY);
+            return Ok(Given::One(RawValue::FAULTY));
         }
         Err(E::custom(format!(
             "taxel {} is `{word}`; give a number without quotes, null where it is missing, \"nan\" where it is faulty",
-            self.id
+            Channel(self.id)
         )))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Given, A::Error> {
+        let wrong = || {
+            let name = Channel(self.id);
+            A::Error::custom(format!("taxel {name} has an array; give one number, or three: along its normal, u and v"))
+        };
+        let mut values = [RawValue::MISSING; 3];
+        for value in &mut values {
+            let Some(Given::One(own)) = seq.next_element_seed(Parse(ValueVisitor { id: self.id }))? else {
+                return Err(wrong());
+            };
+            *value = own;
+        }
+        if seq.next_element::<IgnoredAny>()?.is_some() { Err(wrong()) } else { Ok(Given::Three(values)) }
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use crate::signal::Channel;
+
 /// Maximum number of ids to remember, so that invalid input does not fill the memory.
 const MAX_IDS: usize = 10_000;
 /// Maximum number of ids listed in a message.
@@ -21,7 +23,7 @@ pub(super) struct UnknownTaxels {
 impl UnknownTaxels {
     /// An error for the unknown taxel `id`, if it is to be one.
     pub(super) fn check(&self, id: u32) -> Result<(), String> {
-        let what = || format!("the body has no taxel {id}; leave it out, or give the body that has it");
+        let what = || format!("the body has no taxel {}; leave it out, or give the body that has it", Channel(id));
         if self.refused { Err(what()) } else { Ok(()) }
     }
 
@@ -58,7 +60,7 @@ impl UnknownTaxels {
 /// The first few of `ids`, and how many more there are.
 fn named(ids: impl ExactSizeIterator<Item = u32>) -> String {
     let more = ids.len().saturating_sub(MAX_LISTED_IDS);
-    let names: Vec<String> = ids.take(MAX_LISTED_IDS).map(|id| id.to_string()).collect();
+    let names: Vec<String> = ids.take(MAX_LISTED_IDS).map(|id| Channel(id).to_string()).collect();
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     format!("{}{more}", names.join(", "))
 }

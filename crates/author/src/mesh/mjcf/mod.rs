@@ -191,6 +191,7 @@ fn on_vertices(places: &Places<'_>, sensor: &MjSensor, geom: &str, mesh: &str) -
             normal_in_link: own.body_from_geom.transform_vector3(normal).normalize(),
             area,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         };
         placed.push((index as u32, body, taxel));
     }
@@ -244,6 +245,7 @@ fn in_bins(places: &mut Places<'_>, sensor: &MjSensor, site: &str, grid: &TouchG
             normal_in_link: body_from_world.transform_vector3(exit.normal).normalize(),
             area,
             modality: Modality::Pressure,
+            tangent_in_link: None,
         };
         placed.push((index, on, taxel));
     }

@@ -69,7 +69,7 @@ fn run_rows(plan: &Plan, level: Level, rows: Rows<'_>, frames: usize, at_once: u
     let mut cpu = Cpu::with_level(plan, level);
     let mut percepts = Percepts::new(plan.outputs, plan.fields.len(), Precision::F32)
         .with_columns(plan.columns, plan.kept_pressures())
-        .with_letters(plan.letters().len());
+        .with_letters(plan.letter_by_field());
     percepts.reset(frames);
     let steps = vec![Step { dt_s: 0.01, flags: Flags::empty() }; frames];
     for first in (0..frames).step_by(at_once) {
@@ -145,6 +145,7 @@ fn sheet(taxels: u32) -> Body {
         normal_in_link: if id < FOLD { DVec3::Y } else { -DVec3::Y },
         area: 25e-6,
         modality: Modality::Pressure,
+        tangent_in_link: None,
     };
     let field = |first: u32| FieldSpec {
         name: format!("field {first}"),

@@ -9,6 +9,7 @@ use super::super::curves::Curves;
 use super::super::left_out::{LeftOut, is_pressure, pressed_members};
 use super::super::members::{parts, quantity_of, surface, thresholds, unit_of, weights};
 use super::super::onset::softened;
+use super::super::senses::{Senses, letters_and_outputs};
 use super::super::stages::Stages;
 use super::super::{Coordinates, Scene, choose_fields};
 use super::{Plan, PlanField};
@@ -30,12 +31,21 @@ impl Plan {
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         check(body, fields, scene, calibration)?;
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
-        let left_out = LeftOut::from_fields(body, &chosen, fields);
+        let outputs = scene.knobs.orientation_by.applied(scene.outputs);
+        let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, outputs)?;
+        let left_out = LeftOut::from_fields(body, &chosen, fields, &letters);
         let chosen = left_out.feeling(body, chosen, fields)?;
-        let mut plan = Self::without_fields(body, scene, calibration, read(body, fields, scene, &chosen))?;
+        // Nobody named letters, and there are no pressures to find touches in.
+        let feels_pressure = !letters.is_empty() && letters.iter().any(|letter| letter.receptor.is_of_pressure());
+        let touches = scene.asked_touches().filter(|_| feels_pressure || !scene.letters.is_empty());
+        let read = read(body, fields, touches.is_some(), &chosen);
+        let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
+        plan.senses = Senses::new(body, fields, &chosen, &letters, calibration);
+        plan.letters = letters;
+        plan.touch_outputs = touches.map(|touches| touches.outputs);
         plan.left_out = left_out;
         let first_slots = plan.lay_out_slots(calibration)?;
-        if scene.asked_touches().is_some() {
+        if touches.is_some() {
             plan.find_touches(&first_slots)?;
         }
         plan.note_what_is_felt();
@@ -52,7 +62,7 @@ impl Plan {
         let mut made =
             FieldsMade { fields: Vec::with_capacity(chosen.len() * plan.letters.len()), members: Vec::new() };
         for index in chosen {
-            made.add(&plan, &from, index, &pressed_members(body, &fields.fields[index]))?;
+            made.add(&plan, &from, index, &fields.fields[index])?;
         }
         plan.take_fields(made);
         plan.choose_columns();
@@ -60,14 +70,25 @@ impl Plan {
     }
 
     /// A plan that reads `body_taxels` and has no fields yet.
-    fn without_fields(body: &Body, scene: &Scene, calibration: &Calibration, body_taxels: Vec<usize>) -> Result<Self> {
-        let outputs = scene.knobs.orientation_by.applied(scene.outputs);
-        let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibration.taxels[taxel]));
+    fn without_fields(
+        body: &Body,
+        scene: &Scene,
+        calibration: &Calibration,
+        body_taxels: Vec<usize>,
+        outputs: Outputs,
+    ) -> Result<Self> {
+        let calibrated = |taxel: usize| {
+            // Backends have a channel at least.
+            let mask = calibration.taxels[taxel].mask || !is_pressure(body, taxel);
+            TaxelCalibration { mask, ..calibration.taxels[taxel] }
+        };
+        let (calibrations, onsets) = softened(body_taxels.iter().map(|&taxel| calibrated(taxel)));
         Ok(Self {
             outputs,
             stages: Stages::for_outputs(outputs),
             columns: outputs,
-            letters: scene.letters.clone(),
+            letters: Vec::new(),
+            senses: Senses::default(),
             knobs: scene.knobs,
             relative_to: scene.checked_link(body)?,
             change_dead_band: calibration.change.dead_band,
@@ -80,7 +101,7 @@ impl Plan {
             curves: Curves::default(),
             feels_from: Vec::new(),
             touched_from: None,
-            touch_outputs: scene.asked_touches().map(|touches| touches.outputs),
+            touch_outputs: None,
             spread_slots: Vec::new(),
             heaviest: Vec::new(),
             left_out: LeftOut::default(),
@@ -129,7 +150,9 @@ fn check(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibratio
         return Err(Error::failed("the body has no fields: add some with `somatic author`").at(&body.name));
     }
     calibration.check_body(&body.name)?;
-    Letter::check(&scene.letters)?;
+    if !scene.letters.is_empty() {
+        Letter::check(&scene.letters)?;
+    }
     let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
     scene.knobs.check(scene.outputs, has_changes, scene.touches.is_some())?;
     scene.check_world()?;
@@ -149,12 +172,13 @@ fn check(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibratio
     Ok(())
 }
 
-/// The taxels of `body` that are read: those of the `chosen` fields, and with touches all that feel pressure.
-fn read(body: &Body, fields: &FieldSet, scene: &Scene, chosen: &[usize]) -> Vec<usize> {
+/// The taxels of `body` whose pressures are read: those of the `chosen` fields, and with touches all. Where none feels pressure, the
+/// first taxel stands for one.
+fn read(body: &Body, fields: &FieldSet, has_touches: bool, chosen: &[usize]) -> Vec<usize> {
     let of_fields = chosen.iter().flat_map(|&f| fields.fields[f].members.iter().map(|member| member.taxel));
-    let of_touches = (0..body.taxels.len()).filter(|_| scene.asked_touches().is_some());
+    let of_touches = (0..body.taxels.len()).filter(|_| has_touches);
     let read: BTreeSet<usize> = of_fields.chain(of_touches).filter(|&taxel| is_pressure(body, taxel)).collect();
-    read.into_iter().collect()
+    if read.is_empty() { vec![0] } else { read.into_iter().collect() }
 }
 
 /// What fields are made of.
@@ -177,19 +201,32 @@ struct FieldsMade {
 }
 
 impl FieldsMade {
-    /// Adds `field`, the body's field `index` with the members that feel pressure, in every letter.
+    /// Adds `field`, the body's field `index`, in every letter that its taxels have.
     fn add(&mut self, plan: &Plan, from: &Sources<'_>, index: usize, field: &Field) -> Result<()> {
-        let in_first = made_in_first_letter(plan, from, index, field)?;
+        let pressed = pressed_members(from.body, field);
+        let shape = if pressed.members.is_empty() { field } else { &pressed };
+        let in_first = made_in_first_letter(plan, from, index, shape)?;
         let channel_of = |taxel: usize| plan.body_taxels.binary_search(&taxel).expect("its field was chosen") as u32;
         for (letter, &first_slot) in from.first_slots.iter().enumerate() {
+            let receptor = plan.letters[letter].receptor;
+            if !receptor.is_of_pressure() {
+                let sensed = plan.senses.members(from.body, field, receptor);
+                if !sensed.is_empty() {
+                    self.fields.push(in_first.clone().of_senses(letter, self.members.len(), sensed));
+                }
+                continue;
+            }
+            if pressed.members.is_empty() {
+                continue;
+            }
             // The same in every letter, but for what it reads and when it counts as touched.
             let in_letter = PlanField {
                 letter,
                 first: self.members.len(),
-                thresholds: thresholds(from.calibration, &field.name, plan.letters[letter].receptor),
+                thresholds: thresholds(from.calibration, &field.name, receptor),
                 ..in_first.clone()
             };
-            self.members.extend(field.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
+            self.members.extend(pressed.members.iter().zip(&in_letter.places).map(|(member, place)| layout::Member {
                 slot: first_slot + channel_of(member.taxel),
                 weight: member.weight as f32,
                 u: place.x as f32,
@@ -230,6 +267,7 @@ fn made_in_first_letter(plan: &Plan, from: &Sources<'_>, index: usize, field: &F
         origin_in_anchor: field.origin_in_anchor,
         chart: field.chart.as_ref().ok().cloned(),
         no_chart: field.chart.as_ref().err().cloned(),
+        sensed: Arc::default(),
         surface: plan.stages.position.then(|| surface(nearest, kept, field)).flatten(),
         spacing: field.spacing_m() / f64::from(unit_m),
         places,

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::places::{header, vector};
 use super::readings::Readings;
-use crate::body::{Body, Modality};
+use crate::body::Body;
 use crate::percept;
 use crate::robot::messages::{Wrench, WrenchStamped};
 use crate::scene::Plan;
@@ -69,7 +69,7 @@ impl LinkWrenches {
         let mut is_sent = vec![false; body.taxels.len()];
         sent.iter().flatten().for_each(|&taxel| is_sent[taxel] = true);
         let mut of_links = vec![Vec::new(); body.links.len()];
-        for (index, taxel) in body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality == Modality::Pressure) {
+        for (index, taxel) in body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality.is_pressed()) {
             of_links[taxel.link].push(index);
         }
         let (mut links, mut unknown) = (Vec::new(), BTreeMap::<Unknown, Vec<&str>>::new());

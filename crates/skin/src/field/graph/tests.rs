@@ -8,7 +8,7 @@ use crate::body::{Glb, MeshData, Modality, Taxel};
 const PITCH: f64 = 0.01;
 
 fn taxel(id: u32, position_in_link: DVec3, normal_in_link: DVec3, area: f64) -> Taxel {
-    Taxel { id, link: 0, position_in_link, normal_in_link, area, modality: Modality::Pressure }
+    Taxel { id, link: 0, position_in_link, normal_in_link, area, modality: Modality::Pressure, tangent_in_link: None }
 }
 
 /// A link with `meshes` and `taxels`, and beside it another with `beyond`.

@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
 use super::layer::LayerKeys;
+use super::senses::{ProximityKeys, ShearKeys, TemperatureKeys};
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
 use crate::error::{Error, Result, failed};
@@ -34,6 +35,12 @@ struct File {
     #[serde(default)]
     drift: DriftKeys,
     layer: Option<LayerKeys>,
+    #[serde(default)]
+    temperature: TemperatureKeys,
+    #[serde(default)]
+    proximity: ProximityKeys,
+    #[serde(default)]
+    shear: ShearKeys,
 }
 
 impl Calibration {
@@ -66,6 +73,9 @@ impl Calibration {
         let mut missing = vec![file.all.missing(text)?.unwrap_or_default(); ids.len()];
         let mut named: Vec<_> = file.taxel.into_iter().collect();
         named.sort_by_key(|(id, _)| id.span().start);
+        let mut temperature = file.temperature.read((&curves, &names), text)?;
+        let mut proximity = file.proximity.read((&curves, &names), text)?;
+        let mut shear = file.shear.read(text)?;
         let mut table_of = HashMap::new();
         for (id, keys) in named {
             let index = id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
@@ -87,6 +97,10 @@ impl Calibration {
                 missing[index] = codes;
             }
             drafts[index].apply(&keys, &names, text)?;
+            for sense in [&mut temperature, &mut proximity] {
+                keys.sense(index, sense, (&curves, &names), text)?;
+            }
+            keys.shear(index, &mut shear, text)?;
             only_for_fsr(&keys, drafts[index].is_fsr(), text)?;
         }
         only_for_fsr(&file.all, all.is_fsr() || drafts.iter().any(Draft::is_fsr), text)?;
@@ -104,7 +118,8 @@ impl Calibration {
         let change = file.change.read(text)?.times(factor);
         let layer = file.layer.map(|keys| keys.read(text)).transpose()?;
         let File { body, checks, drift, .. } = file;
-        Ok(Self { body, taxels, missing, curves, contact, fields, change, checks, drift, layer })
+        let senses = Self { temperature, proximity, shear, ..Self::default() };
+        Ok(Self { body, taxels, missing, curves, contact, fields, change, checks, drift, layer, ..senses })
     }
 }
 

@@ -3,12 +3,14 @@
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::senses::{Curves, baselines_of, curve_called, gain_of};
 use super::{Onset, Sensors, TaxelCalibration};
 use crate::error::{Error, Result, nearest};
 use crate::keys::Text;
 use crate::signal::curve::{Column, Curve};
 use crate::signal::fsr::FsrCircuit;
 use crate::signal::response::{FsrResponse, GAIN_RANGE, MAX_MAGNITUDE, Response};
+use crate::signal::sense::{SenseCalibration, SenseResponse, ShearCalibration};
 use crate::signal::unit::UnitOfP;
 
 /// Most raw values that `missing` may list: every value of every frame is compared with each.
@@ -36,6 +38,8 @@ pub(super) struct Keys {
     wiper: Option<Spanned<i64>>,
     signal: Option<Spanned<String>>,
     full_scale_newton: Option<Spanned<f64>>,
+    shear_baseline: Option<Spanned<[f64; 2]>>,
+    shear_gain: Option<Spanned<f64>>,
 }
 
 impl Keys {
@@ -51,6 +55,45 @@ impl Keys {
             raw => Err(text.wrong(code.span(), format!("`missing` has {raw}; its values must be finite raw values"))),
         };
         codes.get_ref().iter().map(code).collect::<Result<_>>().map(Some)
+    }
+
+    /// Lays the keys of the body's taxel `taxel` over those of its sense, whichever that is.
+    pub(super) fn sense(
+        &self,
+        taxel: usize,
+        senses: &mut SenseCalibration,
+        curves: Curves<'_>,
+        text: Text<'_>,
+    ) -> Result<()> {
+        let mut own = senses.all.clone();
+        if let Some(baseline) = &self.baseline {
+            own.baseline = *baseline.get_ref();
+        }
+        if let Some(gain) = &self.gain {
+            own.gain *= gain.get_ref() / senses.written_gain;
+        }
+        if let Some(curve) = &self.curve {
+            own.response = SenseResponse::Curve(curve_called(curve, curves, text)?);
+        }
+        if let Some(range) = &self.raw_range {
+            own.raw_range = *range.get_ref();
+        }
+        own.mask = self.mask.unwrap_or(own.mask);
+        if own != senses.all {
+            senses.own.insert(taxel, own);
+        }
+        Ok(())
+    }
+
+    /// The same of its tangential forces.
+    pub(super) fn shear(&self, taxel: usize, shear: &mut ShearCalibration, text: Text<'_>) -> Result<()> {
+        if let Some(baselines) = &self.shear_baseline {
+            shear.own_baselines.insert(taxel, baselines_of("shear_baseline", baselines, text)?);
+        }
+        if let Some(gain) = &self.shear_gain {
+            shear.own_gains.insert(taxel, gain_of("shear_gain", gain, text)?);
+        }
+        Ok(())
     }
 
     /// Refuses keys that hold for all taxels alike under a single one.
@@ -280,6 +323,7 @@ impl Draft {
             }
         }
         taxel.quantity = self.unit.quantity;
+        taxel.unit_factor = self.unit.factor;
         taxel.gain *= self.unit.factor;
         taxel.dead_band *= self.unit.factor;
         if taxel.p_max < f64::from(f32::MAX) {

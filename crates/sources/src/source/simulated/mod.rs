@@ -42,7 +42,7 @@ use self::setup::Setup;
 use self::whole::{BodySkin, Covers};
 use self::whole_truth::{Moment, TouchOfBody};
 use super::Source;
-use crate::body::{Body, Modality, Taxel};
+use crate::body::{Body, Taxel};
 use crate::bundled;
 use crate::error::{Error, ErrorKind, Result, failed};
 use crate::field::{FieldSet, Lattice};
@@ -162,7 +162,7 @@ impl SimulatedSource {
             let what = format!("`duration_s` and `rate_hz` make {frames:e} frames; that is too many");
             return Err(text.wrong(file.duration_s.span(), what));
         }
-        let pressure = || body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality == Modality::Pressure);
+        let pressure = || body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality.is_pressed());
         let ids: Vec<u32> = pressure().map(|(_, taxel)| taxel.id).collect();
         if ids.is_empty() {
             return Err(failed!("the body `{}` has no pressure taxels", body.name));

@@ -227,6 +227,7 @@ mod tests {
                 normal_in_link: DVec3::Z,
                 area: 1e-4,
                 modality: Modality::Pressure,
+                tangent_in_link: None,
             })
             .collect();
         let taxels: Vec<(usize, f64)> = (0..body.taxels.len()).map(|taxel| (taxel, 0.01)).collect();

@@ -1,0 +1,229 @@
+//! Senses beside pressure: how raw values become temperatures, distances and tangential forces. In double precision.
+//!
+//! Temperature: T = gain · r(raw − baseline) + offset, in °C. Distance: the same in m. r is the raw value itself, a table, or
+//! the temperature of a thermistor in a divider, by its B parameter: 1/T = 1/298.15 K + ln(R/R₂₅)/B.
+
+use std::collections::BTreeMap;
+
+use super::curve::Curve;
+use super::frame::RawValue;
+
+/// 0 °C, K.
+pub(super) const ZERO_CELSIUS_K: f64 = 273.15;
+/// Sizes beyond which a raw value is not believed, as of pressures.
+const UNBELIEVABLE: f64 = 1_152_921_504_606_846_976.0;
+
+/// What a raw value is in a sense.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reading {
+    /// °C, m, or the unit of P; and whether the raw value is in the sensor's range.
+    Value(f64, bool),
+    /// No value arrived.
+    Missing,
+    /// It is not a number, or its taxel is masked.
+    Faulty,
+}
+
+/// The conversion of one taxel's raw values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sense {
+    /// Raw value at 0.
+    pub baseline: f64,
+    /// °C or m for each raw unit, or what the response is multiplied by.
+    pub gain: f64,
+    /// What is added, °C or m.
+    pub offset: f64,
+    /// The response before the gain.
+    pub response: SenseResponse,
+    /// The range of raw values; others are flagged `out_of_range`.
+    pub raw_range: [f64; 2],
+    /// Ignore this taxel.
+    pub mask: bool,
+    /// Raw values that are no readings, in single precision as raw values are.
+    pub missing: Vec<f32>,
+}
+
+/// What a raw value above the baseline is, before the gain.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum SenseResponse {
+    /// Itself.
+    #[default]
+    Linear,
+    /// A table.
+    Curve(Curve),
+    /// A thermistor to ground under a resistor to the reference voltage, °C.
+    Ntc {
+        /// Its resistance at 25 °C, Ω.
+        ohm_at_25: f64,
+        /// Its B parameter, K.
+        b_k: f64,
+        /// The resistor above it, Ω.
+        series_ohm: f64,
+        /// The raw value of the reference voltage.
+        full_raw: f64,
+    },
+}
+
+impl Default for Sense {
+    fn default() -> Self {
+        Self {
+            baseline: 0.0,
+            gain: 1.0,
+            offset: 0.0,
+            response: SenseResponse::Linear,
+            raw_range: [f64::NEG_INFINITY, f64::INFINITY],
+            mask: false,
+            missing: Vec::new(),
+        }
+    }
+}
+
+impl SenseResponse {
+    /// At `above`, the raw value above the baseline; `None` where it has none.
+    fn at(&self, above: f64) -> Option<f64> {
+        match self {
+            Self::Linear => Some(above),
+            Self::Curve(curve) => Some(curve.value(above)),
+            Self::Ntc { ohm_at_25, b_k, series_ohm, full_raw } => {
+                // Open or shorted.
+                if !(above > 0.0 && above < *full_raw) {
+                    return None;
+                }
+                let ohm = series_ohm * above / (full_raw - above);
+                let inverse_k = 1.0 / (ZERO_CELSIUS_K + 25.0) + (ohm / ohm_at_25).ln() / b_k;
+                (inverse_k > 0.0).then(|| 1.0 / inverse_k - ZERO_CELSIUS_K)
+            }
+        }
+    }
+}
+
+impl Sense {
+    /// What `raw` is.
+    #[must_use]
+    pub fn read(&self, raw: RawValue) -> Reading {
+        if raw.is_missing() {
+            return Reading::Missing;
+        }
+        let Some(number) = raw.number().filter(|number| !self.mask && number.abs() <= UNBELIEVABLE) else {
+            return Reading::Faulty;
+        };
+        if self.missing.contains(&(number as f32)) {
+            return Reading::Missing;
+        }
+        let value = self.response.at(number - self.baseline).map(|response| self.gain * response + self.offset);
+        match value.filter(|value| value.abs() <= UNBELIEVABLE) {
+            Some(value) => Reading::Value(value, (self.raw_range[0]..=self.raw_range[1]).contains(&number)),
+            None => Reading::Faulty,
+        }
+    }
+}
+
+/// The conversions of all taxels of a sense.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SenseCalibration {
+    /// Of taxels without keys of their own.
+    pub all: Sense,
+    /// By the taxel's place in the body.
+    pub own: BTreeMap<usize, Sense>,
+    /// The time over which rates are found, s.
+    pub window_s: f64,
+    /// The gain of `all` as it is written, in the unit of the file.
+    pub written_gain: f64,
+    /// The farthest distance that counts, m; infinite where none is given. Of temperatures it has no meaning.
+    pub range_m: f64,
+}
+
+impl SenseCalibration {
+    /// Of temperatures: °C, rates over 1 s.
+    pub(super) fn of_temperature() -> Self {
+        Self { all: Sense::default(), own: BTreeMap::new(), window_s: 1.0, written_gain: 1.0, range_m: f64::INFINITY }
+    }
+
+    /// Of distances: mm, speeds over 0.1 s.
+    pub(super) fn of_proximity() -> Self {
+        Self { all: Sense { gain: 1e-3, ..Sense::default() }, window_s: 0.1, ..Self::of_temperature() }
+    }
+
+    /// That of the body's taxel `taxel`.
+    #[must_use]
+    pub fn of_taxel(&self, taxel: usize) -> &Sense {
+        self.own.get(&taxel).unwrap_or(&self.all)
+    }
+}
+
+/// How tangential raw values become forces along t and n × t, in the unit of P: each less its baseline, times the gain, then
+/// s = C (P, sᵤ, sᵥ).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShearCalibration {
+    /// Raw values at rest, along t and n × t.
+    pub baselines: [f64; 2],
+    /// By the taxel's place in the body, where it has its own.
+    pub own_baselines: BTreeMap<usize, [f64; 2]>,
+    /// P for each raw unit; `None` is the size of the taxel's own gain.
+    pub gain: Option<f64>,
+    /// By the taxel's place in the body, where it has its own.
+    pub own_gains: BTreeMap<usize, f64>,
+    /// C: what of P and of each raw tangential force is in each tangential force.
+    pub cross_axis: [[f64; 3]; 2],
+    /// μ, the friction at which a contact slips, if it is known.
+    pub slips_at: Option<f64>,
+}
+
+impl Default for ShearCalibration {
+    fn default() -> Self {
+        Self {
+            baselines: [0.0; 2],
+            own_baselines: BTreeMap::new(),
+            gain: None,
+            own_gains: BTreeMap::new(),
+            cross_axis: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            slips_at: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(sense: &Sense, raw: f64) -> f64 {
+        match sense.read(RawValue::new(raw)) {
+            Reading::Value(value, _) => value,
+            other => panic!("{raw}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_line_and_a_table_give_what_they_say() {
+        let line = Sense { baseline: 100.0, gain: 0.5, offset: -10.0, raw_range: [0.0, 300.0], ..Sense::default() };
+        assert_eq!(value(&line, 140.0), 10.0);
+        assert_eq!(line.read(RawValue::new(301.0)), Reading::Value(90.5, false));
+        let curve = SenseResponse::Curve(Curve::new(&[0.0, 10.0, 20.0], &[100.0, 20.0, 10.0]).unwrap());
+        let table = Sense { response: curve, gain: 1e-3, ..Sense::default() };
+        assert!((value(&table, 15.0) - 0.015).abs() < 1e-15 && value(&table, 99.0) == 0.01);
+    }
+
+    #[test]
+    fn a_thermistor_is_at_25_degrees_where_it_is_as_its_resistor() {
+        let ntc = SenseResponse::Ntc { ohm_at_25: 10e3, b_k: 3950.0, series_ohm: 10e3, full_raw: 1024.0 };
+        let sense = Sense { response: ntc, ..Sense::default() };
+        assert!((value(&sense, 512.0) - 25.0).abs() < 1e-9);
+        // A hotter one has less resistance. At 50 °C R/R₂₅ = exp(B (1/323.15 − 1/298.15)).
+        let ohm = 10e3 * (3950.0_f64 * (1.0 / 323.15 - 1.0 / 298.15)).exp();
+        let raw = 1024.0 * ohm / (ohm + 10e3);
+        assert!((value(&sense, raw) - 50.0).abs() < 1e-3);
+        for open_or_shorted in [0.0, 1024.0, -1.0] {
+            assert_eq!(sense.read(RawValue::new(open_or_shorted)), Reading::Faulty);
+        }
+    }
+
+    #[test]
+    fn what_is_no_reading_is_said() {
+        let sense = Sense { missing: vec![30_000.0], ..Sense::default() };
+        assert_eq!(sense.read(RawValue::MISSING), Reading::Missing);
+        assert_eq!(sense.read(RawValue::new(30_000.0)), Reading::Missing);
+        assert_eq!(sense.read(RawValue::FAULTY), Reading::Faulty);
+        assert_eq!(sense.read(RawValue::new(1e19)), Reading::Faulty);
+        assert_eq!(Sense { mask: true, ..sense }.read(RawValue::new(1.0)), Reading::Faulty);
+    }
+}

@@ -1,0 +1,283 @@
+//! Shear, temperature and proximity beside pressure, on every backend: the same bits everywhere, however frames are cut; nothing of
+//! one letter is in another, and nothing costs a body without such taxels anything.
+
+use glam::{DQuat, DVec2, DVec3};
+use somatic::body::{ChartKind, ChartSpec, FieldSpec, MemberSpec, Modality, Taxel};
+use somatic::internal::body::Glb;
+use somatic::signal::Pose;
+use somatic::{
+    BackendKind, Body, Calibration, Engine, Flags, Frame, Letter, Options, Outputs, Percept, RawValue, Receptor, Scene,
+};
+
+use crate::common::{Flat, backends};
+
+const PITCH: f64 = 0.005;
+const SIDE: u32 = 5;
+/// Ids of the first taxel of each kind.
+const WARM: u32 = 100;
+const NEAR: u32 = 200;
+const CALIBRATION: &str = "[all]\nunit = \"N\"\nnoise = 0.01\n[shear]\nslips_at = 0.5\n[proximity]\nunit = \"mm\"\nrange = 80\n\
+                           window_s = 0.2\n[temperature]\nwindow_s = 0.5\n";
+
+fn grid() -> impl Iterator<Item = (u32, DVec2)> {
+    let half = f64::from(SIDE - 1) / 2.0;
+    (0..SIDE * SIDE).map(move |i| (i, PITCH * DVec2::new(f64::from(i % SIDE) - half, f64::from(i / SIDE) - half)))
+}
+
+/// A sheet whose normal is +y in its link, with 25 taxels of each kind, and one field over the first `kinds` of them.
+/// Its chart's +u is +x and its +v −z; tangents are turned by 90° against that.
+fn skin(kinds: usize) -> Body {
+    let mut glb = Glb::new();
+    let link = glb.node("skin", None, DVec3::ZERO);
+    let all = [(0, Modality::Force3), (WARM, Modality::Temperature), (NEAR, Modality::Proximity)];
+    for (first, modality) in all.into_iter().take(kinds) {
+        let taxel = |(i, at): (u32, DVec2)| Taxel {
+            id: first + i,
+            link: 0,
+            position_in_link: DVec3::new(at.x, 0.0, -at.y),
+            normal_in_link: DVec3::Y,
+            area: PITCH * PITCH,
+            modality,
+            tangent_in_link: (modality == Modality::Force3).then_some(DVec3::NEG_Z),
+        };
+        let taxels: Vec<Taxel> = grid().map(taxel).collect();
+        glb.taxels(&format!("taxels {first}"), Some(link), &taxels, None);
+    }
+    let chart =
+        ChartSpec { kind: ChartKind::Plane, origin_in_anchor: Some([0.0; 3]), u_in_anchor: Some([1.0, 0.0, 0.0]) };
+    let ids = all.into_iter().take(kinds).flat_map(|(first, _)| (0..SIDE * SIDE).map(move |i| first + i));
+    let members = ids.map(|id| (id, MemberSpec::default())).collect();
+    glb.field(&FieldSpec { name: "skin".into(), parent: None, members, chart: Some(chart) }, Some(link), DVec3::ZERO);
+    Body::from_bytes("skin", &glb.to_bytes().unwrap()).unwrap()
+}
+
+fn engine(body: &Body, kind: BackendKind, scene: Scene) -> Engine {
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let calibration = Calibration::parse(CALIBRATION, &ids).unwrap();
+    Engine::new(body, Options::default().scene(scene).calibration(Some(calibration)).backend(kind).batch(16)).unwrap()
+}
+
+/// A finger's pressure at `at`, N.
+fn pressure(at: DVec2, of: DVec2) -> f64 {
+    let share = 1.0 - (of - at).length_squared() / (2.5 * PITCH).powi(2);
+    (0.2 * share).max(0.0)
+}
+
+/// What a touch does in a frame.
+#[derive(Clone, Copy)]
+struct Touch {
+    at: DVec2,
+    /// Tangential force over pressure, along u and v of the chart.
+    drag: DVec2,
+    /// The same, about the middle, for each metre of distance.
+    twist: f64,
+    /// Of what comes near, m.
+    distance_m: f64,
+    /// Of a plane of temperatures in the middle, °C.
+    celsius: f64,
+}
+
+impl Touch {
+    fn frame(self, engine: &Engine, t_s: f64) -> Frame {
+        let mut frame = engine.frame(t_s);
+        let mut set = |name: String, value: f64| {
+            if let Some(index) = engine.index_of(&name) {
+                frame.values[index] = RawValue::new(value);
+            }
+        };
+        for (i, of) in grid() {
+            let p = pressure(self.at, of);
+            let s = p * (self.drag + self.twist * (of - self.at).perp());
+            set(i.to_string(), p);
+            // t is the chart's +v and n × t its −u.
+            set(format!("{i}.u"), s.y);
+            set(format!("{i}.v"), -s.x);
+            set((WARM + i).to_string(), self.celsius + 300.0 * of.x - 100.0 * of.y);
+            set((NEAR + i).to_string(), 1e3 * (self.distance_m + (of - self.at).length()));
+        }
+        frame
+    }
+}
+
+const TOUCH: Touch = Touch { at: DVec2::ZERO, drag: DVec2::new(0.3, 0.1), twist: 0.0, distance_m: 0.03, celsius: 31.0 };
+
+/// The percepts of `frames`, which are the same however they are cut and agree with the reference.
+fn run(body: &Body, kind: BackendKind, scene: &Scene, touches: &[(f64, Touch)]) -> Vec<Vec<Percept>> {
+    let cut_by = |cut: usize| {
+        let mut engine = engine(body, kind, scene.clone());
+        let frames: Vec<Frame> = touches.iter().map(|&(t_s, touch)| touch.frame(&engine, t_s)).collect();
+        let mut seen = Vec::new();
+        for part in frames.chunks(cut) {
+            let (percepts, agreement) = engine.process_and_compare(part).unwrap();
+            assert!(agreement.holds(), "{kind:?}: {agreement}");
+            seen.extend((0..part.len()).map(|frame| percepts.frame(frame).collect::<Vec<_>>()));
+        }
+        seen
+    };
+    let whole = cut_by(touches.len());
+    for cut in [1, 5] {
+        assert_eq!(cut_by(cut), whole, "{kind:?} cut by {cut}");
+    }
+    whole
+}
+
+fn close(a: DVec2, b: DVec2, within: f64) {
+    assert!((a - b).length() <= within, "{a} is not {b}");
+}
+
+#[test]
+fn a_field_of_all_kinds_has_a_percept_for_each_letter_and_they_are_right() {
+    let body = skin(3);
+    let touches: Vec<(f64, Touch)> = (0..20)
+        .map(|i| {
+            let t_s = 0.05 * f64::from(i);
+            (t_s, Touch { distance_m: 0.06 - 0.04 * t_s, celsius: 25.0 + 6.0 * t_s, ..TOUCH })
+        })
+        .collect();
+    let mut all: Vec<Vec<Vec<Percept>>> = Vec::new();
+    for kind in backends() {
+        let percepts = run(&body, kind, &Scene::default(), &touches);
+        let [ref pressure, ref shear, ref warm, ref near] = percepts[19][..] else {
+            panic!("{} percepts", percepts[19].len());
+        };
+        assert_eq!([pressure, shear, warm, near].map(|percept| percept.letter), [0, 1, 2, 3]);
+        let total = pressure.total.unwrap();
+        assert!(
+            pressure.shear.is_none() && shear.total.is_none() && warm.nearest.is_none() && near.temperature.is_none()
+        );
+        // Each taxel is pulled by 0.3 and 0.1 of its pressure.
+        close(DVec2::from_array(shear.shear.unwrap()), total * TOUCH.drag, 1e-6 * total);
+        assert!((shear.shear_direction.unwrap() - TOUCH.drag.to_angle()).abs() < 1e-6);
+        assert!((shear.friction.unwrap() - TOUCH.drag.length()).abs() < 1e-6 && shear.contact);
+        assert!((shear.slip_ratio.unwrap() - 2.0 * TOUCH.drag.length()).abs() < 1e-6);
+        assert!(shear.torsion.unwrap().abs() < 1e-9);
+        // In the link: u is +x, v −z, the normal +y.
+        let force = DVec3::from_array(shear.force_vector.unwrap());
+        assert!((force - total * DVec3::new(0.3, -1.0, -0.1)).length() < 1e-5 * total, "{force}");
+        let celsius = 25.0 + 6.0 * 0.95;
+        assert!((warm.temperature.unwrap() - celsius).abs() < 1e-5);
+        close(DVec2::from_array(warm.temperature_gradient.unwrap()), DVec2::new(300.0, -100.0), 1e-2);
+        assert!((warm.temperature_rate.unwrap() - 6.0).abs() < 1e-3);
+        assert_eq!((warm.warmest_taxel, warm.coldest_taxel), (Some(WARM + 4), Some(WARM + 20)));
+        // Positions are stored in single precision.
+        assert!((warm.warmest_position.unwrap()[0] - 2.0 * PITCH).abs() < 1e-9);
+        assert!((near.nearest.unwrap() - (0.06 - 0.04 * 0.95)).abs() < 1e-8 && near.nearest_taxel == Some(NEAR + 12));
+        assert!((near.approach_speed.unwrap() - 0.04).abs() < 1e-5 && near.covered == Some(25));
+        close(DVec2::from_array(near.proximity_centroid.unwrap()), DVec2::ZERO, 1e-9);
+        assert_eq!(near.nearest_normal, Some([0.0, 1.0, 0.0]));
+        // No rate before half a window.
+        assert!(percepts[4][2].temperature_rate.is_none() && percepts[4][2].flags.contains(Flags::NO_PREVIOUS));
+        all.push(percepts);
+    }
+    for other in &all[1..] {
+        for (a, b) in all[0].iter().flatten().zip(other.iter().flatten()).filter(|(a, _)| a.letter > 0) {
+            assert_eq!(a, b, "made of raw values, these are the same bits on every backend");
+        }
+    }
+}
+
+#[test]
+fn a_twist_has_the_sign_of_its_sense_and_no_direction() {
+    let body = skin(1);
+    for (twist, sign) in [(40.0, 1.0), (-40.0, -1.0)] {
+        let touch = Touch { drag: DVec2::ZERO, twist, ..TOUCH };
+        let percepts = run(&body, BackendKind::Cpu, &Scene::default(), &[(0.0, touch)]);
+        let shear = percepts[0].iter().find(|percept| percept.letter == 1).unwrap();
+        assert!(shear.torsion.unwrap() * sign > 1e-4, "{:?}", shear.torsion);
+        assert!(shear.shear_direction.is_none_or(|_| shear.friction.unwrap() < 1e-6));
+    }
+}
+
+#[test]
+fn vectors_and_places_turn_with_the_link() {
+    let body = skin(3);
+    let mut engine = engine(&body, BackendKind::Cpu, Scene::default());
+    let rotation = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let mut frame = TOUCH.frame(&engine, 0.0);
+    let at_rest: Vec<Percept> = engine.process_one(&frame).unwrap().frame(0).collect();
+    frame.t_s = 0.1;
+    frame.pose.push(("skin".into(), Pose { translation: DVec3::Z, rotation }));
+    let posed: Vec<Percept> = engine.process_one(&frame).unwrap().frame(0).collect();
+    assert!(at_rest.iter().all(|percept| !percept.in_world) && posed.iter().all(|percept| percept.in_world));
+    let turned = |vector: Option<[f64; 3]>| rotation * DVec3::from_array(vector.unwrap());
+    let same =
+        |a: Option<[f64; 3]>, b: DVec3| assert!((DVec3::from_array(a.unwrap()) - b).length() < 1e-12, "{a:?} {b}");
+    same(posed[1].force_vector, turned(at_rest[1].force_vector));
+    same(posed[1].shear_vector, turned(at_rest[1].shear_vector));
+    same(posed[2].warmest_position, turned(at_rest[2].warmest_position) + DVec3::Z);
+    same(posed[3].nearest_normal, turned(at_rest[3].nearest_normal));
+}
+
+#[test]
+fn what_is_missing_or_out_of_range_is_said_and_the_rest_counts() {
+    let body = skin(3);
+    let mut engine = engine(&body, BackendKind::Reference, Scene::default());
+    let mut frame = Touch { distance_m: 0.5, ..TOUCH }.frame(&engine, 0.0);
+    let mut put = |name: &str, value: RawValue| frame.values[engine.index_of(name).unwrap()] = value;
+    put("12.u", RawValue::MISSING);
+    put("7.v", RawValue::FAULTY);
+    put("100", RawValue::FAULTY);
+    put("101", RawValue::MISSING);
+    let percepts: Vec<Percept> = engine.process_one(&frame).unwrap().frame(0).collect();
+    let [pressure, shear, warm, near] = &percepts[..] else { panic!() };
+    // Its normal part counts.
+    assert!(!pressure.flags.intersects(Flags::INCOMPLETE | Flags::FAULTY_INPUT) && pressure.peak.unwrap() > 0.19);
+    assert!(shear.flags.contains(Flags::INCOMPLETE | Flags::FAULTY_INPUT));
+    assert!((shear.friction.unwrap() - TOUCH.drag.length()).abs() < 1e-6);
+    assert!(warm.flags.contains(Flags::INCOMPLETE | Flags::FAULTY_INPUT) && warm.temperature.is_some());
+    assert!(near.nearest.is_none() && near.covered == Some(0) && !near.contact);
+    assert!(near.flags.contains(Flags::OUT_OF_RANGE | Flags::NO_CONTACT));
+    // What touches a distance sensor is as near as it can tell.
+    let close = Touch { distance_m: 0.0, ..TOUCH }.frame(&engine, 0.1);
+    let near = engine.process_one(&close).unwrap().get(0, 3);
+    assert!(near.nearest == Some(1e-4) && near.flags.contains(Flags::SATURATED));
+}
+
+#[test]
+fn letters_are_those_that_are_asked_for_and_each_needs_its_taxels() {
+    let letters = |receptors: &[Receptor]| Letter::all_of(receptors, &[]);
+    let body = skin(3);
+    let count = |scene: Scene| engine(&body, BackendKind::Cpu, scene).plan().letters().len();
+    assert_eq!(count(Scene::default()), 4);
+    assert_eq!(count(Scene::default().letters(letters(&[Receptor::Sustained, Receptor::Change]))), 2);
+    assert_eq!(count(Scene::default().outputs(Outputs::TOTAL)), 1);
+    assert_eq!(count(Scene::default().outputs(Outputs::TOTAL | Outputs::WARMEST)), 2);
+    assert_eq!(count(Scene::default().letters(letters(&[Receptor::Temperature])).touches(None)), 1);
+    let plain = Flat::new(&[[0.0, 0.0], [0.01, 0.0]]).field("skin", None, 0..2).body();
+    let why = |scene: Scene| {
+        let made = Engine::new(&plain, Options::default().scene(scene).backend(BackendKind::Cpu));
+        made.map(|_| ()).unwrap_err().to_string()
+    };
+    let shear = why(Scene::default().letters(letters(&[Receptor::Shear])));
+    assert!(shear.contains("letter `shear` has no taxels"), "{shear}");
+    let nearest = why(Scene::default().outputs(Outputs::NEAREST));
+    assert!(nearest.contains("`nearest` is of letter `proximity`"), "{nearest}");
+    // A body of plain taxels has what it had.
+    let plain = Engine::new(&plain, Options::default().backend(BackendKind::Cpu)).unwrap();
+    assert!(plain.plan().letters().len() == 1 && !plain.plan().outputs().intersects(Outputs::OF_OTHER_LETTERS));
+}
+
+#[test]
+fn a_skin_without_any_pressure_is_read_on_every_backend() {
+    let (mut glb, chart) = (Glb::new(), ChartKind::Plane);
+    let link = glb.node("skin", None, DVec3::ZERO);
+    let taxel = |(i, at): (u32, DVec2)| Taxel {
+        id: NEAR + i,
+        link: 0,
+        position_in_link: DVec3::new(at.x, 0.0, -at.y),
+        normal_in_link: DVec3::Y,
+        area: 0.0,
+        modality: Modality::Proximity,
+        tangent_in_link: None,
+    };
+    glb.taxels("taxels", Some(link), &grid().map(taxel).collect::<Vec<_>>(), None);
+    let members = (0..SIDE * SIDE).map(|i| (NEAR + i, MemberSpec::default())).collect();
+    let chart = Some(ChartSpec { kind: chart, origin_in_anchor: None, u_in_anchor: None });
+    glb.field(&FieldSpec { name: "skin".into(), parent: None, members, chart }, Some(link), DVec3::ZERO);
+    let body = Body::from_bytes("skin", &glb.to_bytes().unwrap()).unwrap();
+    for kind in backends() {
+        let scene = Scene::default().touches(somatic::touch::Options::default());
+        let percepts = run(&body, kind, &scene, &[(0.0, TOUCH), (0.1, TOUCH)]);
+        assert!(percepts.iter().all(|frame| frame.len() == 1 && frame[0].nearest.is_some()), "{kind:?}");
+    }
+}
