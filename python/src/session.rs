@@ -15,6 +15,8 @@ pub(crate) struct Run {
     pub(crate) plan: Plan,
     pub(crate) names: Vec<FieldNames>,
     pub(crate) labels: Vec<String>,
+    /// By field, its letter.
+    pub(crate) letters: Vec<String>,
     pub(crate) outputs: Outputs,
     pub(crate) precision: Precision,
     pub(crate) backend: [String; 3],
@@ -38,10 +40,13 @@ impl Run {
     ) -> Self {
         let plan = engine.plan().clone();
         let chosen = engine.backend();
-        let labels = (0..plan.fields().len()).map(|field| plan.label(field)).collect();
+        let (fields, percepts) = (0..plan.fields().len(), engine.percepts());
+        let labels = fields.clone().map(|field| plan.label(field)).collect();
+        let letters = fields.map(|field| plan.letters()[percepts.letter(field)].receptor.to_string()).collect();
         Self {
             names: FieldNames::all_of(&plan),
             labels,
+            letters,
             outputs: engine.percepts().outputs(),
             precision: engine.percepts().precision(),
             backend: [chosen.name.to_owned(), chosen.device, chosen.reason.to_owned()],
