@@ -387,6 +387,11 @@ impl PyBody {
         in_python(slf.py(), "_plots", "body", (slf, values, ax, surface, unit, letter))
     }
 
+    /// Vectors in the frames of taxels' links, [taxels, 3], in the world with the body at rest. For pictures.
+    fn _at_rest(&self, py: Python<'_>, vectors: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        body_tables::at_rest(py, &self.inner, vectors)
+    }
+
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         in_python(slf.py(), "_html", "body", (slf,))
     }

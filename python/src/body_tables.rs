@@ -8,7 +8,7 @@ use somatic::Body;
 use somatic::body::{Modality, Taxel};
 use somatic::internal::body::{LinkMotion, WORLD_FROM_BODY};
 
-use crate::arrays::{array, structured};
+use crate::arrays::{self, array, structured};
 use crate::kinematics;
 
 /// The taxels, as an array of structures.
@@ -35,6 +35,15 @@ pub(crate) fn taxels<'py>(py: Python<'py>, body: &Body) -> PyResult<Bound<'py, P
         ("tangent", "f8", 3, vectors(&tangent)?),
     ];
     structured(py, count, &fields)
+}
+
+/// `vectors`, of each taxel one in the frame of its link, in the world with the body at rest.
+pub(crate) fn at_rest(py: Python<'_>, body: &Body, vectors: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+    let vectors = arrays::vectors(vectors, "vectors")?;
+    let turned = body.taxels.iter().zip(&vectors);
+    let turned = turned
+        .flat_map(|(taxel, vector)| body.links[taxel.link].world_from_link().transform_vector3(*vector).to_array());
+    array(py, turned.collect::<Vec<f64>>(), &[vectors.len(), 3])
 }
 
 /// The surface in the world with the body at rest, as vertices and faces.
