@@ -57,7 +57,7 @@ The file is TOML; its keys may be edited:
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, sensing-hand, mat and humanoid.
     #[arg(long, value_name = "BODY")]
     body: String,
 

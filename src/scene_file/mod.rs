@@ -52,7 +52,7 @@ use crate::source::{SourceSpec, VendorFormat};
 )]
 #[non_exhaustive]
 pub struct SceneFile {
-    /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
+    /// The robot's body: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the source's own, or
     /// hand].
     pub body: Option<String>,
 
@@ -114,8 +114,8 @@ pub struct SceneFile {
     /// Replace output files that exist; a file that is read is never replaced.
     pub overwrite: bool,
 
-    /// Compute the fields from pressures (sustained), from their change per second (change), or once from each
-    /// [default: sustained].
+    /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
+    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and those of other taxels].
     #[serde(deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub letters: Vec<Receptor>,

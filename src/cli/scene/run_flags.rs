@@ -23,7 +23,7 @@ use crate::cli::text_flags::TextFlags;
 /// find it by that name. The keys of `--force` and `--speed` are `overwrite` and `playback_speed`. Flags override keys.
 #[derive(Args, Clone, Debug, Default)]
 pub(in crate::cli) struct RunFlags {
-    /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
+    /// The robot's body: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the source's own, or
     /// hand].
     #[arg(long, value_name = "BODY")]
     pub(in crate::cli) body: Option<String>,
@@ -82,10 +82,10 @@ pub(in crate::cli) struct RunFlags {
     #[arg(long = "force")]
     pub(in crate::cli) overwrite: bool,
 
-    /// Compute the fields from pressures (sustained), from their change per second (change), or once from each
-    /// [default: sustained].
+    /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
+    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and those of other taxels].
     #[arg(long, help_heading = COMPUTED, value_name = "LETTER,...", value_delimiter = ',',
-        value_parser = one_of::<Receptor>(&["sustained", "change"]))]
+        value_parser = one_of::<Receptor>(&["sustained", "change", "shear", "temperature", "proximity"]))]
     pub(in crate::cli) letters: Vec<Receptor>,
 
     /// Compute from the raw or the linear signal of force-sensing resistors, not the one in the calibration.

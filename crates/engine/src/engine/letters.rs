@@ -235,7 +235,8 @@ impl Cell<'_> {
             made.give(Outputs::PROXIMITY_CENTROID, Host::ProximityCentroid, &centroid);
         }
         match window.take(self.t_s(), distance_m, by.window_s) {
-            Some(slope) => made.give(Outputs::APPROACH_SPEED, Host::ApproachSpeed, &[-slope]),
+            // From 0, so that what stays has no sign.
+            Some(slope) => made.give(Outputs::APPROACH_SPEED, Host::ApproachSpeed, &[0.0 - slope]),
             None => made.flags |= Flags::NO_PREVIOUS,
         }
     }

@@ -358,6 +358,12 @@ impl Column {
         self.name.to_uppercase()
     }
 
+    /// Whether its values are whole numbers: counts, and ids of taxels.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        Outputs::WHOLE.contains(self.output)
+    }
+
     /// Whether it is in double precision on every backend.
     #[must_use]
     pub fn is_double(&self) -> bool {

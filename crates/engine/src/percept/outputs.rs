@@ -18,6 +18,13 @@ impl Outputs {
         .difference(Self::FORCE)
         .difference(Self::OF_OTHER_LETTERS);
 
+    /// Counts, and ids of taxels.
+    pub(super) const WHOLE: Self = Self::ACTIVE
+        .union(Self::WARMEST_TAXEL)
+        .union(Self::COLDEST_TAXEL)
+        .union(Self::NEAREST_TAXEL)
+        .union(Self::COVERED);
+
     /// What letters beside pressure give: of shear, temperature and proximity.
     pub const OF_OTHER_LETTERS: Self =
         Self::of_stage("shear").union(Self::of_stage("temperature")).union(Self::of_stage("proximity"));

@@ -149,7 +149,7 @@ pub struct FieldNames {
     pub link: String,
     /// The frame of those that are in the world: `world`, or the link that stands for it.
     pub world: String,
-    /// Its letter, if the output names it: `sustained` or `change`.
+    /// Its letter, if the output names it, such as `sustained` or `temperature`.
     pub letter: Option<String>,
     /// Its signal, if the output names it: `raw` or `linear`.
     pub signal: Option<String>,

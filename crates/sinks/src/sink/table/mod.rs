@@ -46,7 +46,7 @@ fn keys(names: &[FieldNames]) -> Vec<TableColumn> {
 /// Letter and signal, where a field has percepts of several.
 fn letter_columns(names: &[FieldNames]) -> impl Iterator<Item = TableColumn> {
     let letter = names.iter().any(|name| name.letter.is_some()).then(|| {
-        let help = "Of what the percept is made: `sustained` or `change`.";
+        let help = "Of what the percept is made: `sustained`, `change`, `shear`, `temperature` or `proximity`.";
         TableColumn::new("letter", "", TableType::Word, help, ValueOf::Letter).or_absent()
     });
     let signal = names.iter().any(|name| name.signal.is_some()).then(|| {
@@ -90,8 +90,8 @@ fn columns_of(
 }
 
 fn kind_of(column: &Column, session: &Session<'_>) -> TableType {
-    match column.output {
-        Outputs::ACTIVE => TableType::U32,
+    match column {
+        _ if column.is_whole() => TableType::U32,
         _ if column.is_double() || session.is_double => TableType::F64,
         _ => TableType::F32,
     }
