@@ -50,7 +50,7 @@ class Episode:
 def _body(body: Body | str | os.PathLike[str] | None) -> Body | None:
     if body is None or isinstance(body, Body):
         return body
-    names: list[Any] = ["hand", "mat", "humanoid"]
+    names: list[Any] = ["hand", "sensing-hand", "mat", "humanoid"]
     return Body.bundled(body) if body in names else Body.load(body)  # type: ignore[arg-type]
 
 

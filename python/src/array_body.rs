@@ -1,7 +1,6 @@
 //! A body of arrays.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use glam::{DVec3, Vec3};
 use pyo3::prelude::*;
@@ -13,9 +12,6 @@ use somatic::internal::error::suggestion;
 
 use crate::arrays::{doubles, shown, vectors};
 use crate::error::{unknown_name, usage};
-
-/// A field for each link, with its taxels of all kinds.
-const OF_LINKS: &str = "[[fields]]\neach = \"link\"\ntaxels = [\"0..=16777216\"]\nwrap = \"split\"\n";
 
 /// A name for all taxels, or for each.
 #[derive(FromPyObject)]
@@ -154,13 +150,7 @@ impl ArrayBody {
             glb.taxels(&format!("{link} taxels"), Some(node), taxels, None);
         }
         let file = Original::from_bytes(name, &glb.to_bytes()?, None)?;
-        let mut kinds = self.links.iter().flat_map(|(_, taxels)| taxels).map(|taxel| taxel.modality);
-        // Of pressures alone fields are made as usual; where there are others, every link's has all of its taxels.
-        let recipe = match kinds.all(Modality::is_pressed) {
-            true => Recipe::none(),
-            false => Recipe::parse("fields of links", OF_LINKS, Path::new(""))?,
-        };
-        author(file, &recipe, |_| {})?.file.to_glb()
+        author(file, &Recipe::none(), |_| {})?.file.to_glb()
     }
 }
 

@@ -87,7 +87,7 @@ impl PyBody {
         free(py, || Self::of_file(&path)).or_raise_of(py, &path)
     }
 
-    /// One of the bodies that come with the package: 'hand', 'mat' or 'humanoid'.
+    /// One of the bodies that come with the package: 'hand', 'sensing-hand', 'mat' or 'humanoid'.
     ///
     /// >>> import somatic_touch as st
     /// >>> [len(st.Body.bundled(name).taxels) for name in ("hand", "mat", "humanoid")]
