@@ -72,7 +72,7 @@ def info(
     ('MCAP', 280, 5.58, ['hand'])
     >>> palm = [row for row in st.info(path, contacts=True)["contacts"] if row["field"] == "hand/palm"]
     >>> [(row["contact"], row["whole"], row["total_peak"]) for row in palm]
-    [(1, True, 2660.0)]
+    [(1, True, 1099.0)]
     """
     table = None if isinstance(contacts, bool) else contacts
     is_asked = contacts is not False

@@ -203,7 +203,8 @@ def _values(ax: Any, shape: _native.Body, values: npt.NDArray[np.float64], unit:
     read = np.isin(modality, _READS[letter]) if letter else np.full(len(places), True)
     if not read.any():
         raise UsageError(f"no taxel of this body is of letter `{letter}`")
-    ax.scatter(*places[~read].T, s=3, color="0.7", depthshade=False, zorder=2)
+    if not read.all():
+        ax.scatter(*places[~read].T, s=3, color="0.7", depthshade=False, zorder=2)
     numbers = values if values.ndim == 1 else values[:, 0]
     there = read & np.isfinite(numbers)
     ax.scatter(*places[read & ~there].T, s=10, facecolors="none", edgecolors="0.5", depthshade=False, zorder=2, label="no value")
@@ -224,6 +225,8 @@ def _values(ax: Any, shape: _native.Body, values: npt.NDArray[np.float64], unit:
 def _arrows(ax: Any, shape: _native.Body, values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_]) -> None:
     """The tangential parts of forces, the largest as long as `_LONGEST` says."""
     taxels = shape.taxels
+    if not there.any():
+        return
     tangents = taxels["tangent"]
     in_links = np.where(there[:, None], values[:, 1:2] * tangents + values[:, 2:3] * np.cross(taxels["normal"], tangents), 0.0)
     forces = shape._at_rest(in_links)[there]

@@ -161,8 +161,8 @@ impl PyBody {
 
     /// Its sensors, an array of structures [taxels] by ascending id: `id`; `link`, an index into `links`; `position` and `normal`
     /// [3] in the link's frame, in metres; `place`, the position in the world with the body at rest; `area`, in m², 0 where unknown;
-    /// `modality`, what it measures: 'pressure', 'force3' (three axes), 'temperature' or 'proximity'; `tangent` [3], of one with three axes
-    /// the direction t of its second value in the link's frame (the third is along n × t), of others NaN.
+    /// `modality`, what it measures: 'pressure', 'force3' (three axes), 'temperature' or 'proximity'; and, if any has three axes,
+    /// `tangent` [3], the direction t of its second value in the link's frame (the third is along n × t), of others NaN.
     ///
     /// It is a table as it is: `pandas.DataFrame(body.taxels)` and `polars.DataFrame(body.taxels)` have vectors as columns
     /// `position_x`, `position_y`, `position_z`, and so on.

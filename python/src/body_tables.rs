@@ -24,7 +24,7 @@ pub(crate) fn taxels<'py>(py: Python<'py>, body: &Body) -> PyResult<Bound<'py, P
     let vectors =
         |of: &dyn Fn(&Taxel) -> [f64; 3]| array(py, taxels.iter().flat_map(of).collect::<Vec<f64>>(), &[count, 3]);
     let modalities: Vec<String> = taxels.iter().map(|taxel| taxel.modality.name()).collect();
-    let fields = [
+    let mut fields = vec![
         ("id", "u4", 1, array(py, taxels.iter().map(|taxel| taxel.id).collect(), &[count])?),
         ("link", "i8", 1, array(py, taxels.iter().map(|taxel| taxel.link as i64).collect(), &[count])?),
         ("position", "f8", 3, vectors(&|taxel| taxel.position_in_link.to_array())?),
@@ -32,8 +32,10 @@ pub(crate) fn taxels<'py>(py: Python<'py>, body: &Body) -> PyResult<Bound<'py, P
         ("place", "f8", 3, vectors(&place)?),
         ("area", "f8", 1, array(py, taxels.iter().map(|taxel| taxel.area).collect(), &[count])?),
         ("modality", "U24", 1, modalities.into_pyobject(py)?.into_any().unbind()),
-        ("tangent", "f8", 3, vectors(&tangent)?),
     ];
+    if taxels.iter().any(|taxel| taxel.modality == Modality::Force3) {
+        fields.push(("tangent", "f8", 3, vectors(&tangent)?));
+    }
     structured(py, count, &fields)
 }
 

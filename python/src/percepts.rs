@@ -289,13 +289,7 @@ impl PyPercepts {
 
     /// The unit of the column called `name`, such as 'm' or 'Pa'; '1' where it has none.
     fn unit(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        use somatic::percept::Unit;
-        let column = self.column(py, name)?;
-        let p = self.run.unit();
-        Ok(match column.unit {
-            Unit::P if !p.is_empty() => p.to_owned(),
-            unit => unit.symbol().to_owned(),
-        })
+        Ok(self.run.symbol_of(self.column(py, name)?.unit))
     }
 
     /// Why quantities are absent or in doubt, uint32 [frames, fields]; the bits are those of `Flags`.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use somatic::internal::recording::CALIBRATION;
 use somatic::internal::sink::{RecordPart, TableWish};
+use somatic::percept::Unit;
 use somatic::signal::Quantity;
 use somatic::sink::{FieldNames, Session};
 use somatic::{Body, Engine, Outputs, Plan, Precision};
@@ -62,6 +63,16 @@ impl Run {
     /// What pressures are measured in; empty where fields differ.
     pub(crate) fn unit(&self) -> &'static str {
         self.plan.common_quantity().map_or("", Quantity::symbol)
+    }
+
+    /// The symbol of `unit` as quantities of this run have it.
+    pub(crate) fn symbol_of(&self, unit: Unit) -> String {
+        let p = self.unit();
+        match unit {
+            Unit::P if !p.is_empty() => p.to_owned(),
+            Unit::PMetre if !p.is_empty() => format!("{p} m"),
+            unit => unit.symbol().to_owned(),
+        }
     }
 
     /// What sinks and tables know of the run; `source` is the input's name for people.

@@ -21,7 +21,6 @@ def test_taxels_are_a_table_as_they_are(name) -> None:
     taxels = st.Body.bundled(name).taxels
     frame, other = pd.DataFrame(taxels), pl.DataFrame(taxels)
     names = ["id", "link", *[f"{vector}_{axis}" for vector in ("position", "normal", "place") for axis in "xyz"], "area", "modality"]
-    names += [f"tangent_{axis}" for axis in "xyz"]
     assert list(frame.columns) == other.columns == names == list(taxels.dtype.names or ())
     for vector in ("position", "normal", "place"):
         columns = [f"{vector}_{axis}" for axis in "xyz"]

@@ -225,7 +225,7 @@ def test_percepts_are_of_their_letters() -> None:
         assert p.present(name).tolist() == [[at == letter for at in p.letters]] * 20
         column = p[name].reshape(20, 4, -1)
         assert np.isnan(column[~p.present(name)]).all() and np.isfinite(column[p.present(name)]).all()
-    assert p.unit("shear") == p.unit("total") == "N" and p.unit("torsion") == "N·m"
+    assert p.unit("shear") == p.unit("total") == "N" and p.unit("torsion") == "N m"
     assert (p.unit("temperature"), p.unit("temperature_rate"), p.unit("nearest")) == ("°C", "K/s", "m")
     # Of proximity: that something is in range; of temperature: that there is a reading.
     assert p.contact.tolist() == [[True, True, True, near <= 0.08] for near in 0.06 - 0.04 * p.t]
