@@ -6,7 +6,7 @@ import csv
 import json
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, TypedDict, Unpack
 
 import numpy as np
@@ -87,8 +87,8 @@ def info(
 
 def _contact(row: dict[str, str]) -> dict[str, Any]:
     """A row of the table of contacts with numbers as such; what is blank is absent."""
-    words = {"recording": str, "field": str, "unit": str, "contact": int, "whole": "true".__eq__}
-    return {name: words.get(name, float)(text) if text else None for name, text in row.items()}
+    others: dict[str, Callable[[str], Any]] = {"recording": str, "field": str, "unit": str, "contact": int, "whole": "true".__eq__}
+    return {name: others.get(name, float)(text) if text else None for name, text in row.items()}
 
 
 def inspect(
