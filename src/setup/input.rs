@@ -193,7 +193,7 @@ impl Input {
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
     pub fn open(&self, ids: &[u32], setup: &Setup) -> Result<Box<dyn Source + Send>> {
         #[cfg(feature = "ros2")]
-        if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
+        if let (Some(SourceSpec::Ros2 { topic, kind }), None) = (&self.spec, &setup.map) {
             return Ok(Box::new(crate::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(setup)?)?));
         }
         if let Some(source) = setup.take_text(ids)? {

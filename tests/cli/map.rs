@@ -219,7 +219,7 @@ fn what_a_map_does_not_fit_is_refused_in_a_line() {
     let why = refused(2, &["run", "--source", &source, "--map", "dex4", "--sink", "-"]);
     assert!(why.contains("did you mean `dex3`?"), "{why}");
     let why = refused(2, &["run", "--source", "csv:a.csv", "--map", "dex3", "--sink", "-"]);
-    assert!(why.contains("--map is for one ROS 2 bag, NDJSON, or lines of JSON"), "{why}");
+    assert!(why.contains("--map is for one ROS 2 bag or topic, NDJSON, or lines of JSON"), "{why}");
     // A message that is cut short is left out and counted.
     let mut cut = messages();
     cut[1].3.truncate(200);

@@ -280,9 +280,9 @@ impl SourceSpec {
 
     /// Checks that a map is for this source.
     fn check_map(&self, options: &VendorOptions) -> Result<()> {
-        if !matches!(self, Self::Ros2Mcap(_) | Self::Ndjson(_) | Self::Stdin | Self::Text(_)) {
+        if !matches!(self, Self::Ros2Mcap(_) | Self::Ros2 { .. } | Self::Ndjson(_) | Self::Stdin | Self::Text(_)) {
             return Err(Error::usage(
-                "--map is for ROS 2 bags, NDJSON and lines of JSON; leave it out here, or name columns with --columns",
+                "--map is for ROS 2 bags and topics, NDJSON and lines of JSON; leave it out here, or name columns with --columns",
             ));
         }
         match options.text.given() {

@@ -9,6 +9,7 @@ mod layout;
 mod mapped;
 pub(in crate::source) mod path;
 mod presets;
+mod sensor_names;
 
 pub use self::array_map::{ArrayMap, MapTime};
 pub use self::decoder::Decoder;
@@ -16,3 +17,4 @@ pub use self::json_lines::JsonLines;
 pub use self::layout::{Dimension, Lies, order};
 pub use self::mapped::{Came, MappedSource, Messages};
 pub use self::path::{ArrayPath, Step};
+pub use self::sensor_names::named_sensors;

@@ -56,6 +56,7 @@ uint32 reserve
 const TACTILE_STATE: &str = r#"
 type = "tactile_msgs/msg/TactileState"
 values = "sensors[*].values"
+names = "sensors[*].name"
 time = "header.stamp"
 "#;
 
