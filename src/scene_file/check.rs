@@ -20,12 +20,12 @@ impl SceneFile {
             ));
         }
         let has_messages = |source: &SourceSpec| {
-            use SourceSpec::{Mcap, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
-            matches!(source, Mcap(_) | Ndjson(_) | Ros2 { .. } | Ros2Mcap(_) | Stdin | Text(_))
+            use SourceSpec::{Mcap, Modbus, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
+            matches!(source, Mcap(_) | Modbus(_) | Ndjson(_) | Ros2 { .. } | Ros2Mcap(_) | Stdin | Text(_))
         };
         if self.map.is_some() && !(self.sources.len() == 1 && self.sources.iter().all(has_messages)) {
             return Err(Error::usage(
-                "`map` is for one ROS 2 bag or topic, NDJSON, or lines of JSON; add `source = \"ros2-mcap:BAG\"`, or leave it out",
+                "`map` is for one ROS 2 bag or topic, NDJSON, lines of JSON, or Modbus; add `source = \"ros2-mcap:BAG\"`, or leave it out",
             ));
         }
         let has_no_bad = |source: &SourceSpec| {

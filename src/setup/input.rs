@@ -133,8 +133,11 @@ impl Input {
     }
 
     pub fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Text, Zenoh};
-        !matches!(self.spec, Some(Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Zenoh(_)))
+        use SourceSpec::{CsvStdin, Modbus, Ros2, Serial, Stdin, Text, Zenoh};
+        let is_live = |spec: &SourceSpec| {
+            matches!(spec, Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Modbus(_) | Zenoh(_))
+        };
+        !self.spec.as_ref().is_some_and(is_live)
     }
 
     /// Whether several boards or limbs are merged.

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{BufWriter, Read as _, Write as _};
+use std::net::TcpListener;
 use std::path::Path;
 
 use serde_json::Value;
@@ -219,7 +220,7 @@ fn what_a_map_does_not_fit_is_refused_in_a_line() {
     let why = refused(2, &["run", "--source", &source, "--map", "dex4", "--sink", "-"]);
     assert!(why.contains("did you mean `dex3`?"), "{why}");
     let why = refused(2, &["run", "--source", "csv:a.csv", "--map", "dex3", "--sink", "-"]);
-    assert!(why.contains("--map is for one ROS 2 bag or topic, NDJSON, or lines of JSON"), "{why}");
+    assert!(why.contains("--map is for one ROS 2 bag or topic, NDJSON, lines of JSON, or Modbus"), "{why}");
     // A message that is cut short is left out and counted.
     let mut cut = messages();
     cut[1].3.truncate(200);
@@ -362,4 +363,48 @@ fn sensors_that_have_names_are_fields() {
     fs::write(&path, line).unwrap();
     let of_lines = done(&[&["run", "--map", "tactile-state"], &ASKED[..], &[text_of(&path)]].concat());
     assert_eq!(totals(&of_lines), all[..1]);
+}
+
+/// A hand that answers reads of registers over Modbus TCP: the thumb's tip is pressed from the twentieth round of its pads on.
+fn hand() -> String {
+    const THUMB_TIP: u16 = 4480;
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let (mut request, mut rounds) = ([0; 12], 0);
+        while stream.read_exact(&mut request).is_ok() {
+            let number = |at: usize| u16::from_be_bytes([request[at], request[at + 1]]);
+            let (first, count) = (number(8), number(10));
+            rounds += usize::from(first == THUMB_TIP);
+            let value: u16 = if first == THUMB_TIP && rounds > 20 { 500 } else { 40 };
+            let length = (3 + 2 * count).to_be_bytes();
+            let head = [&request[..4], &length, &[request[6], 3, 2 * count as u8]].concat();
+            let registers: Vec<u8> = (0..count).flat_map(|_| value.to_be_bytes()).collect();
+            if stream.write_all(&[head, registers].concat()).is_err() {
+                break;
+            }
+        }
+    });
+    address
+}
+
+#[test]
+fn registers_of_a_hand_are_frames() {
+    let source = format!("modbus://{}", hand());
+    let run = output(&[&["run", "--map", "inspire", "--for", "2s", "--sink", "-"], &ASKED[..], &[&source]].concat());
+    let said = stderr(&run);
+    assert_eq!(run.status.code(), Some(0), "{said}");
+    for says in ["registers of fingerone_tip_touch to palm_touch; time is when they come: 1062 values", "untested", "17 pads"] {
+        assert!(said.contains(says), "{says}: {said}");
+    }
+    let all = totals(&String::from_utf8(run.stdout).unwrap());
+    assert!(all.len() > 25, "{} frames", all.len());
+    assert_eq!((all[0]["thumb_tip"], all[0]["palm"], all[24]["thumb_tip"]), (360.0, 4480.0, 4500.0));
+    let why = refused(2, &["run", "--source", "modbus://127.0.0.1:1", "--body", "hand", "--sink", "-"]);
+    assert!(why.contains("a map names the registers that are sensors; add --map FILE, or --map inspire"), "{why}");
+    let why = refused(2, &["run", "--source", &source, "--map", "dex3", "--sink", "-"]);
+    assert!(why.contains("dex3: registers: name them, as registers = { palm = [4900, 112] }"), "{why}");
+    let why = refused(2, &["run", "--source", "modbus://hand:x", "--map", "inspire", "--sink", "-"]);
+    assert!(why.contains("`hand:x` is not a device; write modbus://HOST:PORT"), "{why}");
 }

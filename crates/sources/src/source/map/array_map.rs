@@ -1,6 +1,6 @@
 //! Maps: which values of a message are sensors, and which taxels these are.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -15,6 +15,9 @@ use super::presets;
 use crate::error::{Error, Result, failed, parse_toml, suggestion};
 use crate::limits::{self, MAX_TOML_BYTES};
 use crate::signal::RawValue;
+
+/// Registers that a device gives at once.
+const MAX_REGISTERS: u16 = 125;
 
 /// A file of a map, as people write it.
 #[derive(Deserialize)]
@@ -33,6 +36,8 @@ struct Keys {
     time: Option<String>,
     decoder: Option<String>,
     definition: Option<PathBuf>,
+    #[serde(default)]
+    registers: BTreeMap<String, [u16; 2]>,
     #[serde(default)]
     pads: Vec<PadKeys>,
 }
@@ -110,6 +115,8 @@ pub struct ArrayMap {
     pub(in crate::source) pitch_m: Option<[f64; 2]>,
     missing: Vec<f64>,
     scale: f64,
+    /// Of devices that speak Modbus, the first register of an array and how many it has.
+    registers: BTreeMap<String, [u16; 2]>,
 }
 
 impl ArrayMap {
@@ -175,6 +182,13 @@ impl ArrayMap {
             Some(TextIds::Listed(ids)) => Some(ids),
             None => None,
         };
+        for (name, [first, count]) in &keys.registers {
+            if !(1..=MAX_REGISTERS).contains(count) || first.checked_add(count - 1).is_none() {
+                return Err(failed!(
+                    "registers: `{name}` has {count} from {first} on; a device gives 1 to {MAX_REGISTERS} at once, up to 65535"
+                ));
+            }
+        }
         let whole = |kind: String| {
             type_of(&kind).ok_or_else(|| failed!("type: `{kind}` is not a type; write it as package/msg/Name"))
         };
@@ -194,6 +208,7 @@ impl ArrayMap {
             pitch_m: keys.pitch.as_deref().map(pitch).transpose().map_err(at("pitch"))?,
             missing: keys.missing,
             scale,
+            registers: keys.registers,
         })
     }
 
@@ -201,6 +216,23 @@ impl ArrayMap {
     #[must_use]
     pub fn value(&self, number: f64) -> RawValue {
         if self.missing.contains(&number) { RawValue::MISSING } else { RawValue::new(number * self.scale) }
+    }
+
+    /// The first register and the number of registers of each of its arrays.
+    ///
+    /// # Errors
+    /// A usage error: it does not name them.
+    pub(in crate::source) fn blocks(&self) -> Result<Vec<[u16; 2]>> {
+        if self.registers.is_empty() {
+            return Err(Error::usage("registers: name them, as registers = { palm = [4900, 112] }, the first and how many"));
+        }
+        let block = |path: &ArrayPath| {
+            let name = path.to_string();
+            let near = || suggestion(&name, self.registers.keys().map(String::as_str));
+            let missing = || Error::usage(format!("registers: there is no `{name}`; {}", near()));
+            self.registers.get(&name).copied().ok_or_else(missing)
+        };
+        self.values.iter().map(block).collect()
     }
 
     /// Pads by the names of sensors, each with so many values, one below the other.

@@ -7,6 +7,7 @@ mod json;
 mod json_lines;
 mod layout;
 mod mapped;
+pub(in crate::source) mod modbus;
 pub(in crate::source) mod path;
 mod presets;
 mod sensor_names;
