@@ -15,6 +15,7 @@ use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::bodies::in_body;
 use somatic::internal::survey::known::{KnownForces, PressedOn};
 use somatic::internal::survey::{Findings, Found, Survey, Wishes};
+use somatic::scene::file::SceneFile;
 use somatic::signal::RawValue;
 use somatic::source::{Lines, Source};
 use somatic::{Body, Calibration, Error, Result};
@@ -174,7 +175,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     outputs.add_standard_output()?;
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
     let name = sources.first().map_or("", String::as_str);
-    let Opened { body, source, lines, is_live, unit } = Opened::new(arguments)?;
+    let Opened { body, source, lines, is_live, unit } = Opened::new(scene_of(arguments, &sources)?)?;
     let channels = in_body(&body, &*source)?;
     if arguments.gains_from.is_some() {
         let touches = gains::Touches { name, source, calibration: arguments.calibration.as_deref() };
@@ -226,6 +227,19 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let code = tell_losses(&lost);
     say(&format!("wrote {}", output.display()));
     Ok(code)
+}
+
+/// What a scene would say of the `sources` that `arguments` name.
+fn scene_of(arguments: &Arguments, sources: &[String]) -> Result<SceneFile> {
+    let mut scene = SceneFile::default();
+    scene.sources = sources.iter().map(|text| text.parse()).collect::<Result<_>>()?;
+    scene.body.clone_from(&arguments.body);
+    scene.map.clone_from(&arguments.map);
+    scene.text = arguments.text.keys();
+    scene.rate_hz = arguments.rate;
+    let lines = arguments.lines.keys();
+    (scene.wiring, scene.live_rate_hz, scene.board_rate_hz) = (lines.wiring, lines.live_rate_hz, lines.board_rate_hz);
+    Ok(scene)
 }
 
 /// Refuses flags that do not go together.

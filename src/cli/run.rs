@@ -130,7 +130,9 @@ impl Arguments {
             return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
         }
         if self.check_order.is_some() && sinks.iter().any(SinkSpec::is_on_stdout) {
-            return Err(Error::usage("--check-order prints on standard output; leave out the --sink that does so, too"));
+            return Err(Error::usage(
+                "--check-order prints on standard output; leave out the --sink that does so, too",
+            ));
         }
         let mut outputs: OutputPaths = FilesRead::from_scene(asked, self.scene.as_deref()).outputs(asked.overwrite);
         // A description makes no file.

@@ -51,11 +51,24 @@ fn each_change_of_the_pressed_pad_is_a_line_and_the_silent_ones_are_listed() {
     let begins: Vec<&str> = reported.lines().map(|line| line.split(" (").next().unwrap()).collect();
     assert_eq!(
         begins,
-        ["pad \"index_tip\"", "pad \"thumb_tip\"", "pad \"index_tip\"", "never answered: 1 of 3 pads", "  pad \"palm\""]
+        [
+            "pad \"index_tip\"",
+            "pad \"thumb_tip\"",
+            "pad \"index_tip\"",
+            "never answered: 1 of 3 pads",
+            "  pad \"palm\""
+        ]
     );
     let all: Vec<&str> = reported.lines().collect();
-    assert!(all[0].starts_with("pad \"index_tip\" (taxels 4-7): pressed, 40") && all[0].ends_with("most at taxel 5"), "{reported}");
-    assert!(all[1].starts_with("pad \"thumb_tip\" (taxels 0-3): pressed, 40") && all[1].ends_with("counts, most at taxel 2"), "{reported}");
+    assert!(
+        all[0].starts_with("pad \"index_tip\" (taxels 4-7): pressed, 40") && all[0].ends_with("most at taxel 5"),
+        "{reported}"
+    );
+    assert!(
+        all[1].starts_with("pad \"thumb_tip\" (taxels 0-3): pressed, 40")
+            && all[1].ends_with("counts, most at taxel 2"),
+        "{reported}"
+    );
     assert_eq!(all[4], "  pad \"palm\" (taxel 8)");
     // By taxel.
     let reported = done(&[&run[..], &["--check-order=taxels"]].concat());
@@ -67,7 +80,10 @@ fn each_change_of_the_pressed_pad_is_a_line_and_the_silent_ones_are_listed() {
     fs::write(&calibration, "[all]\nbaseline = 1000\ngain = 0.01\ndead_band = 0.1\nunit = 'N'\n").unwrap();
     let reported = done(&[&run[..], &["--calibration", text_of(&calibration), "--check-order"]].concat());
     assert!(reported.starts_with("pad \"index_tip\" (taxels 4-7): pressed, 4"), "{reported}");
-    assert!(reported.lines().next().unwrap().contains(" N, most at taxel 5") && reported.contains("2 of 3 pads"), "{reported}");
+    assert!(
+        reported.lines().next().unwrap().contains(" N, most at taxel 5") && reported.contains("2 of 3 pads"),
+        "{reported}"
+    );
     // Percepts go to files all the same, and not beside it.
     let percepts = folder.path().join("p.ndjson");
     done(&[&run[..], &["--check-order", "--sink", text_of(&percepts)]].concat());

@@ -241,7 +241,8 @@ fn what_a_map_reads_is_calibrated_as_a_table_is() {
     const FRAMES: usize = 190;
     let folder = tempfile::tempdir().unwrap();
     let [lines, table, map, body, by_map, by_table] =
-        ["s.ndjson", "s.csv", "map.toml", "row.glb", "by-map.toml", "by-table.toml"].map(|name| folder.path().join(name));
+        ["s.ndjson", "s.csv", "map.toml", "row.glb", "by-map.toml", "by-table.toml"]
+            .map(|name| folder.path().join(name));
     fs::write(&map, "values = 'pads[*].force'\nmissing = [-1]\n").unwrap();
     let line = |frame: usize| {
         let [a, b, c, d] = pressed(frame);
@@ -280,9 +281,11 @@ fn what_a_map_reads_is_calibrated_as_a_table_is() {
     // A source that says nothing of its robot is not taken for the hand.
     let why = refused(2, &["calibrate", "--source", text_of(&table), "-o", text_of(&by_map), "--force"]);
     assert!(why.contains("name the robot as --body"), "{why}");
-    let why = refused(2, &["calibrate", "--source", text_of(&table), "--map", "dex3", "-o", text_of(&by_map), "--force"]);
+    let why =
+        refused(2, &["calibrate", "--source", text_of(&table), "--map", "dex3", "-o", text_of(&by_map), "--force"]);
     assert!(why.contains("--map is for one ROS 2 bag"), "{why}");
-    let why = refused(2, &["calibrate", "--map", text_of(&map), "--source", text_of(&lines), "-o", text_of(&map), "--force"]);
+    let why =
+        refused(2, &["calibrate", "--map", text_of(&map), "--source", text_of(&lines), "-o", text_of(&map), "--force"]);
     assert!(why.contains("this is the input"), "{why}");
 }
 
@@ -300,11 +303,13 @@ fn a_hand_is_calibrated_from_its_bag() {
     };
     let message = |frame: usize| (TOPIC.to_owned(), STATE.to_owned(), 10_000_000 * frame as i64, state(raw(frame)));
     write_mcap(&bag, &(0..400).map(message).collect::<Vec<_>>());
-    let found = done(&["calibrate", "--map", "dex3", "--source", text_of(&bag), "--rest", "2", "--json", "-o", text_of(&to)]);
+    let found =
+        done(&["calibrate", "--map", "dex3", "--source", text_of(&bag), "--rest", "2", "--json", "-o", text_of(&to)]);
     let found: Value = serde_json::from_str(&found).unwrap();
     let sensors = found["sensors"].as_array().unwrap();
     assert_eq!((sensors.len(), &found["invert"]), (108, &false.into()));
-    let travels = sensors.iter().filter(|sensor| (49_000.0..51_000.0).contains(&sensor["travel"].as_f64().unwrap_or(0.0)));
+    let travels =
+        sensors.iter().filter(|sensor| (49_000.0..51_000.0).contains(&sensor["travel"].as_f64().unwrap_or(0.0)));
     assert_eq!(travels.count(), 107, "{found}");
     assert!(sensors[107]["baseline"].is_null(), "{found}");
     done(&["run", "--map", "dex3", "--source", text_of(&bag), "--calibration", text_of(&to), "--sink", "-"]);
@@ -338,16 +343,23 @@ fn sensors_that_have_names_are_fields() {
     let message = |sec: u32, sensors: &[(&str, &[f32])]| {
         ("/tactile".to_owned(), TACTILE.to_owned(), i64::from(sec) * 1_000_000_000, tactile(sec, sensors))
     };
-    let thumb = |tip: f32| message(tip as u32, &[("thumb_tip", &[tip, 1.0, 2.0]), ("palm", &[4.0]), ("palm", &[5.0, 6.0])]);
+    let thumb =
+        |tip: f32| message(tip as u32, &[("thumb_tip", &[tip, 1.0, 2.0]), ("palm", &[4.0]), ("palm", &[5.0, 6.0])]);
     write_db3(&bag, &[thumb(1.0), thumb(2.0)]);
-    let run = |more: &[&str]| output(&[&["run", "--map", "tactile-state"], &ASKED[..], &[text_of(&bag)], more].concat());
+    let run =
+        |more: &[&str]| output(&[&["run", "--map", "tactile-state"], &ASKED[..], &[text_of(&bag)], more].concat());
     let reported = run(&[]);
     let said = stderr(&reported);
     assert_eq!(reported.status.code(), Some(0), "{said}");
     assert!(said.contains("6 values a message of 3 sensors, thumb_tip to palm"), "{said}");
-    assert!(said.contains("a body is made: 3 pads (thumb_tip to palm_2) of 6 sensors; where they lie is a guess"), "{said}");
+    assert!(
+        said.contains("a body is made: 3 pads (thumb_tip to palm_2) of 6 sensors; where they lie is a guess"),
+        "{said}"
+    );
     let all = totals(&String::from_utf8(reported.stdout).unwrap());
-    let fields = |tip: f64| [("palm", 4.0), ("palm_2", 11.0), ("thumb_tip", tip + 3.0)].map(|(name, sum)| (name.to_owned(), sum));
+    let fields = |tip: f64| {
+        [("palm", 4.0), ("palm_2", 11.0), ("thumb_tip", tip + 3.0)].map(|(name, sum)| (name.to_owned(), sum))
+    };
     assert_eq!(all, [BTreeMap::from(fields(1.0)), BTreeMap::from(fields(2.0))]);
     // A message whose sensors stand in another order is not taken for the first ones.
     let turned = message(3, &[("palm", &[4.0]), ("thumb_tip", &[1.0, 1.0, 2.0]), ("palm", &[5.0, 6.0])]);
@@ -395,7 +407,9 @@ fn registers_of_a_hand_are_frames() {
     let run = output(&[&["run", "--map", "inspire", "--for", "2s", "--sink", "-"], &ASKED[..], &[&source]].concat());
     let said = stderr(&run);
     assert_eq!(run.status.code(), Some(0), "{said}");
-    for says in ["registers of fingerone_tip_touch to palm_touch; time is when they come: 1062 values", "untested", "17 pads"] {
+    for says in
+        ["registers of fingerone_tip_touch to palm_touch; time is when they come: 1062 values", "untested", "17 pads"]
+    {
         assert!(said.contains(says), "{says}: {said}");
     }
     let all = totals(&String::from_utf8(run.stdout).unwrap());

@@ -15,8 +15,9 @@ const SENT: usize = 30;
 fn totals(text: &str) -> Vec<(f64, BTreeMap<String, f64>)> {
     let of = |frame: &Value| {
         let fields = frame["fields"].as_array().unwrap().iter();
-        let sums =
-            fields.map(|field| (field["field"].as_str().unwrap().to_owned(), field["total"].as_f64().unwrap())).collect();
+        let sums = fields
+            .map(|field| (field["field"].as_str().unwrap().to_owned(), field["total"].as_f64().unwrap()))
+            .collect();
         (frame["t"].as_f64().unwrap(), sums)
     };
     frames(text).iter().map(of).collect()
@@ -45,7 +46,8 @@ fn messages_of_other_types_are_read_by_a_map_or_by_its_name() {
     let read = |kind: &str, definitions: &[&str], map: &str, source: &str, message: &dyn Fn(usize) -> Value| {
         let topic = source.split('@').next().unwrap().strip_prefix("ros2:").unwrap();
         let mut peer = Peer::start(&python, &domain, &[&["send", topic, kind, "reliable"], definitions].concat());
-        let asked = ["run", "--map", map, "--source", source, "--outputs", "total", "--all-fields", "--backend", "reference"];
+        let asked =
+            ["run", "--map", map, "--source", source, "--outputs", "total", "--all-fields", "--backend", "reference"];
         let child = run(&domain, &[&asked[..], &["--sink", "-", "--for", "4s"]].concat());
         peer.wait_for("matched");
         std::thread::sleep(Duration::from_millis(500));
@@ -66,21 +68,23 @@ fn messages_of_other_types_are_read_by_a_map_or_by_its_name() {
     };
     let kind = "tactile_msgs/msg/TactileState";
     let (all, said) = read(kind, &[text_of(&definition)], "tactile-state", "ros2:/tactile", &state);
-    assert!(said.contains("`ros2:/tactile` (tactile_msgs/msg/TactileState): sensors[*].values; time is header.stamp"), "{said}");
+    assert!(
+        said.contains("`ros2:/tactile` (tactile_msgs/msg/TactileState): sensors[*].values; time is header.stamp"),
+        "{said}"
+    );
     for (t_s, sums) in &all {
         assert_eq!((sums["tip"], sums["palm"]), (t_s - 100.0 + 1.0, 0.5));
     }
     // A type that the map defines by a file; the name of the type is the robot's.
-    let state = |number: usize| {
-        json!({"header": header(number), "name": ["a", "b"], "position": [], "velocity": [], "effort": [number, 0.25]})
-    };
+    let state = |number: usize| json!({"header": header(number), "name": ["a", "b"], "position": [], "velocity": [], "effort": [number, 0.25]});
     let (all, _) = read("sensor_msgs/msg/JointState", &[], text_of(&joints), "ros2:/joints", &state);
     for (t_s, sums) in &all {
         assert_eq!((sums["a"], sums["b"]), (2.0 * (t_s - 100.0), 0.5));
     }
     // An array of ROS's own, with a layout column by column and without a stamp.
     let data = |number: usize| {
-        let dimension = |label: &str, size: usize, stride: usize| json!({"label": label, "size": size, "stride": stride});
+        let dimension =
+            |label: &str, size: usize, stride: usize| json!({"label": label, "size": size, "stride": stride});
         json!({"layout": {"dim": [dimension("taxels", 3, 3)], "data_offset": 1}, "data": [77, number, 2, 3]})
     };
     let source = "ros2:/array@std_msgs/msg/Int16MultiArray";

@@ -1,13 +1,12 @@
 //! What `somatic calibrate` reads: the robot, and frames of its sensors, opened as `somatic run` opens them.
 
-use somatic::internal::scene_file::SceneFile;
 use somatic::internal::setup::attached;
 use somatic::internal::setup::{Input, Setup};
 use somatic::internal::signal::UnitOfP;
+use somatic::scene::file::SceneFile;
 use somatic::source::{Lines, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Body, Error, Result};
 
-use super::Arguments;
 use crate::cli::scene::{in_flags, input, set_up};
 
 /// The robot, and what its sensors deliver.
@@ -22,17 +21,16 @@ pub(super) struct Opened {
 }
 
 impl Opened {
-    /// Opens the sources that `arguments` name.
-    pub(super) fn new(arguments: &Arguments) -> Result<Self> {
-        Self::open(arguments).map_err(in_flags)
+    /// Opens the sources that `scene` names.
+    pub(super) fn new(scene: SceneFile) -> Result<Self> {
+        Self::open(scene).map_err(in_flags)
     }
 
-    fn open(arguments: &Arguments) -> Result<Self> {
-        let scene = scene_of(arguments)?;
-        // Options of exports alone are no flags here.
-        let lines = scene.line_keys();
+    fn open(scene: SceneFile) -> Result<Self> {
+        scene.check()?;
+        let (lines, rate_hz) = (scene.line_keys(), scene.rate_hz);
         let ports = lines.lines(&scene.sources)?;
-        if !ports.is_empty() && arguments.rate.is_some() {
+        if !ports.is_empty() && rate_hz.is_some() {
             return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
         }
         let setup = set_up(scene);
@@ -45,24 +43,9 @@ impl Opened {
             let lines = Some(source.lines());
             return Ok(Self { body, source: Box::new(source), lines, is_live, unit: UnitOfP::COUNT });
         }
-        let unit = unit_of(&input, arguments.rate)?;
+        let unit = unit_of(&input, rate_hz)?;
         Ok(Self { source: input.open(&ids, &setup)?, body, lines: None, is_live, unit })
     }
-}
-
-/// What a scene would say of what `arguments` name.
-fn scene_of(arguments: &Arguments) -> Result<SceneFile> {
-    let named = arguments.sources.iter().chain(&arguments.gains_from);
-    let mut scene = SceneFile::default();
-    scene.sources = named.map(|text| text.parse()).collect::<Result<Vec<SourceSpec>>>()?;
-    scene.body.clone_from(&arguments.body);
-    scene.map.clone_from(&arguments.map);
-    scene.text = arguments.text.keys();
-    scene.rate_hz = arguments.rate;
-    let lines = arguments.lines.keys();
-    (scene.wiring, scene.live_rate_hz, scene.board_rate_hz) = (lines.wiring, lines.live_rate_hz, lines.board_rate_hz);
-    scene.check()?;
-    Ok(scene)
 }
 
 /// The robot that is named, or that of the source. A source without one is not taken to be of the bundled hand.

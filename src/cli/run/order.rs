@@ -135,7 +135,11 @@ impl OrderReport {
     fn line(&self, answer: &Answer) -> String {
         let group = &self.order.groups()[answer.group];
         let (factor, unit) = self.quantity.readable(answer.most);
-        let most = if group.sensors.len() > 1 { format!(", most at taxel {}", self.ids[answer.sensor]) } else { String::new() };
+        let most = if group.sensors.len() > 1 {
+            format!(", most at taxel {}", self.ids[answer.sensor])
+        } else {
+            String::new()
+        };
         format!("{}: pressed, {} {unit}{most}", self.named(group), short(answer.most * factor))
     }
 

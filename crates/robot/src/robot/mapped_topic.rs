@@ -118,7 +118,8 @@ impl Messages for MappedTopic {
 
     fn losses(&self) -> Vec<String> {
         let messages = if self.damaged == 1 { "message was" } else { "messages were" };
-        let what = format!("{}: {} {messages} not as long as the definition of {} says", self.name, self.damaged, self.kind);
+        let what =
+            format!("{}: {} {messages} not as long as the definition of {} says", self.name, self.damaged, self.kind);
         if self.damaged > 0 { vec![what] } else { Vec::new() }
     }
 

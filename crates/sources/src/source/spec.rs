@@ -356,7 +356,8 @@ impl SourceSpec {
             #[cfg(not(feature = "parquet"))]
             Self::LeRobot(name) => Err(Error::failed(refused::NO_PARQUET).at(name.path.display())),
             Self::Modbus(_) => {
-                Err(Error::usage("a map names the registers that are sensors; add --map FILE, or --map inspire").at(self))
+                Err(Error::usage("a map names the registers that are sensors; add --map FILE, or --map inspire")
+                    .at(self))
             }
             Self::Ros2 { topic, .. } => {
                 let what = "a topic of ROS 2 is read live, by `somatic run` in a build with feature `ros2`: cargo install \

@@ -171,7 +171,9 @@ impl ArrayMap {
             return Err(Error::failed("values: name the array of the values, such as data or pads[*].pressure"));
         }
         if keys.names.is_some() && (values.len() > 1 || !keys.pads.is_empty()) {
-            return Err(Error::failed("names: they go with one path of values, and make the pads; leave out the others"));
+            return Err(Error::failed(
+                "names: they go with one path of values, and make the pads; leave out the others",
+            ));
         }
         let scale = keys.scale.unwrap_or(1.0);
         if !(scale.is_finite() && scale != 0.0) {
@@ -224,7 +226,9 @@ impl ArrayMap {
     /// A usage error: it does not name them.
     pub(in crate::source) fn blocks(&self) -> Result<Vec<[u16; 2]>> {
         if self.registers.is_empty() {
-            return Err(Error::usage("registers: name them, as registers = { palm = [4900, 112] }, the first and how many"));
+            return Err(Error::usage(
+                "registers: name them, as registers = { palm = [4900, 112] }, the first and how many",
+            ));
         }
         let block = |path: &ArrayPath| {
             let name = path.to_string();
@@ -244,7 +248,8 @@ impl ArrayMap {
             let others = (2..).map(|number| format!("{stem}_{number}"));
             let name = std::iter::once(stem.clone()).chain(others).find(|name| used.insert(name.clone()));
             let count = u32::try_from(*count).unwrap_or(u32::MAX);
-            let grid = self.grid.filter(|[rows, columns]| rows.checked_mul(*columns) == Some(count)).unwrap_or([1, count]);
+            let grid =
+                self.grid.filter(|[rows, columns]| rows.checked_mul(*columns) == Some(count)).unwrap_or([1, count]);
             let pitch_m = self.pitch_m.unwrap_or([USUAL_PITCH_M; 2]);
             let height_m = f64::from(grid[0]) * pitch_m[0];
             let at_m = [0.0, -(down_m + height_m / 2.0)];

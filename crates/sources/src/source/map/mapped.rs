@@ -140,8 +140,13 @@ impl MappedSource {
                     if self.messages.named() == self.named {
                         return Ok(Some(time));
                     }
-                    let what = Error::failed("its sensors have other names than those of the first message, or stand elsewhere");
-                    ("other names of sensors", what.at(format!("{}: the message of {} s", self.messages.name(), time.s)))
+                    let what = Error::failed(
+                        "its sensors have other names than those of the first message, or stand elsewhere",
+                    );
+                    (
+                        "other names of sensors",
+                        what.at(format!("{}: the message of {} s", self.messages.name(), time.s)),
+                    )
                 }
                 Ok(Came::Message(time)) => {
                     let what = failed!("it has {} values, the first one {}", self.values.len(), self.ids.len());

@@ -44,7 +44,8 @@ pub(in crate::source) struct ModbusRegisters {
 /// # Errors
 /// A usage error: it is not written so.
 pub(in crate::source) fn place_of(text: &str) -> Result<(String, u8)> {
-    let bad = || Error::usage(format!("`{text}` is not a device; write modbus://HOST:PORT, or modbus://HOST:PORT/UNIT"));
+    let bad =
+        || Error::usage(format!("`{text}` is not a device; write modbus://HOST:PORT, or modbus://HOST:PORT/UNIT"));
     let (address, unit) = match text.split_once('/') {
         Some((address, unit)) => (address, unit.parse().map_err(|_| bad())?),
         None => (text, UNIT),
@@ -66,7 +67,9 @@ impl ModbusRegisters {
         let name = format!("modbus://{place}");
         let blocks = map.blocks().map_err(|e| e.at(&map.name))?;
         if matches!(map.time, MapTime::At(..)) || map.names.is_some() {
-            return Err(Error::usage("registers have neither a time nor names; leave these out of the map").at(&map.name));
+            return Err(
+                Error::usage("registers have neither a time nor names; leave these out of the map").at(&map.name)
+            );
         }
         let (address, unit) = place_of(place)?;
         let failed = |e: std::io::Error| failed!("no connection to {address}: {e}").at(&name);
@@ -240,7 +243,9 @@ mod tests {
             assert!(frame.t_s > before_s);
             before_s = frame.t_s;
         }
-        assert!(source.notices()[0].contains("/2: registers of tip to palm; time is when they come: 5 values a message"));
+        assert!(
+            source.notices()[0].contains("/2: registers of tip to palm; time is when they come: 5 values a message")
+        );
     }
 
     #[test]
@@ -299,7 +304,10 @@ mod tests {
         let mut values = Vec::new();
         messages.next(&mut values).unwrap();
         assert_eq!(values.len(), 5 * (9 + 96) + 4 * 80 + 96 + 9 + 112);
-        assert_eq!([0, 8, 9, 105].map(|at: usize| values[at].number()), [Some(0.0), Some(8.0), Some(18.0), Some(210.0)]);
+        assert_eq!(
+            [0, 8, 9, 105].map(|at: usize| values[at].number()),
+            [Some(0.0), Some(8.0), Some(18.0), Some(210.0)]
+        );
         assert_eq!(values.last().unwrap().number(), Some(1900.0 + 111.0));
     }
 }
