@@ -78,7 +78,7 @@ fn every_command_of_the_readmes_table_runs() {
             runs = runs.replace(part, other);
         }
         let domain = std::process::id() % 101 + 1;
-        done(&format!("export ROS_DOMAIN_ID={domain}; rm -f percepts.csv; {runs}"));
+        done(&format!("export ROS_DOMAIN_ID={domain}; rm -f percepts*; {runs}"));
     }
     // What nothing uses any more is taken out.
     assert_eq!(used, [true; STAND_INS.len()]);
