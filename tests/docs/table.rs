@@ -35,7 +35,7 @@ const STAND_INS: [(&str, &str); 9] = [
     ),
     ("driver |", "cat frames.ndjson |"),
     ("| controller", "> percepts.ndjson"),
-    ("somatic run --body skin.glb --source ros2:/skin --sink ros2", "somatic run --body skin.glb --sink ros2 --for 1s"),
+    ("somatic run --body skin.glb --source ros2:/skin --sink ros2", "somatic run --sink ros2 --for 1s"),
 ];
 
 /// The commands of the table in `text`, row by row.
