@@ -117,6 +117,14 @@ impl Sink for ParquetSink {
         Ok(Flow::Open)
     }
 
+    fn begin_recording(&mut self, index: usize) -> Result<Flow> {
+        self.percepts.table.begin_recording(index);
+        for file in [&mut self.touches, &mut self.self_contacts].into_iter().flatten() {
+            file.table.begin_recording(index);
+        }
+        Ok(Flow::Open)
+    }
+
     fn flush(&mut self) -> Result<Flow> {
         // A file without its end cannot be read: it is written as a whole.
         Ok(Flow::Open)
@@ -127,6 +135,7 @@ impl Sink for ParquetSink {
         let beside = [self.touches, self.self_contacts].into_iter().flatten();
         percepts.finish_with(beside.map(ParquetFile::finish).collect::<Result<_>>()?)
     }
+
     fn finish_early(self: Box<Self>) -> Result<Option<String>> {
         let name = self.percepts.name.clone();
         // Where it is a stream it gets an end, as it cannot be read without.
