@@ -57,6 +57,11 @@ impl Input {
                 }
             };
         };
+        if setup.sources.len() > 1 && named.is_recording() {
+            return Err(Error::usage(
+                "several recordings are run one after the other by `somatic run` alone, into a table; name one of them here",
+            ));
+        }
         let Some(spec) = setup.first_source()? else { unreachable!("a source is named") };
         let name = match &spec {
             SourceSpec::Ros2Mcap(bag) => bag.to_string(),
@@ -133,8 +138,7 @@ impl Input {
     }
 
     pub fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Text, Zenoh};
-        !matches!(self.spec, Some(Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Zenoh(_)))
+        self.spec.as_ref().is_none_or(SourceSpec::is_recording)
     }
 
     /// Whether several boards or limbs are merged.

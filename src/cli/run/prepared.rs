@@ -2,14 +2,14 @@
 
 use std::time::{Duration, Instant};
 
-use somatic::internal::run::{Opened, Pace, RunOptions};
+use somatic::internal::run::{Opened, Pace, RunOptions, Several};
 use somatic::internal::setup::{Input, Setup};
 use somatic::output::OutputPath;
 use somatic::run::Run;
 use somatic::sink::Sink;
 #[cfg(feature = "page")]
 use somatic::sink::SinkSpec;
-use somatic::{BackendKind, Error, Result};
+use somatic::{BackendKind, Error, Options, Result};
 
 use super::console::Console;
 use crate::cli::doubts::Doubts;
@@ -25,8 +25,7 @@ use crate::cli::words;
 /// All that a run at a terminal has before its sinks are opened.
 pub(super) struct Prepared {
     pub(super) opened: Opened,
-    #[cfg(feature = "page")]
-    options: somatic::Options,
+    options: Options,
     /// What is written of boards at the end.
     summary: Option<OutputPath>,
     doubts: Option<Doubts>,
@@ -66,7 +65,6 @@ impl Prepared {
         let verify = asked.verify && has_another_to_compare(&opened.engine, why.as_deref())?;
         let mut prepared = Self {
             opened,
-            #[cfg(feature = "page")]
             options,
             summary,
             doubts: None,
@@ -92,25 +90,26 @@ impl Prepared {
         self.doubts = Some(doubts);
     }
 
-    /// Starts to read, for `sinks` and what a `view` shows.
+    /// Starts to read, for `sinks` and what a `view` shows, what is asked of each recording; the first one is open.
     pub(super) fn start(
         self,
-        asked: &Setup,
+        several: Several,
         input: &Input,
         view: ViewKind,
         sinks: Vec<Box<dyn Sink + Send>>,
     ) -> Result<(Run, Console)> {
+        let asked = several.first();
         let Opened { body, engine, lines, .. } = &self.opened;
         #[cfg(feature = "page")]
         let explainer = match asked.sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_))) {
             true => {
                 let Opened { backend, source, .. } = &self.opened;
-                let options = self.options.backend(backend[0].parse()?);
+                let options = self.options.clone().backend(backend[0].parse()?);
                 Some(LiveExplainer::start(body.clone(), options, source.taxels().to_vec()))
             }
             false => None,
         };
-        let about = RunInfo { engine, body, source: &input.name, all_fields: asked.all_fields };
+        let about = RunInfo { engine, body, source: several.title(&input.name), all_fields: asked.all_fields };
         let console = Console {
             view: view.open(&about),
             live: lines.clone().map(|lines| LineReport::new(lines, self.summary, asked.quiet)),
@@ -119,7 +118,8 @@ impl Prepared {
             explainer,
         };
         let until = self.lasts.map(|span| Instant::now() + span);
+        let following = several.following(&self.opened, &self.options)?;
         let run = self.opened.start(sinks, input, &RunOptions { verify: self.verify, until, ..RunOptions::default() });
-        Ok((run, console))
+        Ok((run.followed_by(following), console))
     }
 }
