@@ -63,7 +63,8 @@ pub struct SceneFile {
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
-    /// text:-. Standard input: - for NDJSON, csv:- for CSV.
+    /// text:-. Standard input: - for NDJSON, csv:- for CSV. Several recordings go into one table with a column
+    /// `recording`, each from its own beginning.
     #[serde(rename = "source", deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub sources: Vec<SourceSpec>,
