@@ -119,7 +119,9 @@ impl Arguments {
             return Err(Error::usage("--wide is for the table of fields; leave --table out"));
         }
         if sinks.is_empty() && !self.describe && asked.each().len() > 1 {
-            return Err(Error::usage("several recordings go into a table; add `sink = \"csv:FILE\"` or `sink = \"parquet:FILE\"`"));
+            return Err(Error::usage(
+                "several recordings go into a table; add `sink = \"csv:FILE\"` or `sink = \"parquet:FILE\"`",
+            ));
         }
         if self.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !self.describe {
             return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));

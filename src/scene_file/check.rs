@@ -57,8 +57,11 @@ impl SceneFile {
         if self.sources.len() < 2 || !self.sources.iter().all(SourceSpec::is_recording) {
             return Ok(());
         }
-        let of_one =
-            [("joint_states", self.joint_states.is_some()), ("poses", self.poses.is_some()), ("loop", self.repeat.is_some())];
+        let of_one = [
+            ("joint_states", self.joint_states.is_some()),
+            ("poses", self.poses.is_some()),
+            ("loop", self.repeat.is_some()),
+        ];
         if let Some((key, _)) = of_one.iter().find(|(_, given)| *given) {
             return Err(Error::usage(format!("`{key}` is for one recording; leave it out, or run once for each")));
         }

@@ -65,7 +65,8 @@ fn several_recordings_are_one_run() {
     let frames = 2 * (text.lines().count() - 1);
     assert_eq!((outcome.frames as usize, listener.frames, listener.began), (frames, frames, 1));
     let both = std::fs::read_to_string(folder.path().join("both.csv")).unwrap();
-    let of = |name: &str| -> Vec<&str> { both.lines().filter_map(|row| row.split_once(name)).map(|(_, row)| row).collect() };
+    let of =
+        |name: &str| -> Vec<&str> { both.lines().filter_map(|row| row.split_once(name)).map(|(_, row)| row).collect() };
     assert!(of("a.csv").len() > 50 && of("a.csv") == of("b.csv"));
     // Interrupted in the second one, there is no part of a table.
     let keys = keys.replace("both", "cut");

@@ -63,14 +63,7 @@ impl Prepared {
         let (options, why) = chosen.unwrap_or_default();
         let is_raw = options.calibration.is_none() && !options.tare;
         let verify = asked.verify && has_another_to_compare(&opened.engine, why.as_deref())?;
-        let mut prepared = Self {
-            opened,
-            options,
-            summary,
-            doubts: None,
-            verify,
-            lasts,
-        };
+        let mut prepared = Self { opened, options, summary, doubts: None, verify, lasts };
         prepared.tell(asked, input, is_raw);
         Ok(prepared)
     }

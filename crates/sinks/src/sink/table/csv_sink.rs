@@ -73,7 +73,9 @@ impl CsvSink {
         if let Some(percepts) = sink.percepts.as_mut().filter(|_| wide) {
             let columns = wide_columns(session);
             // Which frame it is of; what follows is of each field.
-            percepts.columns.retain(|column| matches!(column.value, ValueOf::Recording | ValueOf::Time | ValueOf::Frame));
+            percepts
+                .columns
+                .retain(|column| matches!(column.value, ValueOf::Recording | ValueOf::Time | ValueOf::Frame));
             let titles = percepts.columns.iter().map(TableColumn::title);
             let of_field = |name: &FieldNames| {
                 let head = head_of(name);
