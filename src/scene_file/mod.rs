@@ -188,7 +188,7 @@ pub struct SceneFile {
 
     /// Read the source as the export of a pressure system [default: as its content says].
     ///
-    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
+    /// One of xsensor, tekscan, emed, pliance, pedar, loadsol, footscan, stappone, or matrix for plain numbers.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = VendorFormat::WORDS)))]
     pub format: Option<VendorFormat>,

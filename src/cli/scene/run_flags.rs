@@ -180,7 +180,7 @@ pub(in crate::cli) struct RunFlags {
 
     /// Read the source as the export of a pressure system [default: as its content says].
     ///
-    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
+    /// One of xsensor, tekscan, emed, pliance, pedar, loadsol, footscan, stappone, or matrix for plain numbers.
     #[arg(long, help_heading = RECORDINGS, value_name = "FORMAT",
         value_parser = one_of::<VendorFormat>(VendorFormat::WORDS))]
     pub(in crate::cli) format: Option<VendorFormat>,

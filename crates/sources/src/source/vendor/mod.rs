@@ -196,7 +196,8 @@ impl VendorSource {
         match self.skipped.is_on() {
             false => error,
             true => failed!(
-                "{error}; --skip-bad skips frames of one line, and those of XSENSOR and Tekscan after the first one; correct the file"
+                "{error}; --skip-bad skips frames of one line, and those of XSENSOR, Tekscan and footscan after the first one; correct the \
+                 file"
             ),
         }
     }

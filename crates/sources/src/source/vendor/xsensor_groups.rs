@@ -100,7 +100,7 @@ impl Groups {
                 panel.parts.push((name, ids));
             }
             if cells.is_empty() {
-                said.push(format!("none of `{}`, which is never pressed", super::text::shortened(&group.name)));
+                said.push(format!("none of `{}`", super::text::shortened(&group.name)));
             }
         }
         format!("fields of its groups, of cells that are ever pressed: {}", said.join(", "))
