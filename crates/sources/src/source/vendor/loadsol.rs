@@ -10,6 +10,9 @@ use super::text::{Separator, Word};
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue, UnitOfP};
 
+/// Most columns of a table, far more than any insole has.
+const MAX_COLUMNS: usize = 4096;
+
 /// Reads frames from lines.
 pub(super) struct Loadsol {
     separator: Separator,
@@ -24,8 +27,9 @@ pub(super) struct Loadsol {
 struct Table {
     unit: UnitOfP,
     devices: Vec<Device>,
-    /// The columns of the sensors, from 0, in the order of the devices.
-    sensors: Vec<usize>,
+    /// By column up to the last one of a sensor, its place in a frame, where sensors are in the order of the devices.
+    places: Vec<Option<usize>>,
+    sensors: usize,
     /// In words.
     words: String,
 }
@@ -44,6 +48,9 @@ impl Loadsol {
 
     /// The table whose columns have `units`.
     fn table(&self, units: &[String]) -> Result<Table> {
+        if units.len() > MAX_COLUMNS {
+            return Err(failed!("it has {} columns; there are at most {MAX_COLUMNS}", units.len()));
+        }
         let mut devices: Vec<Device> = Vec::new();
         let mut unit = None;
         for (column, head) in units.iter().enumerate() {
@@ -69,7 +76,9 @@ impl Loadsol {
                 device.zones.retain(|(zone, _)| !zone.is_empty());
             }
         }
-        let sensors = devices.iter().flat_map(|device| &device.zones).map(|(_, column)| *column).collect();
+        let sensors: Vec<usize> = devices.iter().flat_map(|device| &device.zones).map(|(_, column)| *column).collect();
+        let mut places = vec![None; sensors.iter().max().map_or(0, |last| last + 1)];
+        sensors.iter().enumerate().for_each(|(place, &column)| places[column] = Some(place));
         let of_device = |device: &Device| {
             let zones = device.zones.iter().map(|(zone, column)| match zone.as_str() {
                 "" => columns(column + 1, column + 1),
@@ -80,11 +89,11 @@ impl Loadsol {
         let devices_in_words: Vec<String> = devices.iter().map(of_device).collect();
         let words =
             format!("column 1: the time; forces of {}; the other columns are left out", devices_in_words.join("; of "));
-        Ok(Table { unit, devices, sensors, words })
+        Ok(Table { unit, devices, places, sensors: sensors.len(), words })
     }
 }
 
-/// The number of a cell; a dash is no reading.
+/// Whether it is a dash, which is no reading.
 fn is_dash(word: Word<'_>) -> bool {
     word.is("-")
 }
@@ -107,18 +116,17 @@ impl Parser for Loadsol {
         let time = cells.next().and_then(Word::number);
         let time = time.ok_or_else(|| Error::failed("its first cell is not the time"))?;
         to.clear();
-        to.values.resize(table.sensors.len(), RawValue::MISSING);
-        let last = table.sensors.iter().copied().max().unwrap_or_default();
-        for column in 1..=last {
-            let mut peeked = cells.clone();
-            let word = peeked.next().ok_or_else(|| failed!("it has {column} of {} cells", last + 1))?;
-            let Some(slot) = table.sensors.iter().position(|&sensor| sensor == column).filter(|_| !is_dash(word))
-            else {
-                cells = peeked;
-                continue;
-            };
-            let value = next_value(&mut cells).ok_or_else(|| failed!("it has {column} of {} cells", last + 1))?;
-            to.values[slot] = value.map_err(|e| e.at(format!("column {}", column + 1)))?;
+        to.values.resize(table.sensors, RawValue::MISSING);
+        for (column, place) in table.places.iter().enumerate().skip(1) {
+            let short = || failed!("it has {column} of {} cells", table.places.len());
+            let word = cells.clone().next().ok_or_else(short)?;
+            match place.filter(|_| !is_dash(word)) {
+                Some(place) => {
+                    let value = next_value(&mut cells).ok_or_else(short)?;
+                    to.values[place] = value.map_err(|e| e.at(format!("column {}", column + 1)))?;
+                }
+                None => drop(cells.next()),
+            }
         }
         to.t_s = self.rate.time_of(Some(time), None)?;
         Ok(true)

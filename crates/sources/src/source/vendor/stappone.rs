@@ -2,6 +2,8 @@
 //! for a moment. Rows that are marked as corrupt have no values. What the values are measured in, and where the sensors are, is not
 //! in the file.
 
+use std::sync::Arc;
+
 use super::super::column_names::columns;
 use super::super::time_column::TimeColumn;
 use super::layout::{Cell, Layout, Panel, next_value};
@@ -74,7 +76,7 @@ pub(super) struct Stappone {
     rate: Rate,
     unit: Option<UnitOfP>,
     numbers: Vec<u32>,
-    header: Option<Header>,
+    header: Option<Arc<Header>>,
     time: TimeColumn,
     /// By sole, its last values and their time.
     last: Vec<Option<(f64, Vec<RawValue>)>>,
@@ -157,7 +159,7 @@ impl Parser for Stappone {
             return Ok(false);
         }
         let Some(header) = self.header.clone() else {
-            self.header = Header::of(self.separator, line);
+            self.header = Header::of(self.separator, line).map(Arc::new);
             return Ok(false);
         };
         let (sole, t_s, values) = self.row(&header, line)?;
