@@ -30,6 +30,8 @@ struct Common {
     quantity: Option<Quantity>,
     options: Options,
     pace: Pace,
+    /// The body, if it is named: that of all.
+    body: Option<Body>,
 }
 
 impl Several {
@@ -80,14 +82,11 @@ impl Several {
         for one in &self.each[1..] {
             let one = one.unheard();
             let input = Input::named(&one)?;
-            let own = input.body(&one)?;
-            let is_alike = ids(&own) == ids(body)
-                && own.links.iter().map(|link| &link.name).eq(body.links.iter().map(|link| &link.name))
-                && own.fields.iter().map(|field| &field.name).eq(body.fields.iter().map(|field| &field.name));
-            if !is_alike {
+            // One that is named is that of all.
+            if one.body.is_none() && !are_alike(&input.body(&one)?, body) {
                 return Err(other_sensors(&self.names[0]).at(&input.name));
             }
-            drop(input.open(&ids(&own), &one)?);
+            drop(input.open(&ids(body), &one)?);
         }
         Ok(())
     }
@@ -109,6 +108,7 @@ impl Several {
             // What was chosen for the first one is not chosen anew.
             options: options.clone().backend(opened.engine.backend().name.parse()?),
             pace: opened.pace,
+            body: self.first().body.is_some().then(|| opened.body.clone()),
         });
         let following = self.each.into_iter().zip(self.names).skip(1).map(|(setup, name)| {
             let common = Arc::clone(&common);
@@ -122,7 +122,7 @@ impl Common {
     /// Opens the recording that `setup` asks for, and starts to read it.
     fn begin(&self, setup: &Setup) -> Result<Begun> {
         let input = Input::named(setup)?;
-        let body = input.body(setup)?;
+        let body = self.body.clone().map_or_else(|| input.body(setup), Ok)?;
         let with_own_calibration = |body: &Body| {
             let own = setup.options(body, &ids(body), self.pace.batch)?;
             Ok((self.options.clone().calibration(own.calibration), None))
@@ -156,6 +156,16 @@ impl Common {
         }
         Ok(())
     }
+}
+
+/// Whether they have the same taxels, links and fields, wherever these are.
+fn are_alike(one: &Body, other: &Body) -> bool {
+    let names = |body: &Body| {
+        let links: Vec<String> = body.links.iter().map(|link| link.name.clone()).collect();
+        let fields: Vec<String> = body.fields.iter().map(|field| field.name.clone()).collect();
+        (links, fields)
+    };
+    ids(one) == ids(other) && names(one) == names(other)
 }
 
 fn ids(body: &Body) -> Vec<u32> {

@@ -183,6 +183,42 @@ impl Xsensor {
         Ok(())
     }
 
+    /// Takes a line that begins with a word, and has another one `beside` it.
+    fn keyword(&mut self, word: Word<'_>, beside: Option<Word<'_>>) -> Result<()> {
+        let keyword = |name: &str| is_key(word, name);
+        if keyword("SENSOR") {
+            self.sensor(&beside.map_or(String::new(), |word| word.text().into_owned()))?;
+        } else if keyword("GROUP") {
+            self.place = Place::Group;
+            if let (Some(groups), Some(number)) = (&mut self.looked_for, beside.and_then(Word::whole)) {
+                groups.begin(number);
+            }
+        } else if keyword("SENSELS") {
+            if let Place::Keys { sensor } = self.place {
+                self.table(sensor)?;
+            }
+        } else if keyword("Units") {
+            if self.unit.is_none() {
+                self.unit = beside.map(|unit| unit.text().parse()).transpose()?;
+            }
+        } else if keyword("Time") && self.place == Place::Head {
+            let text = beside.map_or(String::new(), |word| word.text().into_owned());
+            let t_s = self.time.since_first(&text)?;
+            if let Some(frame) = &mut self.frame {
+                frame.t_s = Some(t_s);
+            }
+        } else if keyword("Rows") && self.place == Place::Head && self.frame.is_some() {
+            // A recording of one sensor may leave its name out.
+            self.sensor("sensor")?;
+            self.key(word, beside)?;
+        } else if self.place == Place::Between && word.number().is_some() {
+            return Err(failed!("a row follows the last row of its sensor"));
+        } else {
+            self.key(word, beside)?;
+        }
+        Ok(())
+    }
+
     /// Takes a key of a sensor or a group, with the cells after it.
     fn key(&mut self, key: Word<'_>, beside: Option<Word<'_>>) -> Result<()> {
         let text = key.text();
@@ -313,37 +349,7 @@ impl Parser for Xsensor {
         }
         cells.next();
         let beside = cells.next();
-        if keyword("SENSOR") {
-            self.sensor(&beside.map_or(String::new(), |word| word.text().into_owned()))?;
-        } else if keyword("GROUP") {
-            self.place = Place::Group;
-            if let (Some(groups), Some(number)) = (&mut self.looked_for, beside.and_then(Word::whole)) {
-                groups.begin(number);
-            }
-        } else if keyword("SENSELS") {
-            if let Place::Keys { sensor } = self.place {
-                self.table(sensor)?;
-            }
-        } else if keyword("Units") {
-            if self.unit.is_none() {
-                self.unit = beside.map(|unit| unit.text().parse()).transpose()?;
-            }
-        } else if keyword("Time") && self.place == Place::Head {
-            let text = beside.map_or(String::new(), |word| word.text().into_owned());
-            let t_s = self.time.since_first(&text)?;
-            if let Some(frame) = &mut self.frame {
-                frame.t_s = Some(t_s);
-            }
-        } else if keyword("Rows") && self.place == Place::Head && self.frame.is_some() {
-            // A recording of one sensor may leave its name out.
-            self.sensor("sensor")?;
-            self.key(word, beside)?;
-        } else if self.place == Place::Between && word.number().is_some() {
-            return Err(failed!("a row follows the last row of its sensor"));
-        } else {
-            self.key(word, beside)?;
-        }
-        Ok(false)
+        self.keyword(word, beside).map(|()| false)
     }
 
     fn end(&mut self, to: &mut Frame) -> Result<bool> {
