@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::opened::{Opened, Pace};
 use super::running::{Begun, Following};
 use crate::body::Body;
-use crate::engine::{Engine, Options};
+use crate::engine::Options;
 use crate::error::{Error, Result, failed};
 use crate::recording::SCENE;
 use crate::setup::{Input, Setup};

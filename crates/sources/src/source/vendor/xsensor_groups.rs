@@ -55,20 +55,18 @@ impl Groups {
     }
 
     /// More of its values.
-    pub(super) fn values(&mut self, mut cells: Cells<'_>) {
-        let Some(at) = self.current else { return };
-        let values = &mut self.known[at].values;
-        while let Some(word) = cells.next() {
+    pub(super) fn values(&mut self, cells: Cells<'_>) {
+        let Some(group) = self.current.and_then(|at| self.known.get_mut(at)) else { return };
+        for word in cells {
             match word.number() {
-                Some(value) => values.push(value),
+                Some(value) => group.values.push(value),
                 // Blanks after the last one of a shorter line.
                 None if word.is_empty() => {}
-                None => self.known[at].is_sound = false,
+                None => group.is_sound = false,
             }
-            let values = &mut self.known[at].values;
-            if values.len() > super::layout::MAX_CELLS as usize {
-                values.clear();
-                self.known[at].is_sound = false;
+            if group.values.len() as u64 > super::layout::MAX_CELLS {
+                group.values.clear();
+                group.is_sound = false;
                 return;
             }
         }
