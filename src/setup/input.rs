@@ -55,6 +55,11 @@ impl Input {
                 _ => Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new(), limbs: Vec::new() }),
             };
         };
+        if setup.sources.len() > 1 && named.is_recording() {
+            return Err(Error::usage(
+                "several recordings are run one after the other by `somatic run` alone, into a table; name one of them here",
+            ));
+        }
         let Some(spec) = setup.first_source()? else { unreachable!("a source is named") };
         let name = match &spec {
             SourceSpec::Ros2Mcap(bag) => bag.to_string(),
@@ -131,11 +136,7 @@ impl Input {
     }
 
     pub fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Modbus, Ros2, Serial, Stdin, Text, Zenoh};
-        let is_live = |spec: &SourceSpec| {
-            matches!(spec, Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Modbus(_) | Zenoh(_))
-        };
-        !self.spec.as_ref().is_some_and(is_live)
+        self.spec.as_ref().is_none_or(SourceSpec::is_recording)
     }
 
     /// Whether several boards or limbs are merged.

@@ -64,6 +64,7 @@ mod run;
 mod self_contacts;
 #[cfg(unix)]
 mod serial;
+mod several;
 #[cfg(unix)]
 mod signals;
 mod simulate;
