@@ -148,6 +148,8 @@ pub mod internal {
         pub use crate::run::opened::{Opened, Pace};
         pub use crate::run::repeats::Repeats;
         pub use crate::run::running::{RunOptions, left_out};
+        #[cfg(feature = "scenes")]
+        pub use crate::run::several::Several;
         pub use crate::run::*;
     }
 }

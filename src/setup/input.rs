@@ -55,6 +55,11 @@ impl Input {
                 _ => Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new(), limbs: Vec::new() }),
             };
         };
+        if setup.sources.len() > 1 && named.is_recording() {
+            return Err(Error::usage(
+                "several recordings are run one after the other by `somatic run` alone, into a table; name one of them here",
+            ));
+        }
         let Some(spec) = setup.first_source()? else { unreachable!("a source is named") };
         let name = match &spec {
             SourceSpec::Ros2Mcap(bag) => bag.to_string(),
@@ -131,8 +136,7 @@ impl Input {
     }
 
     pub fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Text, Zenoh};
-        !matches!(self.spec, Some(Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Zenoh(_)))
+        self.spec.as_ref().is_none_or(SourceSpec::is_recording)
     }
 
     /// Whether several boards or limbs are merged.
@@ -190,7 +194,7 @@ impl Input {
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
     pub fn open(&self, ids: &[u32], setup: &Setup) -> Result<Box<dyn Source + Send>> {
         #[cfg(feature = "ros2")]
-        if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
+        if let (Some(SourceSpec::Ros2 { topic, kind }), None) = (&self.spec, &setup.map) {
             return Ok(Box::new(crate::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(setup)?)?));
         }
         if let Some(source) = setup.take_text(ids)? {

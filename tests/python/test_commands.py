@@ -60,7 +60,13 @@ ELSEWHERE = {
         "json": ITS_RESULT,
     },
     "outputs": {"json": ITS_RESULT},
-    "run": {"describe": "Engine.columns", "for": "Live.stop", "summary": "Live.boards", "table": "Percepts.touches"},
+    "run": {
+        "check-order": "it tells somebody at a terminal which pad answers while they press one after the other",
+        "describe": "Engine.columns",
+        "for": "Live.stop",
+        "summary": "Live.boards",
+        "table": "Percepts.touches",
+    },
     "view": {"beside": "a page shows what one engine computes; each recording has a `view` of its own", "for": "Shown.close"},
 }
 """

@@ -35,7 +35,8 @@ pub(in crate::cli) struct RunFlags {
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
-    /// text:-. Standard input: - for NDJSON, csv:- for CSV.
+    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with --map. Standard input: - for NDJSON, csv:- for CSV. Several
+    /// recordings go into one table with a column `recording`, each from its own beginning.
     #[arg(id = "source", long = "source", value_name = "SOURCE")]
     pub(in crate::cli) sources: Vec<String>,
 
@@ -179,7 +180,7 @@ pub(in crate::cli) struct RunFlags {
 
     /// Read the source as the export of a pressure system [default: as its content says].
     ///
-    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
+    /// One of xsensor, tekscan, emed, pliance, pedar, loadsol, footscan, stappone, or matrix for plain numbers.
     #[arg(long, help_heading = RECORDINGS, value_name = "FORMAT",
         value_parser = one_of::<VendorFormat>(VendorFormat::WORDS))]
     pub(in crate::cli) format: Option<VendorFormat>,
@@ -248,7 +249,7 @@ pub(in crate::cli) struct RunFlags {
 
     /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
     ///
-    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. dex3 and inspire are untested.
     #[arg(long, help_heading = RECORDINGS, value_name = "FILE")]
     pub(in crate::cli) map: Option<String>,
 
