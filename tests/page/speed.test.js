@@ -15,7 +15,7 @@ const SIZES = (process.env.TAXELS ?? "960").split(",").map(Number);
 const RATES_HZ = new Map([
   [1000, 250],
   [10_000, 100],
-  [Infinity, 25],
+  [Infinity, 10],
 ]);
 const LENGTH_S = 10;
 /** A window in which drawings are counted. */
