@@ -210,7 +210,7 @@ impl FieldsMade {
             if !receptor.is_of_pressure() {
                 let sensed = plan.senses.members(from.body, field, receptor);
                 if !sensed.is_empty() {
-                    self.fields.push(in_first.clone().of_senses(letter, self.members.len(), sensed));
+                    self.fields.push(in_first.clone().of_senses(letter, self.members.len(), receptor, sensed));
                 }
                 continue;
             }
