@@ -10,7 +10,7 @@ use somatic::body::Up;
 use somatic::field::FieldSet;
 use somatic::internal::author::{DrawnPoses, lint_with_progress};
 use somatic::internal::contents::{
-    COLUMNS, Contacts, Contents, FoundContacts, Quantity, Rule, Threshold, bag_as_json, of_fields, of_touches,
+    ContactTable, Contacts, Contents, FoundContacts, Quantity, Rule, Threshold, bag_as_json, of_fields, of_touches,
 };
 use somatic::internal::expected::{TestTouches, compare_layouts, expected_and_ideal_errors};
 use somatic::internal::field::{ContactTolerance, TaxelGraph, rest_overlaps};
@@ -108,7 +108,12 @@ fn known(
         json["fields"] = contacts.as_ref().map_or(Value::Null, |contacts| contacts.as_json().into());
         json
     });
-    Ok((json, contacts.map(|contacts| COLUMNS.to_owned() + &contacts.rows(text))))
+    let table = |contacts: FoundContacts| {
+        let mut table = ContactTable::new()?;
+        table.add(text, &contacts)?;
+        String::from_utf8(table.into_bytes()?).map_err(|e| Error::failed(e.to_string()))
+    };
+    Ok((json, contacts.map(table).transpose()?))
 }
 
 #[pyfunction]

@@ -61,7 +61,7 @@ ELSEWHERE = {
     },
     "outputs": {"json": ITS_RESULT},
     "run": {
-        "check-order": "it tells somebody at a terminal which pad answers while they press one after the other",
+        "check-order": "it is for somebody who presses one pad after the other, at a terminal",
         "describe": "Engine.columns",
         "for": "Live.stop",
         "summary": "Live.boards",
