@@ -21,7 +21,7 @@ use somatic::output::OutputPaths;
 use somatic::recording::Reader;
 use somatic::robot::Kinematics;
 use somatic::source::{CsvSource, Source, SourceSpec, VendorOptions, VendorSource};
-use somatic::{Body, Calibration, Result};
+use somatic::{Body, Calibration, Error, Result};
 
 use crate::author::up_of;
 use crate::body::PyBody;

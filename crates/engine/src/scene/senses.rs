@@ -142,6 +142,19 @@ impl Senses {
         }
     }
 
+    /// Refuses what is `asked` of touches by name and no letter gives. Whoever asks for everything gets what there is.
+    pub(super) fn check_touches(&self, asked: TouchOutputs) -> Result<()> {
+        let others = (TouchOutputs::SHEAR | TouchOutputs::TEMPERATURE) & asked;
+        let lacking: Vec<String> = (others - self.of_touches()).names().map(|name| format!("touches.{name}")).collect();
+        if lacking.is_empty() || asked == TouchOutputs::all() {
+            return Ok(());
+        }
+        Err(Error::usage(format!(
+            "no letter gives `{}`: no field's taxels have it, or it is not asked for",
+            listed(&lacking)
+        )))
+    }
+
     /// What touches have of these letters.
     pub(super) fn of_touches(&self) -> TouchOutputs {
         let shear = self.shear.as_ref().map_or(TouchOutputs::empty(), |_| TouchOutputs::SHEAR);

@@ -16,7 +16,7 @@ use super::{Plan, PlanField};
 use crate::body::{Body, KeptOfShape, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Field, FieldSet, WORLD};
-use crate::percept::Outputs;
+use crate::percept::{Outputs, TouchOutputs};
 use crate::signal::{Calibration, Letter, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::layout;
@@ -42,6 +42,8 @@ impl Plan {
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
         plan.senses = Senses::new(body, fields, &chosen, &letters, calibration);
         plan.letters = letters;
+        let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
+        plan.senses.check_touches(of_touches).map_err(|e| e.at(&body.name))?;
         plan.touch_outputs = touches.map(|touches| touches.outputs | plan.senses.of_touches());
         plan.left_out = left_out;
         let first_slots = plan.lay_out_slots(calibration)?;

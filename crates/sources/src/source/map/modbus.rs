@@ -283,7 +283,7 @@ mod tests {
         }
         for (map, says) in [
             ("values = 'tip'", "registers: name them"),
-            ("values = 'palm'\nregisters = { tip = [0, 1] }", "registers: there is no `palm`; did you mean `tip`?"),
+            ("values = 'palm'\nregisters = { tip = [0, 1] }", "registers: there is no `palm`; it is one of tip"),
             ("values = 'tip'\ntime = 't'\nregisters = { tip = [0, 1] }", "registers have neither a time"),
         ] {
             let why = ModbusRegisters::connect("127.0.0.1:1", &ArrayMap::parse(map).unwrap()).err().unwrap();

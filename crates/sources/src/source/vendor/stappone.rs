@@ -110,6 +110,7 @@ impl Stappone {
     fn finish(&mut self, to: &mut Frame) -> Result<bool> {
         let (Some((t_s, _)), Some(header)) = (self.pending.take(), &self.header) else { return Ok(false) };
         to.clear();
+        to.values.clear();
         for last in &self.last {
             match last {
                 Some((at_s, values)) if (0.0..=KEPT_S).contains(&(t_s - at_s)) => to.values.extend_from_slice(values),

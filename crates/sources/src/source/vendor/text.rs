@@ -286,8 +286,8 @@ mod tests {
     fn cells_stand_between_separators() {
         assert_eq!(words(Separator::One(b','), "a, b ,,\"c\""), ["a", "b", "", "c"]);
         assert_eq!(words(Separator::Blanks, "  a\t b  "), ["a", "b"]);
-        assert_eq!(words(Separator::One(b','), "\"a, b\", \"c\",\"d"), ["a, b", "c", "\"d"]);
-        assert_eq!(words(Separator::One(b';'), "\"\";\"a;b\"x;c"), ["", "\"a;b\"x", "c"]);
+        assert_eq!(words(Separator::One(b','), "\"a, b\", \"c\",\"d"), ["a, b", "c", "\\\"d"]);
+        assert_eq!(words(Separator::One(b';'), "\"\";\"a;b\"x;c"), ["", "\\\"a;b\\\"x", "c"]);
         assert_eq!(words(Separator::Blanks, "   "), [""; 0]);
         assert_eq!(words(Separator::One(b';'), ""), [""]);
     }
