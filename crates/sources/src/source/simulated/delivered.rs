@@ -39,11 +39,13 @@ pub(super) fn channels(body: &Body) -> (Vec<u32>, Vec<Delivered>) {
     made.into_iter().unzip()
 }
 
-/// The calibration's table of tangential forces: empty where none are simulated, and where it says nothing.
-pub(super) fn shear_calibration(sensor: &Sensor, pulls_newton: &[[f64; 2]]) -> String {
+/// The calibration's table of tangential forces, of which `friction` is the one that all touches have: empty where none are simulated,
+/// and where it says nothing.
+pub(super) fn shear_calibration(sensor: &Sensor, pulls_newton: &[[f64; 2]], friction: Option<f64>) -> String {
     let rest = sensor.kind.pull_at_rest();
-    if pulls_newton.is_empty() || rest == 0.0 {
+    if pulls_newton.is_empty() || (rest == 0.0 && friction.is_none()) {
         return String::new();
     }
-    format!("\n[shear]\nbaseline = [{rest}, {rest}]\n")
+    let slips_at = friction.map(|friction| format!("slips_at = {friction}\n")).unwrap_or_default();
+    format!("\n[shear]\nbaseline = [{rest}, {rest}]\n{slips_at}")
 }

@@ -60,6 +60,11 @@ impl Friction {
         Self { coefficient, held: None }
     }
 
+    /// μ
+    pub(super) fn coefficient(&self) -> f64 {
+        self.coefficient
+    }
+
     /// Lets go of the skin.
     pub(super) fn release(&mut self) {
         self.held = None;

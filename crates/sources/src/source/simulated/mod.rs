@@ -252,7 +252,7 @@ impl SimulatedSource {
     pub fn calibration(&self) -> String {
         let body = Path::new(&self.body.name).file_name().unwrap_or_default();
         let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids, self.sensors);
-        text + &delivered::shear_calibration(&self.sensor, &self.pulls_newton)
+        text + &delivered::shear_calibration(&self.sensor, &self.pulls_newton, self.touches.friction())
             + &self.senses.calibration()
             + &self.layer.calibration()
     }

@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::contact::Layer;
 use super::file::TouchKeys;
+use super::friction::Friction;
 use super::link_touch::{Felt, Kinds, LinkTouch, Places};
 use super::setup::Setup;
 use super::truth::Truth;
@@ -69,6 +70,17 @@ impl Touches {
             all.push(Pressing::Link(LinkTouch { touch, beside, link, places }));
         }
         Ok(Self { all, body_skin })
+    }
+
+    /// The μ of all touches that have one, if it is the same.
+    pub(super) fn friction(&self) -> Option<f64> {
+        let of_touch = |touch: &Pressing| match touch {
+            Pressing::Link(touch) => touch.beside.friction.as_ref().map(Friction::coefficient),
+            Pressing::Body(_) => None,
+        };
+        let mut all = self.all.iter().filter_map(of_touch);
+        let first = all.next()?;
+        all.all(|other| other == first).then_some(first)
     }
 
     /// Forgets what indenters hold.

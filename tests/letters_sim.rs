@@ -1,0 +1,2 @@
+#[path = "it/letters_simulated.rs"]
+mod letters_simulated;
