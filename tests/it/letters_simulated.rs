@@ -128,28 +128,30 @@ fn drag(degrees: f64, length_m: f64, speed_m_s: f64, friction: f64) -> String {
 #[test]
 fn a_drag_has_its_direction_within_a_degree() {
     let body = skin(1);
-    let (mut each_frame, mut each_drag) = (Vec::new(), Vec::new());
+    let (mut each_frame, mut each_twentieth, mut each_drag) = (Vec::new(), Vec::new(), Vec::new());
     for turn in 0..24 {
         let degrees = 15.0 * f64::from(turn) + 4.0;
         let run = with_noise(&body, 1.3, &drag(degrees, 0.02, 0.02, 0.6));
-        let mut sum = [0.0; 2];
+        let off = |[u, v]: [f64; 2]| angle_between(v.atan2(u), degrees.to_radians()).to_degrees();
+        let mut shears: Vec<[f64; 2]> = Vec::new();
         for moment in run.iter().filter(|moment| moment.truth.as_ref().is_some_and(|truth| truth.slips == Some(true))) {
             let truth = moment.truth.as_ref().unwrap().shear_uv.unwrap();
-            assert!(angle_between(truth[1].atan2(truth[0]), degrees.to_radians()).abs() < 1e-9);
+            assert!(off(truth).abs() < 1e-9);
             let shear = moment.percept.shear.unwrap();
-            each_frame.push(angle_between(shear[1].atan2(shear[0]), degrees.to_radians()).to_degrees());
             assert_eq!(moment.percept.shear_direction, Some(shear[1].atan2(shear[0])));
-            sum = [sum[0] + shear[0], sum[1] + shear[1]];
+            shears.push(shear);
         }
-        each_drag.push(angle_between(sum[1].atan2(sum[0]), degrees.to_radians()).to_degrees());
+        let sum = |shears: &[[f64; 2]]| shears.iter().fold([0.0; 2], |[u, v], shear| [u + shear[0], v + shear[1]]);
+        each_frame.extend(shears.iter().copied().map(off));
+        each_twentieth.extend(shears.windows(5).map(|shears| off(sum(shears))));
+        each_drag.push(off(sum(&shears)));
     }
-    eprintln!(
-        "direction: {:.3}° RMS a frame of {}, {:.3}° a drag",
-        rms(&each_frame),
-        each_frame.len(),
-        rms(&each_drag)
-    );
-    assert!(each_frame.len() > 2000 && rms(&each_drag) <= 1.0, "{}", rms(&each_drag));
+    let [frame, twentieth, drag] = [&each_frame, &each_twentieth, &each_drag].map(|off| rms(off));
+    let frames = each_frame.len();
+    eprintln!("direction: {frame:.2}° RMS a frame of {frames}, {twentieth:.2}° over 50 ms, {drag:.2}° a drag");
+    // Of one frame the noise itself is over a degree: 3 % of the largest force on each of about eleven taxels, over a pull of 0.6 times
+    // 6.5 of those.
+    assert!(frames > 2000 && twentieth <= 1.0 && drag <= 0.5 && frame < 2.0);
 }
 
 #[test]
@@ -336,13 +338,14 @@ fn what_makes_no_sense_is_said_with_its_line() {
         SimulatedSource::on_body("a.toml", &text, body.clone()).map(|_| ()).unwrap_err().to_string()
     };
     let layer = "[layer]\nthickness_m = 0.005";
+    assert!(why("", "friction = 0.5").starts_with("a.toml: line 8"), "{}", why("", "friction = 0.5"));
     assert!(why("", "friction = 0.5").contains("`friction` needs a layer that gives way"));
     assert!(why(layer, "friction = 0").contains("`friction` is 0; it must be over 0"));
     assert!(why(layer, "twist_deg = [[0, 0]]").contains("`twist_deg` has no effect without `friction`"));
     assert!(why(layer, "gap_m = [[0, -1]]").contains("`gap_m` is -1 at 0 s; give [t, metres, 0 or more]"));
     assert!(why(layer, "celsius = inf").contains("`celsius`"));
-    assert!(why("[temperature]\ntime_constant_s = 0", "").contains("line 4: `time_constant_s` is 0"));
-    assert!(why("[sensor]\nkind = \"fsr\"", "").contains("line 4: `kind` is fsr, which feels only the normal force"));
+    assert!(why("[temperature]\ntime_constant_s = 0", "").contains("`time_constant_s` is 0; it must be over 0"));
+    assert!(why("[sensor]\nkind = \"fsr\"", "").contains("`kind` is fsr, which feels only the normal force"));
     let off = why(
         layer,
         "gap_m = [[0, 0.1]]\n[[touch]]\non = \"skin\"\nindenter = \"fingertip\"\npath = [[1, 1]]\n\

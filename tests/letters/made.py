@@ -187,7 +187,8 @@ def random_calibration(rng, body):
     every |= {"noise": number(0.1, 3)} if rng.random() < 0.7 else {}
     every |= {"invert": True} if rng.random() < 0.2 else {}
     every |= {"raw_range": [-1000, 900], "missing": [30000]} if rng.random() < 0.4 else {}
-    every |= {"p_max": every["dead_band"] + number(5, 500)} if rng.random() < 0.4 else {}
+    # A limit under what a baseline would be of the largest gain is refused.
+    every |= {"p_max": number(620, 1500)} if rng.random() < 0.4 else {}
     every["dead_band"] = round(every["dead_band"] * every["gain"], 6)
     file = {"all": every, "curve": {
         "warm": {"raw": [0.0, 100.5, 400.0, 1000.0], "p": [-10.0, 18.5, 36.0, 90.25]},
@@ -250,7 +251,7 @@ class Frames:
             on = step * (rng.choice([1, 1, 2, 7]) if rng.random() < 0.2 else 1)
             if rng.random() < 0.01:
                 on = -2.5 if rng.random() < 0.5 else 12.0
-            times.append(round(times[-1] + on, 6))
+            times.append(round(float(times[-1] + on), 6))
         self.t = times
         steps = np.diff(times, prepend=times[0])
         self.restarts = (np.abs(steps) > 1e-9) & ((steps < 0) | (steps > 10))
@@ -319,6 +320,6 @@ def recordings(long, seed):
     mixes = [KINDS, KINDS[1:], ("force3",), ("temperature",), ("proximity",), ("pressure", "temperature")]
     for number in range(180 if long else 8):
         rng = np.random.default_rng([seed, number])
-        recording = Recording(f"letters-{number}", rng, 260 if long else 40, mixes[number % len(mixes)] if number % 3 else KINDS, ("cpu", "reference")[number % 2])
+        recording = Recording(f"letters-{number}", rng, 260 if long else 60, mixes[number % len(mixes)] if number % 3 else KINDS, ("cpu", "reference")[number % 2])
         if recording.letters():
             yield recording

@@ -32,8 +32,8 @@ LETTERS = {
         "nearest", "nearest_taxel", "nearest_position", "nearest_normal", "approach_speed", "covered", "proximity_centroid",
     ],
 }
-# Rounding of double precision, as a share of the terms that are summed.
-SAME = 1e-10
+# Rounding of double precision: hundreds of units, as a share of the terms that are summed.
+SAME = 1e-13
 HUGE = 2.0**60
 LEAST_M = 1e-4
 LONGEST_GAP_S, SHORTEST_STEP_S = 10.0, 1e-9
@@ -68,10 +68,10 @@ class Slope:
         if t - self.kept[0][0] < self.window / 2:
             return None
         times, values, sizes = np.array(self.kept).T
-        away = times - times.mean()
-        # The times themselves are rounded, and their differences as much.
+        away = times - times[0]
+        away -= away.mean()
         size = np.abs(values).max() + sizes.max()
-        return Value((away * (values - values.mean())).sum() / (away**2).sum(), size / (t - times[0]) * max(1.0, abs(t) / self.window))
+        return Value((away * (values - values.mean())).sum() / (away**2).sum(), size / (t - times[0]))
 
 
 def interpolated(curve, x):
@@ -86,9 +86,17 @@ UNITS = {
 PRESSURES = {"N": ("N", 1.0), "mN": ("N", 1e-3), "kPa": ("Pa", 1e3), "Pa": ("Pa", 1.0), None: (None, 1.0)}
 
 
-def sensed(recording, letter, taxels, raw, missing):
+def read(recording, taxels, axis=""):
+    """Raw values by frame and taxel, and which are missing: codes of [all] are so on every channel."""
+    raw, missing = recording.frames.of(taxels, axis)
+    codes = recording.calibration.get("all", {}).get("missing", [])
+    return raw, missing | np.isin(raw, np.array(codes, np.float32).astype(float))
+
+
+def sensed(recording, letter, taxels):
     """By frame and taxel: the value, whether it is in the sensor's range, which are missing, which are faulty."""
     file, body = recording.calibration, recording.body
+    raw, missing = read(recording, taxels)
     keys = file.get(letter, {})
     factor, offset = UNITS[letter][keys.get("unit", "°C" if letter == "temperature" else "mm")]
     every = {"baseline": 0.0, "gain": 1.0, "raw_range": [-np.inf, np.inf]} | keys
@@ -138,7 +146,7 @@ def arc(a, b, x):
 
 def temperatures(recording, field, frames):
     """What is right of a field's temperatures, by frame: quantities, flags."""
-    values, inside, missing, faulty = sensed(recording, "temperature", field.members, *frames.of(field.members))
+    values, inside, missing, faulty = sensed(recording, "temperature", field.members)
     slope = Slope(recording.calibration.get("temperature", {}).get("window_s", 1.0))
     for frame, t in enumerate(frames.t):
         if frames.restarts[frame]:
@@ -176,7 +184,7 @@ def temperatures(recording, field, frames):
 
 def distances(recording, field, frames):
     keys = recording.calibration.get("proximity", {})
-    values, inside, missing, faulty = sensed(recording, "proximity", field.members, *frames.of(field.members))
+    values, inside, missing, faulty = sensed(recording, "proximity", field.members)
     slope = Slope(keys.get("window_s", 0.1))
     reach = keys["range"] * UNITS["proximity"][keys.get("unit", "mm")][0] if "range" in keys else np.inf
     for frame, t in enumerate(frames.t):
@@ -223,9 +231,8 @@ def shears(recording, field, frames):
     cross = np.array(keys.get("cross_axis", [[0, 1, 0], [0, 0, 1]]), float)
     areas = body.area[field.members]
     newtons = {"N": np.ones(len(areas)), "Pa": np.where(areas > 0, areas, np.nan), None: np.full(len(areas), np.nan)}[quantity]
-    raw, missing = frames.of(field.members)
-    missing = missing | np.isin(raw, np.array(every.get("missing", []), np.float32).astype(float))
-    sides = [frames.of(field.members, axis) for axis in ("u", "v")]
+    raw, missing = read(recording, field.members)
+    sides = [read(recording, field.members, axis) for axis in ("u", "v")]
     for frame in range(len(frames.t)):
         gone = missing[frame]
         bad = ~gone & (mask | ~np.isfinite(raw[frame]))
