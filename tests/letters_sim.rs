@@ -1,2 +1,0 @@
-#[path = "it/letters_simulated.rs"]
-mod letters_simulated;
