@@ -338,7 +338,7 @@ fn what_makes_no_sense_is_said_with_its_line() {
         SimulatedSource::on_body("a.toml", &text, body.clone()).map(|_| ()).unwrap_err().to_string()
     };
     let layer = "[layer]\nthickness_m = 0.005";
-    assert!(why("", "friction = 0.5").starts_with("a.toml: line 8"), "{}", why("", "friction = 0.5"));
+    assert!(why("", "friction = 0.5").starts_with("a.toml: line 9"), "{}", why("", "friction = 0.5"));
     assert!(why("", "friction = 0.5").contains("`friction` needs a layer that gives way"));
     assert!(why(layer, "friction = 0").contains("`friction` is 0; it must be over 0"));
     assert!(why(layer, "twist_deg = [[0, 0]]").contains("`twist_deg` has no effect without `friction`"));
