@@ -54,13 +54,13 @@ impl PySimulation {
             py.check_signals()?;
         }
         let calibration = PyCalibration::of_text(&source.calibration(), &body).or_raise(py)?;
-        let width = source.taxels().len();
+        let pressed = source.forces_newton().len();
         let recording =
             frames.finish(py, name, &source, Some(Py::new(py, body)?), Some(Py::new(py, calibration)?), true)?;
         Ok(Self {
             recording: Py::new(py, recording)?,
             truth: truth(py, &rows)?,
-            forces: array(py, forces, &[index, width])?,
+            forces: array(py, forces, &[index, pressed])?,
         })
     }
 }
@@ -96,6 +96,12 @@ fn truth(py: Python<'_>, rows: &[Row]) -> PyResult<Py<PyAny>> {
         ("direction", "f8", 3, numbers(3, &|truth| vector(truth.direction_in_link.map(Into::into)))?),
         ("principal_axis", "f8", 3, numbers(3, &|truth| vector(truth.principal_axis_in_link.map(Into::into)))?),
         ("depth", "f8", 1, numbers(1, &|truth| vec![truth.depth_m.unwrap_or(nan)])?),
+        ("shear", "f8", 3, numbers(3, &|truth| vector(truth.shear_in_link.map(Into::into)))?),
+        ("shear_uv", "f8", 2, numbers(2, &|truth| truth.shear_uv.unwrap_or([nan; 2]).to_vec())?),
+        ("torsion", "f8", 1, numbers(1, &|truth| vec![truth.torsion.unwrap_or(nan)])?),
+        ("slips", "f8", 1, numbers(1, &|truth| vec![truth.slips.map_or(nan, |slips| u8::from(slips).into())])?),
+        ("gap", "f8", 1, numbers(1, &|truth| vec![truth.gap_m.unwrap_or(nan)])?),
+        ("celsius", "f8", 1, numbers(1, &|truth| vec![truth.celsius.unwrap_or(nan)])?),
     ];
     structured(py, count, &fields).map(Bound::unbind)
 }
@@ -111,14 +117,15 @@ impl PySimulation {
     /// What is true, an array of structures, one for each touch that presses in a frame: `frame`, `touch`, `name`, `link`, `field`;
     /// `position` and `normal` [3] in the link's frame and `uv` [2] in the field's chart, in metres; `angle` along, in rad;
     /// `velocity` [3], `velocity_uv` [2] and `speed`, in m/s; `force`, in N;
-    /// of touches of the whole body `direction` and `principal_axis` [3], unit vectors in the link's frame, and `depth`, in metres.
-    /// What is not defined is NaN.
+    /// of touches of the whole body `direction` and `principal_axis` [3], unit vectors in the link's frame, and `depth`, in metres;
+    /// of those with friction on taxels with three axes `shear` [3] in the link's frame and `shear_uv` [2], in N, `torsion`, in N m,
+    /// and `slips`, 0 or 1; `gap`, in metres, above the skin, and the indenter's `celsius`. What is not defined is NaN.
     #[getter]
     fn truth(&self, py: Python<'_>) -> Py<PyAny> {
         self.truth.clone_ref(py)
     }
 
-    /// The force on each taxel before its sensor, float64 [frames, taxels], in N.
+    /// The force along the normal on each taxel of pressure or force before its sensor, float64 [frames, taxels], in N.
     #[getter]
     fn forces(&self, py: Python<'_>) -> Py<PyAny> {
         self.forces.clone_ref(py)

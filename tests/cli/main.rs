@@ -22,6 +22,7 @@ mod exports;
 mod fields;
 mod formats;
 mod inspect;
+mod letters_oracle;
 mod limbs;
 #[cfg(all(unix, feature = "zenoh"))]
 mod limbs_faults;

@@ -488,7 +488,12 @@ pub(super) fn wiring() -> Target {
 }
 
 pub(super) fn simulation() -> Target {
-    target("simulation", "a.toml", [file("examples/simulations/press.toml")], |case| {
+    let beside = "rate_hz = 20\nduration_s = 1\n[layer]\nthickness_m = 0.005\n[temperature]\nambient_celsius = 20\n\
+                  time_constant_s = 0.5\nnoise_sigma = 0.1\n[proximity]\nrange_m = 0.2\nnoise_sigma = 1\n[[touch]]\n\
+                  on = \"hand/back\"\nindenter = \"ball\"\nradius_m = 0.008\npath = [[0, 0], [0, 0.01]]\nspeed_m_s = 0.02\n\
+                  hold = { newton = 3 }\nfriction = 0.6\ntwist_deg = [[0, 0], [1, 20]]\ncelsius = 34\n\
+                  gap_m = [[0, 0.1], [0.5, 0]]\n";
+    target("simulation", "a.toml", [file("examples/simulations/press.toml"), beside.into()], |case| {
         let body = Body::from_bytes("hand", bundled::HAND).map_err(|e| e.to_string())?;
         verdict(SimulatedSource::on_body("a.toml", &case.text(), body))
     })

@@ -33,6 +33,7 @@ mod imported;
 mod knobs;
 mod legal;
 mod letters;
+mod letters_simulated;
 mod lint;
 mod meshes;
 mod mirrored;

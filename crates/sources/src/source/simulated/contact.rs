@@ -216,6 +216,21 @@ impl Footprint {
         loads
     }
 
+    /// The radius of an even disc with the same second moment, m; of a layer that is no Gaussian, by the Gaussian of its peak.
+    pub(super) fn radius_m(&self) -> f64 {
+        let moment = |load: &Load| {
+            let [across, along, half] = [load.across_m, load.along_m, load.half_m].map(|x| x * x);
+            load.part * (across + along + half / 3.0)
+        };
+        let blurred: f64 = match self.blur {
+            Blur::Gaussian { sigma_across_m, sigma_along_m } => {
+                sigma_across_m * sigma_across_m + sigma_along_m * sigma_along_m
+            }
+            Blur::Radial { .. } => 2.0 * self.blur.sigma_m() * self.blur.sigma_m(),
+        };
+        (2.0 * (blurred + self.loads.iter().map(moment).sum::<f64>())).sqrt()
+    }
+
     /// Maximum distance from the tangent plane at which a taxel is touched, m.
     pub(super) fn depth_m(&self) -> f64 {
         MAX_DEPTH_M + self.half_across_m + DEPTH_SIGMAS * self.blur.sigma_m()

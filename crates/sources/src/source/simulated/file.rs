@@ -15,6 +15,10 @@ pub(super) struct File {
     #[serde(default)]
     pub(super) sensor: SensorKeys,
     #[serde(default)]
+    pub(super) temperature: TemperatureKeys,
+    #[serde(default)]
+    pub(super) proximity: ProximityKeys,
+    #[serde(default)]
     pub(super) calibration: CalibrationKeys,
     #[serde(default)]
     pub(super) touch: Vec<Spanned<TouchKeys>>,
@@ -58,6 +62,25 @@ pub(super) enum ContactName {
     Hertz,
 }
 
+/// Temperature sensors and what they are in.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TemperatureKeys {
+    pub(super) ambient_celsius: Option<Spanned<f64>>,
+    pub(super) time_constant_s: Option<Spanned<f64>>,
+    /// °C
+    pub(super) noise_sigma: Option<Spanned<f64>>,
+}
+
+/// Distance sensors.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ProximityKeys {
+    pub(super) range_m: Option<Spanned<f64>>,
+    /// mm
+    pub(super) noise_sigma: Option<Spanned<f64>>,
+}
+
 /// What the calibration says of these sensors that is not so.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -85,8 +108,7 @@ pub(super) enum OutputName {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorKeys {
-    #[serde(default)]
-    pub(super) kind: SensorName,
+    pub(super) kind: Option<Spanned<SensorName>>,
     pub(super) wiper: Option<Spanned<i64>>,
     pub(super) output: Option<Spanned<OutputName>>,
     pub(super) full_scale_newton: Option<Spanned<f64>>,
@@ -181,6 +203,10 @@ pub(super) struct TouchKeys {
     pub(super) tap: Option<Spanned<TapKeys>>,
     pub(super) press: Option<Spanned<PressKeys>>,
     pub(super) hold: Option<Spanned<HoldKeys>>,
+    pub(super) friction: Option<Spanned<f64>>,
+    pub(super) twist_deg: Option<Spanned<Vec<[f64; 2]>>>,
+    pub(super) celsius: Option<Spanned<f64>>,
+    pub(super) gap_m: Option<Spanned<Vec<[f64; 2]>>>,
 }
 
 #[derive(Deserialize)]

@@ -4,17 +4,23 @@
 
 mod calibration;
 mod contact;
+mod delivered;
 mod disturbed;
 mod file;
+mod friction;
 mod layer;
 mod link_touch;
+mod nearness;
 mod noise;
 mod patch;
 mod path;
+mod pressing;
 mod profile;
 mod quadrature;
 mod radial;
 mod record;
+mod senses;
+mod senses_setup;
 mod sensor;
 mod sensors;
 mod setup;
@@ -25,7 +31,6 @@ mod whole_truth;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use toml::Spanned;
 
@@ -34,15 +39,18 @@ pub use truth::Truth;
 pub use whole::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 
 use self::contact::Layer;
+use self::delivered::Delivered;
 use self::disturbed::{Disturbed, Wires};
-use self::file::File;
-use self::link_touch::{LinkTouch, places_in};
+use self::file::{File, SensorName};
+use self::link_touch::{Felt, Kinds};
+use self::pressing::{Touches, WrongTouch};
+use self::senses::{Sensed, Senses};
 use self::sensor::{Reading, Sensor};
 use self::setup::Setup;
-use self::whole::{BodySkin, Covers};
-use self::whole_truth::{Moment, TouchOfBody};
+use self::whole::Covers;
+use self::whole_truth::Moment;
 use super::Source;
-use crate::body::{Body, Taxel};
+use crate::body::{Body, Modality, Taxel};
 use crate::bundled;
 use crate::error::{Error, ErrorKind, Result, failed};
 use crate::field::{FieldSet, Lattice};
@@ -61,31 +69,23 @@ pub struct SimulatedSource {
     disturbed: Disturbed,
     /// What the sensors cover.
     sensors: Sensors,
-    /// Ids of the pressure taxels, and per taxel its index in the body and the side of a square of its area, m.
+    /// Ids of the pressed taxels, and per taxel its index in the body and the side of a square of its area, m.
     ids: Vec<u32>,
     taxels: Vec<(usize, f64)>,
-    touches: Vec<Pressing>,
-    /// The skin of the whole body, if touches press that.
-    body_skin: Option<Arc<BodySkin>>,
+    senses: Senses,
+    /// The channels of a frame, and what each delivers.
+    channels: Vec<u32>,
+    delivered: Vec<Delivered>,
+    touches: Touches,
     next: u64,
     truth: Vec<Truth>,
     forces_newton: Vec<f64>,
+    /// By pressed taxel along its tangents; empty where none has three axes.
+    pulls_newton: Vec<[f64; 2]>,
+    sensed: Sensed,
 }
 
 somatic_skin::debug_by_name!(SimulatedSource);
-
-/// A touch of one link, or of the whole body.
-enum Pressing {
-    Link(LinkTouch),
-    Body(TouchOfBody),
-}
-
-/// What becomes of a touch that the body has no place for.
-#[derive(Clone, Copy, PartialEq)]
-enum WrongTouch {
-    Refuse,
-    LeaveOut,
-}
 
 impl SimulatedSource {
     /// Opens the simulation in the TOML file at `path`.
@@ -164,9 +164,16 @@ impl SimulatedSource {
         }
         let pressure = || body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality.is_pressed());
         let ids: Vec<u32> = pressure().map(|(_, taxel)| taxel.id).collect();
-        if ids.is_empty() {
-            return Err(failed!("the body `{}` has no pressure taxels", body.name));
+        let (channels, delivered) = delivered::channels(&body);
+        if channels.is_empty() {
+            return Err(failed!("the body `{}` has no taxels of a kind that is simulated", body.name));
         }
+        let has_pulls = body.taxels.iter().any(|taxel| taxel.modality == Modality::Force3);
+        if let Some(kind) = file.sensor.kind.as_ref().filter(|kind| has_pulls && *kind.get_ref() == SensorName::Fsr) {
+            let what = "`kind` is fsr, which feels only the normal force; taxels with three axes need ideal or linear";
+            return Err(text.wrong(kind.span(), what));
+        }
+        let senses = Senses::new(text, &body, &file.temperature, &file.proximity)?;
         let area = file.sensor.area_m2.as_ref().map(|area| text.positive("area_m2", area)).transpose()?;
         let side = |taxel: &Taxel| match area.unwrap_or(taxel.area) {
             area if area > 0.0 => Ok(area.sqrt()),
@@ -178,29 +185,10 @@ impl SimulatedSource {
         let layer = setup.layer(file.layer.as_ref())?;
         let sensor = sensors::sensors(text, &file.sensor, &file.calibration, file.seed, &ids)?;
         let disturbed = disturbed(text, file, &fields, &taxels)?;
-        let mut touches = Vec::with_capacity(file.touch.len());
-        let mut places = BTreeMap::new();
-        let mut body_skin = None;
         let covers = whole_setup::covers(text, &file.sensor)?;
-        for (index, keys) in file.touch.iter().enumerate() {
-            if whole_setup::is_of_body(keys.get_ref()) {
-                let make = || BodySkin::new(&body, &layer, &taxels, covers);
-                match (setup.body_touch(index, keys.get_ref(), &layer, &mut body_skin, make), wrong) {
-                    (Err(_), WrongTouch::LeaveOut) => {}
-                    (touch, _) => touches.push(Pressing::Body(TouchOfBody::new(touch?))),
-                }
-                continue;
-            }
-            let touch = match (setup.touch(index, keys.get_ref()), wrong) {
-                (Err(_), WrongTouch::LeaveOut) => continue,
-                (touch, _) => touch?,
-            };
-            let in_link = || places_in(&body, touch.link, &taxels);
-            let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
-            let link = body.links[touch.link].name.clone();
-            touches.push(Pressing::Link(LinkTouch { link, touch, taxels: places }));
-        }
-        let sensors = match &body_skin {
+        let kinds = Kinds { pressed: &taxels, warm: &senses.warm, near: &senses.near, has_pulls };
+        let touches = Touches::new(&mut setup, &file.touch, &layer, kinds, covers, wrong)?;
+        let sensors = match &touches.body_skin {
             Some(_) if covers == Covers::Cell => Sensors::Cell,
             _ => size_of(&taxels),
         };
@@ -213,10 +201,14 @@ impl SimulatedSource {
             disturbed,
             sensors,
             forces_newton: vec![0.0; ids.len()],
+            pulls_newton: if has_pulls { vec![[0.0; 2]; ids.len()] } else { Vec::new() },
+            sensed: senses.untouched(),
             ids,
+            senses,
+            channels,
+            delivered,
             taxels,
             touches,
-            body_skin,
             next: 0,
             truth: Vec::new(),
             body,
@@ -247,7 +239,7 @@ impl SimulatedSource {
         &self.truth
     }
 
-    /// The force on each taxel in the frame read last, N, in the order of [`Source::taxels`], before any sensor.
+    /// The force on each taxel of pressure or force in the frame read last, N, ascending by id, before any sensor: along its normal.
     #[must_use]
     pub fn forces_newton(&self) -> &[f64] {
         &self.forces_newton
@@ -260,11 +252,19 @@ impl SimulatedSource {
     pub fn calibration(&self) -> String {
         let body = Path::new(&self.body.name).file_name().unwrap_or_default();
         let text = self.sensor.calibration(&body.to_string_lossy(), &self.ids, self.sensors);
-        text + &self.layer.calibration()
+        text + &delivered::shear_calibration(&self.sensor, &self.pulls_newton, self.touches.friction())
+            + &self.senses.calibration()
+            + &self.layer.calibration()
     }
 
-    /// By how much the gain of each taxel differs from what the calibration says, in the order of [`Source::taxels`]: the
-    /// factors on their forces.
+    /// The temperature of each temperature taxel in the frame read last, °C, ascending by id, before its noise.
+    #[must_use]
+    pub fn celsius(&self) -> &[f64] {
+        self.senses.celsius()
+    }
+
+    /// By how much the gain of each taxel differs from what the calibration says, in the order of
+    /// [`SimulatedSource::forces_newton`]: the factors on their forces.
     #[must_use]
     pub fn gains(&self) -> &[f64] {
         &self.sensor.gains
@@ -276,9 +276,12 @@ impl SimulatedSource {
         self.seek(0);
     }
 
-    /// Makes `frame` (counted from 0) the one that is read next. Hysteresis knows nothing of what was before it.
+    /// Makes `frame` (counted from 0) the one that is read next. Hysteresis, friction and temperatures know nothing of what was
+    /// before it.
     pub fn seek(&mut self, frame: u64) {
         self.disturbed.rest();
+        self.senses.rest();
+        self.touches.rest();
         self.next = frame.min(self.frames);
     }
 
@@ -286,26 +289,21 @@ impl SimulatedSource {
         frame as f64 / self.rate_hz
     }
 
-    /// Adds a touch's forces and its truth.
-    fn press(&mut self, index: usize, frame: u64) -> Result<()> {
+    /// Presses all touches in `frame`.
+    fn press(&mut self, frame: u64) -> Result<()> {
         let before_s = frame.checked_sub(1).map(|frame| self.time(frame));
-        let moment = Moment { touch: index, frame, t_s: self.time(frame), before_s };
-        match &mut self.touches[index] {
-            Pressing::Link(touch) => {
-                self.truth.extend(touch.press(&self.layer, &self.taxels, &moment, &mut self.forces_newton)?);
-            }
-            Pressing::Body(touch) => {
-                let Some(skin) = &self.body_skin else { return Ok(()) };
-                self.truth.extend(touch.press(&self.body, skin, &moment, &mut self.forces_newton)?);
-            }
-        }
-        Ok(())
+        let moment = Moment { touch: 0, frame, t_s: self.time(frame), before_s };
+        let has_pulls = !self.pulls_newton.is_empty();
+        let kinds = Kinds { pressed: &self.taxels, warm: &self.senses.warm, near: &self.senses.near, has_pulls };
+        let (forces_newton, pulls_newton) = (&mut self.forces_newton, &mut self.pulls_newton);
+        let mut felt = Felt { forces_newton, pulls_newton, sensed: &mut self.sensed };
+        self.touches.press(&self.body, &self.layer, kinds, &moment, (&mut felt, &mut self.truth))
     }
 }
 
 impl Source for SimulatedSource {
     fn taxels(&self) -> &[u32] {
-        &self.ids
+        &self.channels
     }
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
@@ -316,16 +314,23 @@ impl Source for SimulatedSource {
         self.next += 1;
         self.truth.clear();
         self.forces_newton.fill(0.0);
-        for touch in 0..self.touches.len() {
-            self.press(touch, number).map_err(|e| e.at(&self.name))?;
-        }
+        self.pulls_newton.fill([0.0; 2]);
+        self.sensed = self.senses.untouched();
+        self.press(number).map_err(|e| e.at(&self.name))?;
         frame.clear();
         frame.t_s = self.time(number);
         frame.values.clear();
+        self.senses.feel(frame.t_s, &self.sensed);
         let felt = self.disturbed.felt(&self.forces_newton);
-        let readings = self.ids.iter().zip(felt).enumerate().map(|(index, (&id, &force_newton))| {
-            let reading = Reading { index, id, frame: number, t_s: frame.t_s, force_newton };
-            RawValue::new(self.sensor.read(&reading))
+        let (t_s, seed) = (frame.t_s, [self.sensor.seed, number]);
+        let readings = self.channels.iter().zip(&self.delivered).map(|(&id, &delivered)| {
+            let reading = |index: usize, force_newton: f64| Reading { index, id, frame: number, t_s, force_newton };
+            RawValue::new(match delivered {
+                Delivered::Force(index) => self.sensor.read(&reading(index, felt[index])),
+                Delivered::Pull(index, axis) => self.sensor.read_pull(&reading(index, self.pulls_newton[index][axis])),
+                Delivered::Temperature(index) => self.senses.warm_reading(index, id, seed),
+                Delivered::Distance(index) => self.senses.near_reading(self.sensed.distances_m[index], id, seed),
+            })
         });
         frame.values.extend(readings);
         Ok(true)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use crate::body::SurfaceIndex;
 use crate::field::{Chart, Lift, default_u};
@@ -106,6 +106,14 @@ impl Path {
         };
         let direction = flat - upward * (flat.dot(normal) / upward.dot(normal));
         direction.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())
+    }
+
+    /// `vector`, which is tangent to the surface at `place`, along u and v of the chart: turned with the normal, as the engine turns
+    /// shear; `None` without a plane chart.
+    pub(super) fn in_chart(&self, place: &ContactPoint, vector: DVec3) -> Option<[f64; 2]> {
+        let PathFrame::Chart { chart, .. } = &self.frame else { return None };
+        let turned = DQuat::from_rotation_arc(place.normal_in_link, chart.normal_in_anchor) * vector;
+        Some([turned.dot(chart.u_in_anchor), turned.dot(chart.v_in_anchor)])
     }
 
     /// Times at most half a millimetre of path apart, s, and the waypoints' times.

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{SimulatedSource, Truth};
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, OutputPath};
-use crate::signal::Frame;
+use crate::signal::{Channel, Frame};
 use crate::source::{Source as _, csv_file::put_value};
 
 const COLUMNS: [&str; 29] = [
@@ -41,6 +41,10 @@ const COLUMNS: [&str; 29] = [
     "principal_axis_z",
     "depth",
 ];
+/// Further columns if the body has taxels with three axes, that sense distances, or temperatures.
+const OF_PULLS: [&str; 7] = ["shear_x", "shear_y", "shear_z", "shear_u", "shear_v", "torsion", "slips"];
+const OF_GAPS: &str = "gap";
+const OF_WARMTH: &str = "celsius";
 
 /// Writes all frames of `simulation` as CSV to `frames` and their truth to `truth`: both files or neither. Returns the
 /// number of frames.
@@ -83,9 +87,10 @@ fn write(
     let (mut frames, mut truth) = (writer(frames_file), writer(truth_file));
     let failed = |path: &Path, e: csv::Error| Error::failed(e.to_string()).at(path.display());
     let mut row: Vec<String> = std::iter::once("t".to_owned()).collect();
-    row.extend(simulation.taxels().iter().map(ToString::to_string));
+    row.extend(simulation.taxels().iter().map(|&channel| Channel(channel).to_string()));
     frames.write_record(&row).map_err(|e| failed(frames_path, e))?;
-    truth.write_record(COLUMNS).map_err(|e| failed(truth_path, e))?;
+    let further = Further::of(simulation);
+    truth.write_record(COLUMNS.into_iter().chain(further.columns())).map_err(|e| failed(truth_path, e))?;
     let mut frame = Frame::missing(0.0, simulation.taxels().len());
     let mut number = 0_u64;
     while simulation.next_frame(&mut frame)? {
@@ -98,13 +103,45 @@ fn write(
         }));
         frames.write_record(&row).map_err(|e| failed(frames_path, e))?;
         for touch in simulation.truth() {
-            truth.write_record(truth_row(frame.t_s, number, touch)).map_err(|e| failed(truth_path, e))?;
+            let cells = truth_row(frame.t_s, number, touch).into_iter().chain(further.cells(touch));
+            truth.write_record(cells).map_err(|e| failed(truth_path, e))?;
         }
         number += 1;
         progress(number as f64 / simulation.frames() as f64);
     }
     frames.flush().map_err(|e| Error::io(frames_path, &e))?;
     truth.flush().map_err(|e| Error::io(truth_path, &e))
+}
+
+/// Which further columns there are.
+struct Further {
+    pulls: bool,
+    gaps: bool,
+    warmth: bool,
+}
+
+impl Further {
+    fn of(simulation: &SimulatedSource) -> Self {
+        let senses = &simulation.senses;
+        let pulls = !simulation.pulls_newton.is_empty();
+        Self { pulls, gaps: !senses.near.is_empty(), warmth: !senses.warm.is_empty() }
+    }
+
+    fn columns(&self) -> impl Iterator<Item = &'static str> {
+        let of_pulls = OF_PULLS.into_iter().filter(|_| self.pulls);
+        of_pulls.chain(self.gaps.then_some(OF_GAPS)).chain(self.warmth.then_some(OF_WARMTH))
+    }
+
+    /// The cells under them.
+    fn cells(&self, truth: &Truth) -> impl Iterator<Item = String> {
+        let cell = |number: Option<f64>| number.map(|x| x.to_string()).unwrap_or_default();
+        let shear = truth.shear_in_link.map_or([None; 3], |shear| shear.to_array().map(Some));
+        let uv = truth.shear_uv.map_or([None; 2], |uv| uv.map(Some));
+        let slips = truth.slips.map(|slips| f64::from(u8::from(slips)));
+        let of_pulls = shear.into_iter().chain(uv).chain([truth.torsion, slips]).filter(|_| self.pulls);
+        let others = [self.gaps.then_some(truth.gap_m), self.warmth.then_some(truth.celsius)];
+        of_pulls.chain(others.into_iter().flatten()).map(cell).collect::<Vec<_>>().into_iter()
+    }
 }
 
 /// The cells under [`COLUMNS`]; what is absent is blank.

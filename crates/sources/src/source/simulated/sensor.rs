@@ -66,16 +66,33 @@ pub(super) struct Reading {
 
 impl Sensor {
     pub(super) fn read(&self, reading: &Reading) -> f64 {
+        let disturbed = match self.disturbed(reading) {
+            Ok(disturbed) => disturbed,
+            Err(stuck) => return stuck.unwrap_or_else(|| self.kind.value(0.0, 0.0)),
+        };
+        let force_newton = self.gains[reading.index] * reading.force_newton;
+        let felt = if force_newton > self.threshold_newton { force_newton } else { 0.0 };
+        self.kind.value(felt, disturbed)
+    }
+
+    /// The same of a tangential force, which has no threshold.
+    pub(super) fn read_pull(&self, reading: &Reading) -> f64 {
+        match self.disturbed(reading) {
+            Ok(disturbed) => self.kind.pull(self.gains[reading.index] * reading.force_newton, disturbed),
+            Err(stuck) => stuck.unwrap_or_else(|| self.kind.pull(0.0, 0.0)),
+        }
+    }
+
+    /// What noise and drift add; or, of a broken taxel that feels nothing, what it reads, `None` if that is as untouched.
+    fn disturbed(&self, reading: &Reading) -> Result<f64, Option<f64>> {
         let sigma = match self.faults[reading.index] {
-            Some(Fault::Dead) => return self.kind.value(0.0, 0.0),
-            Some(Fault::Stuck(value)) => return value,
+            Some(Fault::Dead) => return Err(None),
+            Some(Fault::Stuck(value)) => return Err(Some(value)),
             Some(Fault::Noisy(sigma)) => sigma,
             None => self.noise_sigma,
         };
         let noise = if sigma > 0.0 { sigma * noise::normal(self.seed, reading.frame, reading.id) } else { 0.0 };
-        let force_newton = self.gains[reading.index] * reading.force_newton;
-        let felt = if force_newton > self.threshold_newton { force_newton } else { 0.0 };
-        self.kind.value(felt, noise + self.drift_per_minute * (reading.t_s / 60.0))
+        Ok(noise + self.drift_per_minute * (reading.t_s / 60.0))
     }
 }
 
@@ -92,16 +109,33 @@ impl Kind {
                     FsrOutput::Linearised { full_scale_newton } => circuit.linearised(counts, full_scale_newton),
                 }
             }
-            Self::Linear { offset, gain, bits } => {
-                let level = offset + gain * force_newton + disturbed;
-                match bits {
-                    // Halves round up.
-                    Some(bits) => (level + 0.5).floor().clamp(0.0, f64::from((1_u32 << bits) - 1)),
-                    None => level,
-                }
+            Self::Linear { offset, gain, bits } => converted(offset + gain * force_newton + disturbed, bits),
+        }
+    }
+
+    /// The raw value at the tangential force `force_newton`. An `fsr` feels none.
+    fn pull(&self, force_newton: f64, disturbed: f64) -> f64 {
+        match *self {
+            Self::Ideal | Self::Fsr { .. } => force_newton + disturbed,
+            Self::Linear { gain, bits, .. } => {
+                converted(self.pull_at_rest() + gain.abs() * force_newton + disturbed, bits)
             }
         }
     }
+
+    /// What tangential channels read without a force: counts have room for both signs.
+    pub(super) fn pull_at_rest(&self) -> f64 {
+        match *self {
+            Self::Linear { bits: Some(bits), .. } => f64::from(1_u32 << (bits - 1)),
+            Self::Linear { offset, .. } => offset,
+            Self::Ideal | Self::Fsr { .. } => 0.0,
+        }
+    }
+}
+
+/// `level` as a converter with `bits` gives it. Halves round up.
+fn converted(level: f64, bits: Option<u32>) -> f64 {
+    bits.map_or(level, |bits| (level + 0.5).floor().clamp(0.0, f64::from((1_u32 << bits) - 1)))
 }
 
 #[cfg(test)]
@@ -139,6 +173,20 @@ mod tests {
         let sensor = Sensor { gains: vec![1.0, 1.5], threshold_newton: 2.0, ..sensor(Kind::Ideal, vec![None; 2]) };
         assert_eq!([1.0, 2.0, 2.5].map(|f| sensor.read(&reading(0, f))), [0.0, 0.0, 2.5]);
         assert_eq!([1.0, 2.0, 2.5].map(|f| sensor.read(&reading(1, f))), [0.0, 3.0, 3.75]);
+    }
+
+    #[test]
+    fn a_tangential_force_has_two_signs_and_is_never_inverted() {
+        let inverted = Kind::Linear { offset: 240.0, gain: -20.0, bits: Some(8) };
+        let counts = sensor(inverted, vec![None, Some(Fault::Dead), Some(Fault::Stuck(7.0))]);
+        assert_eq!(
+            [-9.0, -1.0, 0.0, 1.0, 9.0].map(|f| counts.read_pull(&reading(0, f))),
+            [0.0, 108.0, 128.0, 148.0, 255.0]
+        );
+        assert_eq!([1, 2].map(|taxel| counts.read_pull(&reading(taxel, 1.0))), [128.0, 7.0]);
+        let plain =
+            Sensor { threshold_newton: 3.0, ..sensor(Kind::Linear { offset: 5.0, gain: 2.0, bits: None }, vec![None]) };
+        assert_eq!([-1.0, 2.0].map(|f| plain.read_pull(&reading(0, f))), [3.0, 9.0]);
     }
 
     #[test]

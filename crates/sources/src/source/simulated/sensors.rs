@@ -59,18 +59,19 @@ pub(super) fn sensors(
 
 fn kind(text: Text<'_>, keys: &SensorKeys) -> Result<Kind> {
     let why = "for this kind of sensor";
-    if keys.kind != SensorName::Fsr {
+    let name = keys.kind.as_ref().map(|kind| *kind.get_ref()).unwrap_or_default();
+    if name != SensorName::Fsr {
         text.refuse("wiper", keys.wiper.as_ref(), why)?;
         text.refuse("output", keys.output.as_ref(), why)?;
         text.refuse("full_scale_newton", keys.full_scale_newton.as_ref(), why)?;
     }
-    if keys.kind != SensorName::Linear {
+    if name != SensorName::Linear {
         text.refuse("offset", keys.offset.as_ref(), why)?;
         text.refuse("gain", keys.gain.as_ref(), why)?;
         text.refuse("bits", keys.bits.as_ref(), why)?;
         text.refuse("invert", keys.invert.as_ref(), why)?;
     }
-    Ok(match keys.kind {
+    Ok(match name {
         SensorName::Ideal => Kind::Ideal,
         SensorName::Fsr => {
             let wiper = text.int("wiper", keys.wiper.as_ref(), 0..256)?;

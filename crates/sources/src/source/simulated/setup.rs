@@ -31,12 +31,25 @@ pub(super) struct Touch {
     pub(super) angle: Option<Profile>,
     pub(super) path: Path,
     pub(super) force_newton: Profile,
+    /// How far its lowest point is above the skin while it does not press, m; `None` where nothing sees that.
+    pub(super) gap_m: Option<Profile>,
 }
 
 impl Touch {
     /// The force at `t_s`, if the touch presses.
     pub(super) fn force(&self, t_s: f64) -> Option<f64> {
         self.force_newton.within(t_s).filter(|&force| force > 0.0)
+    }
+
+    /// How far above the skin it is at `t_s`, m, if that can be seen.
+    pub(super) fn gap(&self, t_s: f64) -> Option<f64> {
+        let gap_m = self.gap_m.as_ref()?;
+        if self.force(t_s).is_some() { Some(0.0) } else { gap_m.within(t_s) }
+    }
+
+    /// Whether it presses or is seen at `t_s`.
+    pub(super) fn is_there(&self, t_s: f64) -> bool {
+        self.force(t_s).is_some() || self.gap(t_s).is_some()
     }
 
     /// The message that the path is off the surface at `t_s`.
@@ -119,9 +132,11 @@ impl Setup<'_> {
             angle: self.angle(keys, indenter.is_long())?,
             path: Path { frame, surface, waypoints, times_s },
             force_newton: self.force(keys)?,
+            gap_m: self.gap(keys)?,
         };
-        let times = touch.path.times_to_check().chain(touch.force_newton.times());
-        let mut pressed = times.filter(|&t_s| t_s <= self.duration_s && touch.force(t_s).is_some());
+        let gaps = touch.gap_m.iter().flat_map(Profile::times);
+        let times = touch.path.times_to_check().chain(touch.force_newton.times()).chain(gaps);
+        let mut pressed = times.filter(|&t_s| t_s <= self.duration_s && touch.is_there(t_s));
         let off_surface = pressed.find(|&t_s| touch.path.place(t_s).is_none());
         drop(pressed);
         match off_surface {

@@ -39,6 +39,19 @@ pub struct Truth {
     pub principal_axis_in_link: Option<DVec3>,
     /// How far the indenter's lowest point is under the surface, m: of a touch of the whole body.
     pub depth_m: Option<f64>,
+    /// Force along the skin, N, of a touch with friction on a body with taxels of three axes; so are the next three.
+    pub shear_in_link: Option<DVec3>,
+    /// The same along u and v of the field's chart, if that is plane.
+    pub shear_uv: Option<[f64; 2]>,
+    /// Moment about the outward normal, N m, counter-clockwise from outside.
+    pub torsion: Option<f64>,
+    /// Whether the indenter has slipped since the frame before.
+    pub slips: Option<bool>,
+    /// How far the indenter's lowest point is above the skin, m, 0 while it presses; if the body has proximity taxels and the
+    /// file gives gaps.
+    pub gap_m: Option<f64>,
+    /// The indenter's temperature, °C, if the file gives it.
+    pub celsius: Option<f64>,
 }
 
 /// The angle of a line, in [0, π).

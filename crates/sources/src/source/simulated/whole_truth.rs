@@ -95,5 +95,11 @@ fn truth(body: &Body, touch: usize, name: String, contact: &Contact, velocity: O
         direction_in_link,
         principal_axis_in_link: contact.principal_axis.map(turned),
         depth_m: Some(contact.depth_m),
+        shear_in_link: None,
+        shear_uv: None,
+        torsion: None,
+        slips: None,
+        gap_m: None,
+        celsius: None,
     }
 }

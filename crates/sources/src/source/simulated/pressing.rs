@@ -1,0 +1,117 @@
+//! The touches of a simulation.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use toml::Spanned;
+
+use super::contact::Layer;
+use super::file::TouchKeys;
+use super::friction::Friction;
+use super::link_touch::{Felt, Kinds, LinkTouch, Places};
+use super::setup::Setup;
+use super::truth::Truth;
+use super::whole::{BodySkin, Covers};
+use super::whole_setup;
+use super::whole_truth::{Moment, TouchOfBody};
+use crate::body::Body;
+use crate::error::Result;
+
+/// A touch of one link, or of the whole body.
+pub(super) enum Pressing {
+    Link(LinkTouch),
+    Body(TouchOfBody),
+}
+
+/// What becomes of a touch that the body has no place for.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum WrongTouch {
+    Refuse,
+    LeaveOut,
+}
+
+/// All touches, and the skin of the whole body if any presses that.
+pub(super) struct Touches {
+    pub(super) all: Vec<Pressing>,
+    pub(super) body_skin: Option<Arc<BodySkin>>,
+}
+
+impl Touches {
+    /// Those of `keys`, through `layer` on the taxels `of` the body.
+    pub(super) fn new(
+        setup: &mut Setup<'_>,
+        keys: &[Spanned<TouchKeys>],
+        layer: &Layer,
+        of: Kinds<'_>,
+        covers: Covers,
+        wrong: WrongTouch,
+    ) -> Result<Self> {
+        let body = setup.body;
+        let mut all = Vec::with_capacity(keys.len());
+        let mut places = BTreeMap::new();
+        let mut body_skin = None;
+        for (index, keys) in keys.iter().enumerate() {
+            if whole_setup::is_of_body(keys.get_ref()) {
+                let make = || BodySkin::new(body, layer, of.pressed, covers);
+                match (setup.body_touch(index, keys.get_ref(), layer, &mut body_skin, make), wrong) {
+                    (Err(_), WrongTouch::LeaveOut) => {}
+                    (touch, _) => all.push(Pressing::Body(TouchOfBody::new(touch?))),
+                }
+                continue;
+            }
+            let touch = match (setup.touch(index, keys.get_ref()), wrong) {
+                (Err(_), WrongTouch::LeaveOut) => continue,
+                (touch, _) => touch?,
+            };
+            let in_link = || Arc::new(Places::new(body, touch.link, of));
+            let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
+            let link = body.links[touch.link].name.clone();
+            let beside = setup.beside(keys.get_ref(), layer)?;
+            all.push(Pressing::Link(LinkTouch { touch, beside, link, places }));
+        }
+        Ok(Self { all, body_skin })
+    }
+
+    /// The μ of all touches that have one, if it is the same.
+    pub(super) fn friction(&self) -> Option<f64> {
+        let of_touch = |touch: &Pressing| match touch {
+            Pressing::Link(touch) => touch.beside.friction.as_ref().map(Friction::coefficient),
+            Pressing::Body(_) => None,
+        };
+        let mut all = self.all.iter().filter_map(of_touch);
+        let first = all.next()?;
+        all.all(|other| other == first).then_some(first)
+    }
+
+    /// Forgets what indenters hold.
+    pub(super) fn rest(&mut self) {
+        for touch in &mut self.all {
+            if let Pressing::Link(touch) = touch {
+                touch.rest();
+            }
+        }
+    }
+
+    /// Adds what the taxels `of` `body` feel of all of them, pressed through `layer`, to `felt`, and what is true of them to
+    /// `truth`. `moment` is that of the first.
+    pub(super) fn press(
+        &mut self,
+        body: &Body,
+        layer: &Layer,
+        of: Kinds<'_>,
+        moment: &Moment,
+        (felt, truth): (&mut Felt<'_>, &mut Vec<Truth>),
+    ) -> Result<()> {
+        for (number, touch) in self.all.iter_mut().enumerate() {
+            let moment = Moment { touch: number, ..*moment };
+            match touch {
+                Pressing::Link(touch) => truth.extend(touch.press(layer, of, &moment, felt)?),
+                Pressing::Body(touch) => {
+                    let Some(skin) = &self.body_skin else { continue };
+                    truth.extend(touch.press(body, skin, &moment, felt.forces_newton)?);
+                }
+            }
+        }
+        Ok(())
+    }
+}

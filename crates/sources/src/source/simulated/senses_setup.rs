@@ -1,0 +1,82 @@
+//! What a touch of one link does beside pressing, from its keys: friction, warmth, and how far off it is.
+
+use toml::Spanned;
+
+use super::contact::Layer;
+use super::file::TouchKeys;
+use super::friction::Friction;
+use super::profile::Profile;
+use super::setup::Setup;
+use crate::body::Modality;
+use crate::error::Result;
+
+/// The most that a coefficient of friction, a turn in degrees and a gap in m may be.
+const MOST: f64 = 1e6;
+
+/// What a touch does beside pressing.
+pub(super) struct Beside {
+    pub(super) friction: Option<Friction>,
+    /// rad, counter-clockwise from outside
+    pub(super) twist: Option<Profile>,
+    pub(super) celsius: Option<f64>,
+}
+
+impl Setup<'_> {
+    /// What `keys` say of a touch that presses through `layer`.
+    pub(super) fn beside(&self, keys: &TouchKeys, layer: &Layer) -> Result<Beside> {
+        let text = self.text;
+        let friction = match &keys.friction {
+            None => {
+                text.refuse("twist_deg", keys.twist_deg.as_ref(), "without `friction`")?;
+                None
+            }
+            Some(friction) if layer.thickness_m <= 0.0 => {
+                let what = "`friction` needs a layer that gives way; give [layer] its `thickness_m`";
+                return Err(text.wrong(friction.span(), what));
+            }
+            Some(friction) => Some(Friction::new(text.positive("friction", friction)?)),
+        };
+        if keys.angle_deg.is_some() {
+            text.refuse("twist_deg", keys.twist_deg.as_ref(), "with `angle_deg`, which turns the indenter")?;
+        }
+        let twist = self.list("twist_deg", keys.twist_deg.as_ref(), -MOST, "degrees")?;
+        let twist = twist.map(|points| points.into_iter().map(|(t_s, degrees)| (t_s, degrees.to_radians())).collect());
+        let celsius = keys.celsius.as_ref().map(|celsius| text.finite("celsius", celsius)).transpose()?;
+        Ok(Beside { friction, twist: twist.map(Profile::new), celsius })
+    }
+
+    /// The touch's gaps, if the body has taxels that see them.
+    pub(super) fn gap(&self, keys: &TouchKeys) -> Result<Option<Profile>> {
+        let gap = self.list("gap_m", keys.gap_m.as_ref(), 0.0, "metres, 0 or more")?.map(Profile::new);
+        let sees = self.body.taxels.iter().any(|taxel| taxel.modality == Modality::Proximity);
+        Ok(gap.filter(|_| sees))
+    }
+
+    /// A list of [t, number].
+    fn list(
+        &self,
+        key: &str,
+        list: Option<&Spanned<Vec<[f64; 2]>>>,
+        least: f64,
+        what: &str,
+    ) -> Result<Option<Vec<(f64, f64)>>> {
+        let Some(list) = list else { return Ok(None) };
+        let points: Vec<(f64, f64)> = list.get_ref().iter().map(|&[t_s, number]| (t_s, number)).collect();
+        self.text.check_times(key, list.span(), points.iter().map(|point| point.0))?;
+        match points.iter().find(|point| !(least..=MOST).contains(&point.1)) {
+            Some((t_s, bad)) => {
+                Err(self.text.wrong(list.span(), format!("`{key}` is {bad} at {t_s} s; give [t, {what}]")))
+            }
+            None => Ok(Some(points)),
+        }
+    }
+
+    /// Refuses what touches of the whole body cannot do.
+    pub(super) fn only_presses(&self, keys: &TouchKeys) -> Result<()> {
+        let why = "for a touch of the whole body; press a field or a link";
+        self.text.refuse("friction", keys.friction.as_ref(), why)?;
+        self.text.refuse("twist_deg", keys.twist_deg.as_ref(), why)?;
+        self.text.refuse("celsius", keys.celsius.as_ref(), why)?;
+        self.text.refuse("gap_m", keys.gap_m.as_ref(), why)
+    }
+}

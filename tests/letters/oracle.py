@@ -1,0 +1,420 @@
+"""Compares shear, temperature and proximity that `somatic run` gave with a definition of their own.
+
+    oracle.py SOMATIC FOLDER [--long] [--seed N]
+
+Makes random bodies, calibrations and frames in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter in a
+frame. Prints a JSON object: `cells`, by letter `by_letter`, `present` (by quantity, how often there was one), `wrong` (cells with
+something wrong), `examples` of these, `largest` (by quantity the largest difference over what rounding may be), and `missed`: what was
+changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
+
+The definition is that of the documentation, in numpy, over arrays of frames; it shares nothing with the program but files.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from collections import Counter, deque
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from made import Recording, recordings
+
+LETTERS = {
+    "shear": ["shear", "shear_direction", "shear_vector", "force_vector", "torsion", "friction", "friction_sigma", "slip_ratio"],
+    "temperature": [
+        "temperature", "warmest", "warmest_taxel", "warmest_position", "coldest", "coldest_taxel", "coldest_position",
+        "temperature_gradient", "temperature_rate",
+    ],
+    "proximity": [
+        "nearest", "nearest_taxel", "nearest_position", "nearest_normal", "approach_speed", "covered", "proximity_centroid",
+    ],
+}
+# Rounding of double precision: hundreds of units, as a share of the terms that are summed.
+SAME = 1e-13
+HUGE = 2.0**60
+LEAST_M = 1e-4
+LONGEST_GAP_S, SHORTEST_STEP_S = 10.0, 1e-9
+MOST_EXAMPLES = 20
+
+
+class Value:
+    """What is right, and the size of the terms that it is made of: it is right within SAME of that."""
+
+    def __init__(self, value, size=None):
+        self.value = np.asarray(value, float)
+        self.size = float(np.abs(self.value).max() if size is None else size)
+
+
+class Slope:
+    """The line of least squares through the last `window` seconds, of which samples nearer than a 128th replace the newest."""
+
+    def __init__(self, window):
+        self.window, self.kept = window, deque()
+
+    def clear(self):
+        self.kept.clear()
+
+    def take(self, t, value, size):
+        if self.kept and t <= self.kept[-1][0]:
+            self.kept.clear()
+        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] < self.window / 128:
+            self.kept.pop()
+        self.kept.append((t, value, size))
+        while t - self.kept[0][0] > self.window * (1 + 1e-9):
+            self.kept.popleft()
+        if t - self.kept[0][0] < self.window / 2:
+            return None
+        times, values, sizes = np.array(self.kept).T
+        away = times - times[0]
+        away -= away.mean()
+        size = np.abs(values).max() + sizes.max()
+        return Value((away * (values - values.mean())).sum() / (away**2).sum(), size / (t - times[0]))
+
+
+def interpolated(curve, x):
+    raw, p = np.array(curve["raw"], float), np.array(curve["p"], float)
+    return np.interp(x, raw, p)
+
+
+UNITS = {
+    "temperature": {"°C": (1.0, 0.0), "K": (1.0, -273.15), "°F": (5 / 9, -160 / 9)},
+    "proximity": {"mm": (1e-3, 0.0), "cm": (1e-2, 0.0), "m": (1.0, 0.0), "in": (0.0254, 0.0)},
+}
+PRESSURES = {"N": ("N", 1.0), "mN": ("N", 1e-3), "kPa": ("Pa", 1e3), "Pa": ("Pa", 1.0), None: (None, 1.0)}
+
+
+def read(recording, taxels, axis=""):
+    """Raw values by frame and taxel, and which are missing: codes of [all] are so on every channel."""
+    raw, missing = recording.frames.of(taxels, axis)
+    codes = recording.calibration.get("all", {}).get("missing", [])
+    return raw, missing | np.isin(raw, np.array(codes, np.float32).astype(float))
+
+
+def sensed(recording, letter, taxels):
+    """By frame and taxel: the value, whether it is in the sensor's range, which are missing, which are faulty."""
+    file, body = recording.calibration, recording.body
+    raw, missing = read(recording, taxels)
+    keys = file.get(letter, {})
+    factor, offset = UNITS[letter][keys.get("unit", "°C" if letter == "temperature" else "mm")]
+    every = {"baseline": 0.0, "gain": 1.0, "raw_range": [-np.inf, np.inf]} | keys
+    values, inside, faulty = np.full(raw.shape, np.nan), np.ones(raw.shape, bool), ~np.isfinite(raw)
+    codes = np.isin(raw, np.array(keys.get("missing", []), np.float32).astype(float))
+    for column, taxel in enumerate(taxels):
+        own = every | file.get("taxel", {}).get(str(body.ids[taxel]), {})
+        # What a masked taxel reads is faulty, whatever it is.
+        codes[:, column] &= not own.get("mask")
+        above = raw[:, column] - own["baseline"]
+        if "ntc" in own and "curve" not in own:
+            ntc = own["ntc"]
+            with np.errstate(all="ignore"):
+                ohm = ntc["series_ohm"] * above / (ntc["full_raw"] - above)
+                response = 1 / (1 / 298.15 + np.log(ohm / ntc["ohm_at_25"]) / ntc["b_k"]) - 273.15
+            faulty[:, column] |= ~((above > 0) & (above < ntc["full_raw"]))
+        else:
+            response = interpolated(file["curve"][own["curve"]], above) if "curve" in own else above
+        values[:, column] = own["gain"] * factor * response + offset
+        inside[:, column] = (raw[:, column] >= own["raw_range"][0]) & (raw[:, column] <= own["raw_range"][1])
+        if own.get("mask"):
+            faulty[:, column] = True
+    missing = missing | codes
+    faulty &= ~missing
+    return values, inside, missing, faulty
+
+
+class Field:
+    def __init__(self, recording, field, kinds):
+        body = recording.body
+        self.body, self.chart = body, body.chart_of(field)
+        self.members = sorted((taxel for taxel in field.members if body.kind[taxel] in kinds), key=lambda taxel: body.ids[taxel])
+        self.weights = np.array([field.members[taxel] for taxel in self.members])
+        at, normals, first, second = body.in_anchor(field, self.members)
+        self.at, self.normals, self.tangents = at, normals, (first, second)
+        if self.chart:
+            origin, u, v, n = self.chart
+            self.places = np.stack([(at - origin) @ u, (at - origin) @ v], axis=1)
+            self.along = [np.array([[turned @ u, turned @ v] for turned in map(arc, normals, [n] * len(normals), way)]) for way in self.tangents]
+
+
+def arc(a, b, x):
+    """x, turned as the least turn from a to b does."""
+    axis, cosine = np.cross(a, b), a @ b
+    return x + np.cross(axis, x) + np.cross(axis, np.cross(axis, x)) / (1 + cosine)
+
+
+def temperatures(recording, field, frames):
+    """What is right of a field's temperatures, by frame: quantities, flags."""
+    values, inside, missing, faulty = sensed(recording, "temperature", field.members)
+    slope = Slope(recording.calibration.get("temperature", {}).get("window_s", 1.0))
+    for frame, t in enumerate(frames.t):
+        if frames.restarts[frame]:
+            slope.clear()
+        flags = flags_of(missing[frame], faulty[frame], field)
+        there = np.flatnonzero(~missing[frame] & ~faulty[frame])
+        if len(there) == 0:
+            slope.clear()
+            yield {}, flags | {"no_contact"}, False
+            continue
+        flags |= {"out_of_range"} if not inside[frame, there].all() else set()
+        celsius, weights = values[frame, there], field.weights[there]
+        size = np.abs(celsius).max() + 300
+        mean = (weights * celsius).sum() / weights.sum()
+        found = {"temperature": Value(mean, size)}
+        for name, index in (("warmest", celsius.argmax()), ("coldest", celsius.argmin())):
+            member = there[index]
+            found[name] = Value(celsius[index], size)
+            found[f"{name}_taxel"] = Value(field.body.ids[field.members[member]])
+            found[f"{name}_position"] = Value(field.at[member], 1)
+        if field.chart and len(there) >= 3:
+            away = field.places[there] - (weights[:, None] * field.places[there]).sum(axis=0) / weights.sum()
+            root = np.sqrt(weights)
+            moments = (root[:, None] * away).T @ (root[:, None] * away)
+            least, most = np.linalg.eigvalsh(moments)
+            share = least * most / (least + most) ** 2
+            if share > 1.001e-6:
+                gradient = np.linalg.lstsq(root[:, None] * away, root * (celsius - mean), rcond=None)[0]
+                found["temperature_gradient"] = Value(gradient, 10 * size / np.sqrt(least / weights.sum()))
+            elif share > 0.999e-6:
+                found["temperature_gradient"] = None
+        found["temperature_rate"] = slope.take(t, mean, size)
+        yield found, flags | (set() if found["temperature_rate"] else {"no_previous"}), True
+
+
+def distances(recording, field, frames):
+    keys = recording.calibration.get("proximity", {})
+    values, inside, missing, faulty = sensed(recording, "proximity", field.members)
+    slope = Slope(keys.get("window_s", 0.1))
+    reach = keys["range"] * UNITS["proximity"][keys.get("unit", "mm")][0] if "range" in keys else np.inf
+    for frame, t in enumerate(frames.t):
+        if frames.restarts[frame]:
+            slope.clear()
+        flags = flags_of(missing[frame], faulty[frame], field)
+        with np.errstate(invalid="ignore"):
+            there = np.flatnonzero(~missing[frame] & ~faulty[frame] & inside[frame] & (values[frame] <= reach))
+        found = {"covered": Value(len(there))}
+        if len(there) == 0:
+            slope.clear()
+            yield found, flags | {"out_of_range", "no_contact"}, False
+            continue
+        flags |= {"saturated"} if (values[frame, there] < LEAST_M).any() else set()
+        metres = np.maximum(values[frame, there], LEAST_M)
+        nearest = there[metres.argmin()]
+        found["nearest"] = Value(metres.min(), 1)
+        found["nearest_taxel"] = Value(field.body.ids[field.members[nearest]])
+        found["nearest_position"] = Value(field.at[nearest], 1)
+        found["nearest_normal"] = Value(field.normals[nearest], 1)
+        if field.chart:
+            weights = 1 / metres**2
+            found["proximity_centroid"] = Value((weights[:, None] * field.places[there]).sum(axis=0) / weights.sum(), 1)
+        rate = slope.take(t, metres.min(), 1e-3)
+        found["approach_speed"] = rate and Value(-rate.value, rate.size)
+        yield found, flags | (set() if rate else {"no_previous"}), True
+
+
+def shears(recording, field, frames):
+    file, body = recording.calibration, recording.body
+    every, keys = file.get("all", {}), file.get("shear", {})
+    quantity, unit = PRESSURES[every.get("unit")]
+    of = lambda key, default, table=every: np.array(
+        [file.get("taxel", {}).get(str(body.ids[taxel]), {}).get(key, table.get(key, default)) for taxel in field.members]
+    )
+    baseline, gain, mask = of("baseline", 0.0).astype(float), of("gain", 1.0) * unit, of("mask", False).astype(bool)
+    gain = np.where(of("invert", False).astype(bool), -gain, gain)
+    dead_band, noise = of("dead_band", 0.0) * unit, of("noise", np.nan).astype(float)
+    most = of("p_max", np.inf).astype(float) * unit
+    ranges = np.array([file.get("taxel", {}).get(str(body.ids[taxel]), {}).get("raw_range", every.get("raw_range", [-np.inf, np.inf])) for taxel in field.members])
+    own_gain = of("shear_gain", keys.get("gain", np.nan)).astype(float) * unit
+    side_gain = np.where(np.isnan(own_gain), np.abs(gain), own_gain)
+    rest = np.array([file.get("taxel", {}).get(str(body.ids[taxel]), {}).get("shear_baseline", keys.get("baseline", [0.0, 0.0])) for taxel in field.members])
+    cross = np.array(keys.get("cross_axis", [[0, 1, 0], [0, 0, 1]]), float)
+    areas = body.area[field.members]
+    newtons = {"N": np.ones(len(areas)), "Pa": np.where(areas > 0, areas, np.nan), None: np.full(len(areas), np.nan)}[quantity]
+    raw, missing = read(recording, field.members)
+    sides = [read(recording, field.members, axis) for axis in ("u", "v")]
+    for frame in range(len(frames.t)):
+        gone = missing[frame]
+        bad = ~gone & (mask | ~np.isfinite(raw[frame]))
+        flags = flags_of(gone, bad, field)
+        usable = ~gone & ~bad
+        with np.errstate(invalid="ignore"):
+            outside = usable & ((raw[frame] < ranges[:, 0]) | (raw[frame] > ranges[:, 1]))
+            pressure = gain * (raw[frame] - baseline)
+            pressed = usable & (pressure > dead_band) & (pressure > 0)
+            flags |= {"saturated"} if (pressed & (pressure > most)).any() else set()
+        flags |= {"out_of_range"} if outside.any() else set()
+        no_side = sides[0][1][frame] | sides[1][1][frame]
+        bad_side = ~no_side & ~(np.isfinite(sides[0][0][frame]) & np.isfinite(sides[1][0][frame]))
+        flags |= {"incomplete"} if (pressed & no_side).any() else set()
+        flags |= {"faulty_input"} if (pressed & bad_side).any() else set()
+        there = np.flatnonzero(pressed & ~no_side & ~bad_side)
+        if len(there) == 0:
+            yield {}, flags | {"no_contact"}, False
+            continue
+        p, weights, g = pressure[there], field.weights[there], side_gain[there]
+        felt = np.stack([p] + [g * (sides[axis][0][frame, there] - rest[there, axis]) for axis in (0, 1)])
+        along = cross @ felt
+        in_space = along[0][:, None] * field.tangents[0][there] + along[1][:, None] * field.tangents[1][there]
+        # Differences from baselines are of larger numbers.
+        terms = np.abs(cross) @ np.stack([p] + [g * (np.abs(sides[axis][0][frame, there]) + np.abs(rest[there, axis])) for axis in (0, 1)])
+        size, pull = (weights * terms.sum(axis=0)).sum(), (weights * p).sum()
+        vector = (weights[:, None] * in_space).sum(axis=0)
+        friction = np.linalg.norm(vector) / pull
+        found = {"shear_vector": Value(vector, size), "friction": Value(friction, size / pull)}
+        if np.isnan(newtons[there]).any():
+            flags |= {"no_unit"}
+        else:
+            force = newtons[there, None] * (in_space - p[:, None] * field.normals[there])
+            found["force_vector"] = Value(force.sum(axis=0), (newtons[there] * (terms.sum(axis=0) + p)).sum())
+        if field.chart:
+            flat = along[0][:, None] * field.along[0][there] + along[1][:, None] * field.along[1][there]
+            total, places = (weights[:, None] * flat).sum(axis=0), field.places[there]
+            centre = ((weights * p)[:, None] * places).sum(axis=0) / pull
+            arms = places - centre
+            torsion = (weights * (arms[:, 0] * flat[:, 1] - arms[:, 1] * flat[:, 0])).sum()
+            reach = np.abs(places).max() + 1e-3
+            found |= {"shear": Value(total, size), "torsion": Value(torsion, 4 * size * reach)}
+            length, sizes = np.linalg.norm(total), (weights * np.linalg.norm(flat, axis=1)).sum()
+            if length > 1e-9 * sizes:
+                found["shear_direction"] = Value(np.arctan2(total[1], total[0]), 4 * max(1, size / length))
+            elif sizes == 0 or length == 0:
+                flags |= {"still"}
+            else:
+                found["shear_direction"] = None
+        if np.isnan(noise[there]).any():
+            flags |= {"noise_unknown"}
+        else:
+            of_pull = ((weights * np.abs(gain[there]) * noise[there]) ** 2).sum()
+            of_shear = ((weights * np.abs(g) * noise[there]) ** 2).sum()
+            sigma = np.sqrt(of_shear + friction**2 * of_pull) / pull
+            # A standard deviation of P is a difference of values.
+            large = (np.abs(raw[frame, there]) + np.abs(baseline[there]) + noise[there]) / noise[there]
+            found["friction_sigma"] = Value(sigma, sigma * large.max() * max(1, size / pull / max(friction, 1e-9)))
+        if "slips_at" in keys:
+            found["slip_ratio"] = Value(friction / keys["slips_at"], size / pull / keys["slips_at"])
+        yield found, flags, True
+
+
+def flags_of(missing, faulty, field):
+    own = {"incomplete"} if missing.any() else set()
+    own |= {"faulty_input"} if faulty.any() else set()
+    return own if field.chart else own | {"no_chart"}
+
+
+MAKERS = {"shear": ("force3", shears), "temperature": ("temperature", temperatures), "proximity": ("proximity", distances)}
+
+
+class Comparison:
+    def __init__(self):
+        self.cells, self.wrong, self.examples = Counter(), 0, []
+        self.present, self.largest = Counter(), {}
+
+    def off(self, letter, told, found, flags, contact):
+        """What is wrong with a cell."""
+        wrong = {}
+        if told["contact"] != contact:
+            wrong["contact"] = (told["contact"], contact)
+        # Those of a wish for poses, which these recordings have none of.
+        if set(told["flags"]) != flags and found.get("shear_direction", 0) is not None:
+            wrong["flags"] = (sorted(told["flags"]), sorted(flags))
+        for name in LETTERS[letter]:
+            if name in found and found[name] is None and name not in ("temperature_rate", "approach_speed"):
+                continue
+            right, value = found.get(name), told.get(name)
+            if (right is None) != (value is None):
+                wrong[name] = (value, right and right.value.tolist())
+            elif right is not None:
+                self.present[name] += 1
+                away = np.abs(np.asarray(value, float) - right.value)
+                if name == "shear_direction":
+                    away = np.minimum(away, 2 * np.pi - away)
+                over = float(away.max()) / (SAME * max(right.size, 1e-300)) if away.max() > 0 else 0.0
+                self.largest[name] = max(self.largest.get(name, 0.0), over)
+                if not over <= 1:
+                    wrong[name] = (value, right.value.tolist())
+        return wrong
+
+    def take(self, letter, told, found, flags, contact, where):
+        self.cells[letter] += 1
+        if told is None:
+            wrong = {"cell": "absent"}
+        else:
+            wrong = self.off(letter, told, found, flags, contact)
+        if wrong:
+            self.wrong += 1
+            if len(self.examples) < MOST_EXAMPLES:
+                self.examples.append(where | {"letter": letter} | wrong)
+        return wrong
+
+
+def changed(told, rng):
+    """`told` with one number that is there changed by a millionth, or by one if it is an id or a count."""
+    names = [name for name in told if name in {name for names in LETTERS.values() for name in names}]
+    if not names:
+        return None, told | {"contact": not told["contact"]}
+    name = str(rng.choice(sorted(names)))
+    value = np.array(told[name], float)
+    whole = name.endswith("taxel") or name == "covered"
+    place = int(rng.integers(value.size))
+    flat = value.reshape(-1)
+    flat[place] += 1 if whole else 1e-6 * max(1.0, np.abs(flat).max())
+    return name, told | {name: value.tolist()}
+
+
+def compare(recording, lines, comparison, missed, rng):
+    """Compares the lines that the program wrote for `recording`."""
+    frames = recording.frames
+    right = {}
+    for field in recording.body.fields:
+        for letter, (kind, maker) in MAKERS.items():
+            of = Field(recording, field, {kind})
+            if of.members:
+                right[field.name, letter] = maker(recording, of, frames)
+    for number, line in enumerate(lines):
+        told = {(cell["field"], cell.get("letter")): cell for cell in json.loads(line)["fields"]}
+        for (field, letter), cells in right.items():
+            found, flags, contact = next(cells)
+            own = told.get((field, letter)) or (told.get((field, None)) if recording.is_alone(letter) else None)
+            wrong = comparison.take(letter, own, found, flags, contact, {"recording": recording.name, "frame": number, "field": field})
+            if own is not None and not wrong and rng.random() < 0.01:
+                name, other = changed(own, rng)
+                before = dict(comparison.largest)
+                if not comparison.off(letter, other, found, flags, contact):
+                    missed.append([recording.name, number, field, letter, name])
+                comparison.largest = before
+    if number + 1 != len(frames.t):
+        raise SystemExit(f"{recording.name}: {number + 1} lines for {len(frames.t)} frames")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("somatic")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--long", action="store_true")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    comparison, missed, rng = Comparison(), [], np.random.default_rng(arguments.seed)
+    for recording in recordings(arguments.long, arguments.seed):
+        assert isinstance(recording, Recording)
+        paths = recording.write(arguments.folder)
+        outputs = ",".join(name for letter in recording.letters() for name in LETTERS[letter])
+        command = [arguments.somatic, "run", "--body", paths["glb"], "--source", paths["csv"], "--calibration", paths["toml"]]
+        command += ["--backend", recording.backend, "--outputs", outputs, "--all-fields", "--sink", f"ndjson:{paths['ndjson']}"]
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+        if done.returncode not in (0, 3):
+            raise SystemExit(f"{recording.name}: {done.stderr}")
+        before = comparison.cells.total()
+        with open(paths["ndjson"]) as lines:
+            compare(recording, lines, comparison, missed, rng)
+        print(f"{recording.name}: {comparison.cells.total() - before} cells, {comparison.wrong} wrong", file=sys.stderr)
+        for path in paths.values():
+            path.unlink()
+    json.dump({
+        "cells": comparison.cells.total(), "by_letter": comparison.cells, "present": comparison.present, "wrong": comparison.wrong,
+        "examples": comparison.examples, "largest": comparison.largest, "missed": missed,
+    }, sys.stdout)
+
+
+if __name__ == "__main__":
+    main()
