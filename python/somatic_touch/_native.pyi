@@ -653,6 +653,7 @@ def _gains(
     calibration: Calibration,
     stamp_m: float | None,
     rate_hz: float | None,
+    map: str | None,
     progress: bool | Callable[[float], object] | None,
 ) -> tuple[str, str]: ...
 def _live(scene: Scene | dict[str, Any] | _Path | None, keys: dict[str, Any]) -> Live: ...

@@ -3,6 +3,7 @@
 use std::vec::IntoIter;
 
 use pyo3::prelude::*;
+use somatic::internal::setup::open_mapped;
 use somatic::internal::tradeoff::TestFrames;
 use somatic::scene::file::LineKeys;
 use somatic::source::{Lines, SimulatedSource, Source, SourceSpec, TextSource, VendorOptions};
@@ -156,7 +157,13 @@ impl OpenSource {
                 return Ok(Self { source: Box::new(source), lines: None, is_live: true });
             }
             let is_live = spec.is_stdin();
-            Ok(Self { source: spec.with_content(options).open(ids, options)?, lines: None, is_live })
+            let spec = spec.with_content(options);
+            if options.map.is_some() {
+                let mut mapped = open_mapped(&spec, options)?;
+                notices.extend(mapped.take_notices());
+                return Ok(Self { source: Box::new(mapped.for_body(ids)?), lines: None, is_live });
+            }
+            Ok(Self { source: spec.open(ids, options)?, lines: None, is_live })
         });
         let opened = opened.or_raise(py)?;
         warn(py, notices)?;

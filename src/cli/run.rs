@@ -1,6 +1,7 @@
 //! `somatic run`: from a source through an engine to sinks.
 
 mod console;
+mod order;
 mod prepared;
 
 use std::path::PathBuf;
@@ -16,13 +17,14 @@ use somatic::sink::{SinkSpec, SinkTarget};
 use somatic::{Error, Result};
 
 use self::console::Console;
+use self::order::OrderOf;
 use self::prepared::Prepared;
 use super::describe::describe;
 use super::interrupt::stop_on_signal;
 #[cfg(unix)]
 use super::keys::Keys;
 use super::live::View;
-use super::scene::{LIVE, RunFlags, grouped, in_flags, input};
+use super::scene::{LIVE, RunFlags, grouped, in_flags, input, one_of};
 use super::stdio::{DONE, FAILED, print, say, say_lines, tell_losses};
 
 const FIRST_EXAMPLES: &str = "\
@@ -91,6 +93,14 @@ pub(super) struct Arguments {
     #[arg(long = "for", value_name = "TIME", help_heading = LIVE)]
     lasts: Option<String>,
 
+    /// Print which field answers while you press one after the other, and at the end those that never did.
+    ///
+    /// With =taxels, or where there is one field, it is the taxel that answers. Without a calibration, nothing may be pressed
+    /// in the first second.
+    #[arg(long, value_name = "WHAT", help_heading = LIVE, num_args = 0..=1, require_equals = true,
+        default_missing_value = "fields", value_parser = one_of::<OrderOf>(OrderOf::WORDS))]
+    check_order: Option<OrderOf>,
+
     /// Write a summary at the end to this file, as JSON.
     ///
     /// It has how many frames each board sent and lost, and how long percepts took.
@@ -119,6 +129,11 @@ impl Arguments {
         if self.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !self.describe {
             return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
         }
+        if self.check_order.is_some() && sinks.iter().any(SinkSpec::is_on_stdout) {
+            return Err(Error::usage(
+                "--check-order prints on standard output; leave out the --sink that does so, too",
+            ));
+        }
         let mut outputs: OutputPaths = FilesRead::from_scene(asked, self.scene.as_deref()).outputs(asked.overwrite);
         // A description makes no file.
         let targets = sinks
@@ -142,12 +157,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     let input = input(asked)?;
     let Reserved { targets, summary } = arguments.reserve(asked)?;
-    let view = View::choose(asked.quiet, asked.sinks.iter().any(SinkSpec::is_on_stdout), input.is_recording());
+    let is_printed = asked.sinks.iter().any(SinkSpec::is_on_stdout) || arguments.check_order.is_some();
+    let view = View::choose(asked.quiet, is_printed, input.is_recording());
     let prepared = Prepared::open(asked, &input, view.is_table(), summary, arguments.lasts.as_deref())?;
 
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
-    let targets = if asked.sinks.is_empty() && !view.is_table() { vec![SinkTarget::Stdout] } else { targets };
+    let is_for_stdout = asked.sinks.is_empty() && !view.is_table() && arguments.check_order.is_none();
+    let targets = if is_for_stdout { vec![SinkTarget::Stdout] } else { targets };
     let session = prepared.opened.session(asked, &input, &targets, arguments.scene.as_deref())?;
     if arguments.describe {
         print(&describe(&asked.sinks, &session, arguments.wide)?)?;
@@ -157,7 +174,7 @@ fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     if !asked.quiet {
         sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| say(&remark));
     }
-    let (run, console) = prepared.start(asked, &input, view, sinks)?;
+    let (run, console) = prepared.start(asked, &input, view, sinks, arguments.check_order)?;
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]
     let keys = if view.is_table() && !input.is_stdin() { Keys::listen() } else { None };

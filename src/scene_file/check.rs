@@ -20,18 +20,18 @@ impl SceneFile {
             ));
         }
         let has_messages = |source: &SourceSpec| {
-            use SourceSpec::{Mcap, Ndjson, Ros2Mcap, Stdin, Text};
-            matches!(source, Mcap(_) | Ndjson(_) | Ros2Mcap(_) | Stdin | Text(_))
+            use SourceSpec::{Mcap, Modbus, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
+            matches!(source, Mcap(_) | Modbus(_) | Ndjson(_) | Ros2 { .. } | Ros2Mcap(_) | Stdin | Text(_))
         };
         if self.map.is_some() && !(self.sources.len() == 1 && self.sources.iter().all(has_messages)) {
             return Err(Error::usage(
-                "`map` is for one ROS 2 bag, NDJSON, or lines of JSON; add `source = \"ros2-mcap:BAG\"`, or leave it out",
+                "`map` is for one ROS 2 bag or topic, NDJSON, lines of JSON, or Modbus; add `source = \"ros2-mcap:BAG\"`, or leave it out",
             ));
         }
         let has_no_bad = |source: &SourceSpec| {
             use SourceSpec::{LeRobot, Mcap, Ros2, Serial, Sim, Zenoh};
-            let is_own = matches!(source, Mcap(_)) && self.map.is_none();
-            is_own || matches!(source, LeRobot(_) | Sim(_) | Serial { .. } | Ros2 { .. } | Zenoh(_))
+            let is_own = matches!(source, Mcap(_) | Ros2 { .. }) && self.map.is_none();
+            is_own || matches!(source, LeRobot(_) | Sim(_) | Serial { .. } | Zenoh(_))
         };
         if self.skip_bad && self.joint_states.is_none() && self.sources.iter().any(has_no_bad) {
             return Err(Error::usage("`skip_bad` is for CSV, NDJSON, exports and ROS 2 bags; leave it out here"));

@@ -133,8 +133,11 @@ impl Input {
     }
 
     pub fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Text, Zenoh};
-        !matches!(self.spec, Some(Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Zenoh(_)))
+        use SourceSpec::{CsvStdin, Modbus, Ros2, Serial, Stdin, Text, Zenoh};
+        let is_live = |spec: &SourceSpec| {
+            matches!(spec, Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Modbus(_) | Zenoh(_))
+        };
+        !self.spec.as_ref().is_some_and(is_live)
     }
 
     /// Whether several boards or limbs are merged.
@@ -192,7 +195,7 @@ impl Input {
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
     pub fn open(&self, ids: &[u32], setup: &Setup) -> Result<Box<dyn Source + Send>> {
         #[cfg(feature = "ros2")]
-        if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
+        if let (Some(SourceSpec::Ros2 { topic, kind }), None) = (&self.spec, &setup.map) {
             return Ok(Box::new(crate::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(setup)?)?));
         }
         if let Some(source) = setup.take_text(ids)? {

@@ -13,6 +13,7 @@ mod blocked_networks;
 mod board;
 mod browser;
 mod calibrate;
+mod check_order;
 mod devices;
 mod doubts;
 mod escape;
@@ -55,6 +56,8 @@ mod robots;
 mod ros2;
 #[cfg(all(unix, feature = "ros2"))]
 mod ros2_live;
+#[cfg(all(unix, feature = "ros2"))]
+mod ros2_mapped;
 #[cfg(all(unix, feature = "ros2"))]
 mod ros2_peer;
 mod run;

@@ -255,14 +255,19 @@ pub(super) fn bag_db3() -> Target {
 }
 
 pub(super) fn map() -> Target {
-    target("map", "a.toml", [seeds::MAP], |case| verdict(ArrayMap::parse(&case.text())))
+    target("map", "a.toml", [seeds::MAP, seeds::MAP_OF_SENSORS], |case| verdict(ArrayMap::parse(&case.text())))
 }
 
 pub(super) fn mapped_lines() -> Target {
-    target("mapped_lines", "a.ndjson", [seeds::MAPPED_LINES], |case| {
-        let map = ArrayMap::parse("values = ['pads[*].p', 'digits']\ndecoder = 'u8'").unwrap();
-        let source = JsonLines::open(case.path, &map).and_then(|lines| MappedSource::new(Box::new(lines), &map, true));
-        verdict(source.and_then(|mut source| frames(&mut source)))
+    let maps = ["values = ['pads[*].p', 'digits']\ndecoder = 'u8'", "values = 'pads[*].p'\nnames = 'pads[*].n'"];
+    let maps = maps.map(|map| ArrayMap::parse(map).unwrap());
+    target("mapped_lines", "a.ndjson", [seeds::MAPPED_LINES, seeds::NAMED_LINES], move |case| {
+        let read = |map: &ArrayMap| {
+            let lines = JsonLines::open(case.path, map)?;
+            let mut source = MappedSource::new(Box::new(lines), map, true)?;
+            frames(&mut source)
+        };
+        Ok(verdict(read(&maps[0]))? | verdict(read(&maps[1]))?)
     })
 }
 

@@ -38,7 +38,7 @@ ELSEWHERE = {
     "simulate": "output force truth",
     "bench": "sensors fields members wide local outputs calls seed dump force json",
     "outputs": "json",
-    "run": "describe for summary table",
+    "run": "check-order describe for summary table",
     "view": "beside for",
 }
 """Flags without a keyword: what Python gives back instead of writing it, has as a function, a method or a type of its own, or leaves to the command."""

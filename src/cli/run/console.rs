@@ -10,6 +10,7 @@ use somatic::internal::sink::Question;
 use somatic::run::{Ending, FrameInfo, Observer, Remark};
 use somatic::{Engine, Frame, Plan, Result};
 
+use super::order::OrderReport;
 use crate::cli::doubts::Doubts;
 #[cfg(feature = "page")]
 use crate::cli::explanation::LiveExplainer;
@@ -24,6 +25,8 @@ pub(super) struct Console {
     pub(super) live: Option<LineReport>,
     /// What is looked for in the first frames.
     pub(super) doubts: Option<Doubts>,
+    /// What is pressed, where that is asked for.
+    pub(super) order: Option<OrderReport>,
     /// With a page.
     #[cfg(feature = "page")]
     pub(super) explainer: Option<LiveExplainer>,
@@ -53,6 +56,10 @@ impl Observer for Console {
             self.tell_doubts(engine.plan());
         }
         self.view.see(engine.percepts(), info.progress);
+        if let Some(Err(error)) = self.order.as_mut().map(|order| order.see(engine, frames)) {
+            self.order = None;
+            say(&error.to_string());
+        }
     }
 
     fn written(&mut self, read_at: &[Instant]) {
@@ -90,6 +97,7 @@ impl Console {
     /// No board was heard.
     pub(super) fn close(self, ending: &mut Ending) -> Result<Option<Doubts>> {
         self.view.finish();
+        self.order.map_or(Ok(()), OrderReport::finish)?;
         if let Some(live) = self.live {
             ending.losses = live.finish()?;
         }

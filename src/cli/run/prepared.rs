@@ -12,6 +12,7 @@ use somatic::sink::SinkSpec;
 use somatic::{BackendKind, Error, Result};
 
 use super::console::Console;
+use super::order::{OrderOf, OrderReport};
 use crate::cli::doubts::Doubts;
 #[cfg(feature = "page")]
 use crate::cli::explanation::LiveExplainer;
@@ -30,6 +31,7 @@ pub(super) struct Prepared {
     /// What is written of boards at the end.
     summary: Option<OutputPath>,
     doubts: Option<Doubts>,
+    has_calibration: bool,
     verify: bool,
     /// How long it goes at most.
     lasts: Option<Duration>,
@@ -63,6 +65,7 @@ impl Prepared {
         })?;
         let (options, why) = chosen.unwrap_or_default();
         let is_raw = options.calibration.is_none() && !options.tare;
+        let has_calibration = options.calibration.is_some();
         let verify = asked.verify && has_another_to_compare(&opened.engine, why.as_deref())?;
         let mut prepared = Self {
             opened,
@@ -70,6 +73,7 @@ impl Prepared {
             options,
             summary,
             doubts: None,
+            has_calibration,
             verify,
             lasts,
         };
@@ -92,15 +96,19 @@ impl Prepared {
         self.doubts = Some(doubts);
     }
 
-    /// Starts to read, for `sinks` and what a `view` shows.
+    /// Starts to read, for `sinks` and what a `view` shows, and prints the order of what is pressed, if that is asked for.
     pub(super) fn start(
         self,
         asked: &Setup,
         input: &Input,
         view: ViewKind,
         sinks: Vec<Box<dyn Sink + Send>>,
+        check_order: Option<OrderOf>,
     ) -> Result<(Run, Console)> {
         let Opened { body, engine, lines, .. } = &self.opened;
+        let word = if asked.map.is_some() { "pad" } else { "field" };
+        let order = check_order
+            .map(|of| OrderReport::new(&self.opened, of, word, !self.has_calibration, !input.is_recording()));
         #[cfg(feature = "page")]
         let explainer = match asked.sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_))) {
             true => {
@@ -115,6 +123,7 @@ impl Prepared {
             view: view.open(&about),
             live: lines.clone().map(|lines| LineReport::new(lines, self.summary, asked.quiet)),
             doubts: self.doubts,
+            order,
             #[cfg(feature = "page")]
             explainer,
         };

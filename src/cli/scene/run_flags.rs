@@ -35,7 +35,7 @@ pub(in crate::cli) struct RunFlags {
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
-    /// text:-. Standard input: - for NDJSON, csv:- for CSV.
+    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with --map. Standard input: - for NDJSON, csv:- for CSV.
     #[arg(id = "source", long = "source", value_name = "SOURCE")]
     pub(in crate::cli) sources: Vec<String>,
 
@@ -248,7 +248,7 @@ pub(in crate::cli) struct RunFlags {
 
     /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
     ///
-    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. dex3 and inspire are untested.
     #[arg(long, help_heading = RECORDINGS, value_name = "FILE")]
     pub(in crate::cli) map: Option<String>,
 
