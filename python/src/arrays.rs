@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyDictMethods, PyList, PyTuple};
 use somatic::RawValue;
+use somatic::internal::signal::Channel;
 use somatic::signal::Pose;
 
 use crate::error::{unknown_name, usage};
@@ -71,9 +72,10 @@ fn of_dicts(py: Python<'_>, frames: &[Bound<'_, PyDict>], ids: &[u32]) -> PyResu
     let mut values = vec![RawValue::MISSING; frames.len() * ids.len()];
     for (number, frame) in frames.iter().enumerate() {
         for (id, value) in frame.iter() {
-            let place = id.extract::<u32>().ok().and_then(|id| index_of.get(&id));
+            let named = || Some(Channel::named(&id.extract::<String>().ok()?)?.0);
+            let place = id.extract::<u32>().ok().or_else(named).and_then(|id| index_of.get(&id));
             let Some(place) = place else {
-                let some: Vec<String> = ids.iter().take(5).map(ToString::to_string).collect();
+                let some: Vec<String> = ids.iter().take(5).map(|&id| Channel(id).to_string()).collect();
                 let (some, more) = (some.join(", "), if ids.len() > 5 { ", …" } else { "" });
                 let what = format!("frame {number} has a value of taxel {}; the engine's are {some}{more}", id.repr()?);
                 return Err(unknown_name(py, what));

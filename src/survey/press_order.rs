@@ -136,7 +136,8 @@ impl PressOrder {
     fn press(&mut self, values: impl Iterator<Item = Option<f64>>) {
         for (sensor, value) in values.enumerate().take(self.pressed.len()) {
             let value = value.map(|value| value as f32);
-            let [before, last] = std::mem::replace(&mut self.last[sensor], [self.last[sensor][1], value]);
+            let [before, last] = self.last[sensor];
+            self.last[sensor] = [last, value];
             self.pressed[sensor] = match (before, last, value) {
                 (Some(before), Some(last), Some(value)) => self.away(sensor, middle(before, last, value).into()),
                 // It has just begun, or a value is missing.

@@ -42,7 +42,7 @@ impl Wish {
         let engine = made.or_raise(py)?;
         let text = calibration.as_ref().map(|calibration| calibration.text.as_str());
         let run = Arc::new(Run::new(&engine, &body.inner, &body.bytes, &self.scene, text));
-        let channels = taxels.clone().unwrap_or_else(|| body.ids());
+        let channels = taxels.clone().unwrap_or_else(|| body.channels());
         let inner = Mutex::new(Inner { engine, lent: Vec::new(), page: None });
         Ok(PyEngine { inner, run, width: channels.len(), channels, wish: self })
     }
