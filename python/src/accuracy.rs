@@ -10,12 +10,13 @@ use somatic::internal::gains::GainsSurvey;
 use somatic::internal::run::{Arrival, Feed, ReadMode};
 use somatic::internal::setup::bodies::in_body;
 use somatic::internal::signal::UnitOfP;
+use somatic::internal::source::ArrayMap;
 use somatic::internal::survey::gains::{layer_under, with_gains};
 use somatic::internal::survey::known::{KnownForces, PressedOn};
 use somatic::internal::survey::{Findings, Survey, Wishes};
 use somatic::internal::tradeoff::{CallMode, MeasureOptions, Target, Tested, Words, software, time, usual_frames};
 use somatic::scene::file::{LineKeys, TextKeys};
-use somatic::source::{ArrayMap, SourceSpec, VendorOptions, VendorSource};
+use somatic::source::{SourceSpec, VendorOptions, VendorSource};
 use somatic::{BackendKind, Body, Calibration, Error, Frame, OutputPath, RawValue};
 
 use crate::body::PyBody;

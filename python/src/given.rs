@@ -26,7 +26,7 @@ pub(crate) struct InMemory {
 impl InMemory {
     pub(crate) fn from_recording(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
         let frames = recording.first_frames(py, usize::MAX)?.into_iter();
-        Ok(Self { taxels: recording.taxels.clone(), frames })
+        Ok(Self { taxels: recording.channels.clone(), frames })
     }
 }
 
@@ -108,8 +108,8 @@ impl Given {
             (None, Some(own)) => (own.clone_ref(py), recording.calibrated(py, calibration, own.get())?),
             (None, None) => return Err(usage(py, format!("{}: it has no body; give body=", recording.name))),
         };
-        let frames = recording.first_frames(py, most(recording.taxels.len()))?;
-        let (source, taxels) = (recording.name.clone(), recording.taxels.clone());
+        let frames = recording.first_frames(py, most(recording.channels.len()))?;
+        let (source, taxels) = (recording.name.clone(), recording.channels.clone());
         Ok(Self { body, calibration, played: Some(TestFrames { source, taxels, frames, truth: Vec::new() }) })
     }
 }

@@ -60,7 +60,7 @@ The file is TOML; its keys may be edited:
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, if it has one].
+    /// The robot: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the source's own, if it has one].
     #[arg(long, value_name = "BODY")]
     body: Option<String>,
 

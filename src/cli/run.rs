@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use somatic::internal::run::Several;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::Setup;
 use somatic::internal::sink::TableName;
@@ -49,6 +50,7 @@ Examples:
   robot-driver | somatic run --body robot.glb --source - | controller
   robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
   somatic run --body robot.glb --source touch.csv.gz
+  somatic run --source a.csv --source b.csv --sink both.csv   one table with a column `recording`
   somatic run --source mcap:touch.mcap --from 60s --to 90s   its second minute's first half
   somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify
@@ -126,6 +128,11 @@ impl Arguments {
         if self.wide && !matches!(self.table, None | Some(TableName::Fields)) {
             return Err(Error::usage("--wide is for the table of fields; leave --table out"));
         }
+        if sinks.is_empty() && !self.describe && asked.each().len() > 1 {
+            return Err(Error::usage(
+                "several recordings go into a table; add `sink = \"csv:FILE\"` or `sink = \"parquet:FILE\"`",
+            ));
+        }
         if self.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !self.describe {
             return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
         }
@@ -155,17 +162,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
-    let input = input(asked)?;
+    let several = Several::new(asked)?;
+    let first = several.first().clone();
+    let input = input(&first)?;
     let Reserved { targets, summary } = arguments.reserve(asked)?;
     let is_printed = asked.sinks.iter().any(SinkSpec::is_on_stdout) || arguments.check_order.is_some();
     let view = View::choose(asked.quiet, is_printed, input.is_recording());
-    let prepared = Prepared::open(asked, &input, view.is_table(), summary, arguments.lasts.as_deref())?;
+    let prepared = Prepared::open(&first, &input, view.is_table(), summary, arguments.lasts.as_deref())?;
+    several.check(&prepared.opened.body)?;
 
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
     let is_for_stdout = asked.sinks.is_empty() && !view.is_table() && arguments.check_order.is_none();
     let targets = if is_for_stdout { vec![SinkTarget::Stdout] } else { targets };
-    let session = prepared.opened.session(asked, &input, &targets, arguments.scene.as_deref())?;
+    let session = several.session(prepared.opened.session(&first, &input, &targets, arguments.scene.as_deref())?);
     if arguments.describe {
         print(&describe(&asked.sinks, &session, arguments.wide)?)?;
         return Ok(DONE);
@@ -174,7 +184,7 @@ fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     if !asked.quiet {
         sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| say(&remark));
     }
-    let (run, console) = prepared.start(asked, &input, view, sinks, arguments.check_order)?;
+    let (run, console) = prepared.start(several, &input, view, sinks, arguments.check_order)?;
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]
     let keys = if view.is_table() && !input.is_stdin() { Keys::listen() } else { None };
@@ -195,10 +205,10 @@ fn finish(mut run: Run, mut console: Console, is_ended: impl Fn() -> bool) -> Re
         }
     };
     // Where nobody was heard, no file is left.
-    let doubts = console.close(&mut ending)?;
+    let mut doubts = console.close(&mut ending)?;
     let outcome = run.finish(ending)?;
     outcome.remarks.iter().for_each(|remark| say(remark));
-    doubts.iter().flat_map(|doubts| doubts.of_frames(outcome.engine.plan())).for_each(|doubt| say(&doubt));
+    doubts.iter_mut().flat_map(|doubts| doubts.told(outcome.engine.plan())).for_each(|doubt| say(&doubt));
     outcome.notices.iter().for_each(|notice| say(notice));
     let code = tell_losses(&outcome.losses);
     if let Some(agreement) = outcome.agreement {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use tempfile::TempDir;
 
 use super::bags::refused;
-use super::{code_of, done, somatic, text_of};
+use super::{code_of, done, fails, somatic, text_of};
 
 const MAP: &str = "values = 'pressure'
 pads = [
@@ -89,7 +89,7 @@ fn each_change_of_the_pressed_pad_is_a_line_and_the_silent_ones_are_listed() {
     done(&[&run[..], &["--check-order", "--sink", text_of(&percepts)]].concat());
     assert_eq!(fs::read_to_string(&percepts).unwrap().lines().count(), 300);
     assert!(refused(2, &[&run[..], &["--check-order", "--sink", "-"]].concat()).contains("--check-order prints on"));
-    assert!(refused(2, &[&run[..], &["--check-order=pads"]].concat()).contains("fields, taxels"));
+    assert!(fails(2, &[&run[..], &["--check-order=pads"]].concat()).contains("fields, taxels"));
 }
 
 #[test]

@@ -65,6 +65,7 @@ mod run;
 mod self_contacts;
 #[cfg(unix)]
 mod serial;
+mod several;
 #[cfg(unix)]
 mod signals;
 mod simulate;

@@ -69,7 +69,9 @@ fn messages_of_other_types_are_read_by_a_map_or_by_its_name() {
     let kind = "tactile_msgs/msg/TactileState";
     let (all, said) = read(kind, &[text_of(&definition)], "tactile-state", "ros2:/tactile", &state);
     assert!(
-        said.contains("`ros2:/tactile` (tactile_msgs/msg/TactileState): sensors[*].values; time is header.stamp"),
+        said.contains(
+            "`ros2:/tactile` (tactile_msgs/msg/TactileState): sensors[*].values; time is as the map names it"
+        ),
         "{said}"
     );
     for (t_s, sums) in &all {

@@ -35,7 +35,7 @@ const STAND_INS: [(&str, &str); 9] = [
     ),
     ("driver |", "cat frames.ndjson |"),
     ("| controller", "> percepts.ndjson"),
-    ("somatic run --body skin.glb --source ros2:/skin --sink ros2", "somatic run --body skin.glb --sink ros2 --for 1s"),
+    ("somatic run --body skin.glb --source ros2:/skin --sink ros2", "somatic run --sink ros2 --for 1s"),
 ];
 
 /// The commands of the table in `text`, row by row.
@@ -78,7 +78,7 @@ fn every_command_of_the_readmes_table_runs() {
             runs = runs.replace(part, other);
         }
         let domain = std::process::id() % 101 + 1;
-        done(&format!("export ROS_DOMAIN_ID={domain}; rm -f percepts.csv; {runs}"));
+        done(&format!("export ROS_DOMAIN_ID={domain}; rm -f percepts*; {runs}"));
     }
     // What nothing uses any more is taken out.
     assert_eq!(used, [true; STAND_INS.len()]);

@@ -150,6 +150,34 @@ pub(super) fn xsensor() -> Target {
     vendor("xsensor", "a.csv", vec![text.into_bytes()], VendorOptions::default())
 }
 
+/// The layout of newer programs; and groups.
+pub(super) fn xsensor_groups() -> Target {
+    let seeds = vec![make::xsensor_groups(&[1, 2, 3]).into_bytes(), make::xsensor_newer(&[1, 2]).into_bytes()];
+    vendor("xsensor_groups", "a.csv", seeds, VendorOptions::default())
+}
+
+pub(super) fn loadsol() -> Target {
+    vendor(
+        "loadsol",
+        "a.txt",
+        vec![make::loadsol(&["A12-L", "A12-R"], &[1, 2, 3]).into_bytes()],
+        VendorOptions::default(),
+    )
+}
+
+pub(super) fn footscan() -> Target {
+    vendor(
+        "footscan",
+        "a.txt",
+        vec![make::footscan(&["Left", "Right"], [4, 3], &[1, 2, 3]).into_bytes()],
+        VendorOptions::default(),
+    )
+}
+
+pub(super) fn stappone() -> Target {
+    vendor("stappone", "a.csv", vec![make::stappone(&[1, 2], &[1, 2, 3]).into_bytes()], VendorOptions::default())
+}
+
 pub(super) fn tekscan() -> Target {
     vendor("tekscan", "a.asf", vec![make::tekscan(&KPA, [6, 10], &[1, 2, 3]).into_bytes()], VendorOptions::default())
 }

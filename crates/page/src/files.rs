@@ -72,6 +72,7 @@ const FILES: &[PageFile] = files![
     "scale_bar.js",
     "socket.js",
     "span.js",
+    "spots.js",
     "stage.css",
     "status.js",
     "style.css",

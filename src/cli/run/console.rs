@@ -62,6 +62,14 @@ impl Observer for Console {
         }
     }
 
+    fn began(&mut self, name: &str, engine: &Engine, taxels: &[u32]) {
+        let is_table = self.view.is_table();
+        let Some(doubts) = &mut self.doubts else { return };
+        let told = doubts.restart(name, taxels, engine.plan());
+        // Under a table they wait for its end.
+        if is_table { doubts.hold(told) } else { told.iter().for_each(|doubt| say(doubt)) }
+    }
+
     fn written(&mut self, read_at: &[Instant]) {
         if let Some(live) = &mut self.live {
             live.see(read_at);
@@ -87,8 +95,7 @@ impl Observer for Console {
 impl Console {
     /// Says, the first time, what is doubtful in the frames so far.
     fn tell_doubts(&mut self, plan: &Plan) {
-        let doubts = self.doubts.take();
-        doubts.iter().flat_map(|doubts| doubts.of_frames(plan)).for_each(|doubt| say(&doubt));
+        self.doubts.iter_mut().flat_map(|doubts| doubts.told(plan)).for_each(|doubt| say(&doubt));
     }
 
     /// Removes the table, and closes the lines, whose losses are those of the run. The doubts are not reported yet.

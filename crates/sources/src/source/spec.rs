@@ -228,6 +228,13 @@ impl SourceSpec {
         matches!(self, Self::Stdin | Self::CsvStdin | Self::Text(TextPlace::Stdin))
     }
 
+    /// Whether it ends, and can be read again.
+    #[must_use]
+    pub fn is_recording(&self) -> bool {
+        use SourceSpec::{CsvStdin, Modbus, Ros2, Serial, Stdin, Text, Zenoh};
+        !matches!(self, Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Modbus(_) | Zenoh(_))
+    }
+
     /// What it is by its file's content and by the options: a `.csv` may be an export.
     #[must_use]
     pub fn with_content(self, options: &VendorOptions) -> Self {
