@@ -16,6 +16,7 @@ use somatic::internal::setup::attached::{self, body_bytes, file_name};
 use somatic::internal::setup::bodies::load_body;
 use somatic::internal::setup::overlaid::{How, overlaid};
 use somatic::internal::setup::{open_mapped, source_of};
+use somatic::internal::signal::Channel;
 use somatic::recording::Reader;
 use somatic::source::{SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Error, Result};
@@ -165,8 +166,7 @@ fn opened(
             let mut mapped = open_mapped(from, options).map_err(in_flags)?;
             let mut attached = files(arguments, from, None)?;
             if let Some(name) = &arguments.body {
-                let ids: Vec<u32> = load_body(name)?.taxels.iter().map(|taxel| taxel.id).collect();
-                mapped = mapped.for_body(&ids)?;
+                mapped = mapped.for_body(&Channel::all_of(&load_body(name)?))?;
             } else if !is_csv {
                 say(&mapped.about_body());
                 attached.push(("map.glb".to_owned(), BODY.to_owned(), mapped.body()?));

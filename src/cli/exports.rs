@@ -43,9 +43,9 @@ pub(super) struct ExportFlags {
     #[arg(long, value_name = "FILE.csv")]
     pub(super) layout: Option<PathBuf>,
 
-    /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
+    /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, tactile-state, xela or xela-ros2.
     ///
-    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. All of them but tactile-state and mujoco are untested.
     #[arg(long, value_name = "FILE")]
     pub(super) map: Option<String>,
 }

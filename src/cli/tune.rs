@@ -11,6 +11,7 @@ use clap::Args;
 use somatic::internal::scene_file::seconds;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::bodies::load_body;
+use somatic::internal::signal::{Axis, Channel};
 use somatic::internal::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use somatic::signal::{FsrCircuit, Wiring};
 use somatic::{Error, Result};
@@ -104,13 +105,17 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
         return Err(Error::usage("standard input is not a terminal; give --press SECONDS"));
     }
     let body = load_body(&arguments.body)?;
-    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let ids = Channel::all_of(&body);
     let wiring = match arguments.lines.keys().wiring()? {
         Some(wiring) => wiring,
         None => Wiring::in_order(&ids, 1, ports.len()).map_err(|e| e.at("no --wiring is given"))?,
     };
     let own = |board: u16, channel: u16| wiring.board(board)?.wipers.get(usize::from(channel)).copied()?;
-    let start = wiring.with_wipers(|board, channel| Some(own(board, channel).unwrap_or(arguments.wiper)));
+    let start = wiring.with_wipers(|board, channel| {
+        // A press turns what is along the normal; other axes keep the wipers that the wiring has.
+        let is_pressed = wiring.taxel(board, channel).is_some_and(|id| Channel(id).axis() == Axis::Normal);
+        own(board, channel).or(is_pressed.then_some(arguments.wiper))
+    });
     let stop = stop_on_signal()?;
     let source = arguments.lines.keys().open_as(Some(start.clone()), &ports, &ids, None)?;
     let mut session = TuningSession::new(source, &start, stop);

@@ -249,9 +249,9 @@ pub struct SceneFile {
     )]
     pub text: TextKeys,
 
-    /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
+    /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, tactile-state, xela or xela-ros2.
     ///
-    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. dex3 and inspire are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. All of them but tactile-state and mujoco are untested.
     pub map: Option<String>,
 
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].

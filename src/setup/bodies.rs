@@ -1,17 +1,21 @@
 //! Bodies by their names.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use crate::body::Body;
 use crate::bundled;
 use crate::error::{Error, Result, nearest};
+use crate::signal::Channel;
 use crate::source::Source;
 
-/// The ids that `source` delivers. `body` must have them all.
+/// The channels that `source` delivers. `body` must have them all.
 pub fn in_body(body: &Body, source: &dyn Source) -> Result<Vec<u32>> {
-    match source.taxels().iter().find(|id| !body.taxels.iter().any(|taxel| taxel.id == **id)) {
+    let channels: HashSet<u32> = Channel::all_of(body).into_iter().collect();
+    match source.taxels().iter().find(|id| !channels.contains(id)) {
         Some(id) => Err(Error::failed(format!(
-            "the source has taxel {id}, and the body has none of that number; is it for another body?"
+            "the source has taxel {}, and the body has none of that number; is it for another body?",
+            Channel(*id)
         ))
         .at(&body.name)),
         None => Ok(source.taxels().to_vec()),

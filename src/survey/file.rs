@@ -66,6 +66,9 @@ impl Findings {
                 if let Some(noise) = found.sigma.map(number).filter(|own| Some(*own) != sigma) {
                     own.push(("noise", noise.to_string()));
                 }
+                if let Some([u, v]) = self.shear_baseline(found.id) {
+                    own.push(("shear_baseline", format!("[{u}, {v}]")));
+                }
             }
             if !own.is_empty() {
                 let _ = write!(text, "\n[taxel.{}]\n", found.id);

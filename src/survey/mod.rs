@@ -9,6 +9,7 @@
 //! chance explains: the steps from value to value tell how far chance goes, as what moves a sensor takes many values over
 //! its way.
 
+mod apart;
 mod at_rest;
 pub mod crosstalk;
 mod figure;
@@ -18,13 +19,16 @@ pub mod known;
 mod known_curve;
 pub mod press_order;
 mod presses;
+mod remarks;
 pub mod scale;
 pub mod tuning;
 mod which_way;
 
+use std::collections::BTreeMap;
+
 use crate::Body;
 use crate::error::{Error, Result};
-use crate::signal::{RawValue, UnitOfP};
+use crate::signal::{Channel, RawValue, UnitOfP};
 
 use self::at_rest::{MIN_TRAVEL_BANDS, chance_of, median, middle, movement_of, rest_of, sigma_of};
 use self::crosstalk::{Crosstalk, Leaks};
@@ -50,7 +54,8 @@ const LOUD_RATIO: f64 = 5.0;
 /// A sensor's baseline and noise; `None` where it delivered nothing.
 type AtRest = Option<(f64, f64)>;
 
-/// A survey that is being made. Sensors stand in the order of the ids it was begun with, and so do the values of a frame.
+/// A survey that is being made. Values of a frame stand in the order of the ids it was begun with, and so do the sensors that feel what
+/// presses on them.
 #[derive(Clone, Debug)]
 pub struct Survey {
     ids: Vec<u32>,
@@ -63,6 +68,19 @@ pub struct Survey {
     /// Baselines and dead bands, from the first press on.
     before_press: Vec<Option<(f64, f64)>>,
     whole_numbers: bool,
+    apart: Option<Box<Apart>>,
+}
+
+/// Where values are in a frame that no press shows, and what they deliver at rest.
+#[derive(Clone, Debug)]
+struct Apart {
+    /// All channels of a frame.
+    all: Vec<u32>,
+    /// The places of those that feel what presses on them.
+    own: Vec<usize>,
+    /// The places of tangential ones of these taxels.
+    tangential: Vec<usize>,
+    survey: Survey,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -153,11 +171,25 @@ pub struct Findings {
     pub curves: Vec<KnownCurve>,
     /// How well known forces agree, in words.
     pub forces_agree: Option<String>,
+    /// By tangential channel, its raw value at rest; `None` where it delivered nothing, or moved.
+    pub tangential: BTreeMap<u32, Option<f64>>,
 }
 
 impl Survey {
     #[must_use]
     pub fn new(ids: &[u32]) -> Self {
+        Self::split(ids, |_| true)
+    }
+
+    /// Of the channels `ids`; `is_pressed` says of a taxel whether it feels what presses on it.
+    fn split(ids: &[u32], is_pressed: impl Fn(u32) -> bool) -> Self {
+        match Apart::of(ids, is_pressed) {
+            Some((own, apart)) => Self { apart: Some(Box::new(apart)), ..Self::of_pressed(&own) },
+            None => Self::of_pressed(ids),
+        }
+    }
+
+    fn of_pressed(ids: &[u32]) -> Self {
         Self {
             ids: ids.to_vec(),
             rest: vec![Vec::new(); ids.len()],
@@ -168,19 +200,34 @@ impl Survey {
             leaks: Leaks::default(),
             before_press: Vec::new(),
             whole_numbers: true,
+            apart: None,
         }
     }
 
-    /// Looks also for crosstalk along the rows and columns of the sensors of `body`.
+    /// The same for sensors of `body`, before any frame: those that feel what presses on them; and looks for crosstalk along their rows and
+    /// columns.
     ///
     /// # Errors
     /// As [`crate::field::FieldSet::new`].
     pub fn on(self, body: &Body) -> Result<Self> {
-        Ok(Self { leaks: Leaks::new(body, &self.ids)?, ..self })
+        let all = self.apart.as_ref().map_or(&self.ids, |apart| &apart.all);
+        let is_pressed = |id: u32| body.taxel_index(id).is_none_or(|index| body.taxels[index].modality.is_pressed());
+        let new = Self::split(all, is_pressed);
+        Ok(Self { leaks: Leaks::new(body, &new.ids)?, ..new })
     }
 
     /// Takes the values of a frame in which nothing touches the robot. Missing and faulty ones are left out.
     pub fn rest(&mut self, values: &[RawValue]) {
+        if let Some(mut apart) = self.apart.take() {
+            let own = apart.rest(values);
+            self.rest_of_pressed(&own);
+            self.apart = Some(apart);
+        } else {
+            self.rest_of_pressed(values);
+        }
+    }
+
+    fn rest_of_pressed(&mut self, values: &[RawValue]) {
         self.rest_frames += 1;
         if !(self.rest_frames - 1).is_multiple_of(self.stride) {
             return;
@@ -208,6 +255,16 @@ impl Survey {
 
     /// Takes the values of a frame in which sensors are being pressed.
     pub fn press(&mut self, values: &[RawValue]) {
+        if let Some(mut apart) = self.apart.take() {
+            let own = apart.press(values);
+            self.press_of_pressed(&own);
+            self.apart = Some(apart);
+        } else {
+            self.press_of_pressed(values);
+        }
+    }
+
+    fn press_of_pressed(&mut self, values: &[RawValue]) {
         if self.before_press.is_empty() {
             let rest = |kept: &Vec<f32>| rest_of(kept, self.step()).map(|(at, noise)| (at, self.dead_band(noise)));
             self.before_press = self.rest.iter().map(rest).collect();
@@ -313,6 +370,7 @@ impl Survey {
             scale: None,
             curves: Vec::new(),
             forces_agree: None,
+            tangential: self.apart.as_ref().map(|apart| apart.baselines()).unwrap_or_default(),
         })
     }
 
@@ -343,21 +401,6 @@ impl Survey {
         at_rest.iter().zip(&self.rest).map(moved).collect()
     }
 
-    /// The error that names the sensors that `moved`.
-    fn not_at_rest(&self, at_rest: &[AtRest], moved: &[bool], range: f64) -> Error {
-        let those = || (0..self.ids.len()).filter(|&sensor| moved[sensor]);
-        let bands = those().filter_map(|sensor| at_rest[sensor]).map(|(_, noise)| self.dead_band(noise));
-        let widest = bands.fold(0.0, f64::max);
-        let ids: Vec<u32> = those().map(|sensor| self.ids[sensor]).collect();
-        Error::failed(format!(
-            "{} of {} sensors moved during the rest: {}; their dead bands would be up to {widest} of a raw range of {range}. Keep \
-             everything off the robot until the rest is over; --mask-moved leaves broken sensors out",
-            ids.len(),
-            self.ids.len(),
-            several(&ids)
-        ))
-    }
-
     /// How far apart the raw values of all sensors were, at rest and pressed.
     fn seen_range(&self) -> f64 {
         let at_rest = self.rest.iter().flatten().copied();
@@ -381,7 +424,7 @@ fn travels(rest: &Option<(f64, f64)>, pressed: &Pressed) -> [f64; 2] {
 /// The first few of `ids`, and how many more there are.
 fn several(ids: &[u32]) -> String {
     const SHOWN: usize = 12;
-    let names: Vec<String> = ids.iter().take(SHOWN).map(ToString::to_string).collect();
+    let names: Vec<String> = ids.iter().take(SHOWN).map(|&id| Channel(id).to_string()).collect();
     let rest = if ids.len() > SHOWN { format!(" and {} more", ids.len() - SHOWN) } else { String::new() };
     format!("{}{rest}", names.join(", "))
 }
@@ -389,52 +432,6 @@ fn several(ids: &[u32]) -> String {
 /// `value` with four significant digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
-}
-
-impl Findings {
-    /// What a person should know of it, a line each.
-    #[must_use]
-    pub fn remarks(&self) -> Vec<String> {
-        let ids = |is: &dyn Fn(&Found) -> bool| -> Vec<u32> {
-            self.sensors.iter().filter(|found| is(found)).map(|found| found.id).collect()
-        };
-        let mut noises: Vec<f64> = self.sensors.iter().filter(|f| f.baseline.is_some()).map(|f| f.noise).collect();
-        let usual = median(&mut noises).unwrap_or(0.0);
-        let at_its_end = |found: &Found| match (self.raw_range, found.baseline) {
-            (Some([low, high]), Some(baseline)) => baseline == if self.invert { low } else { high },
-            _ => false,
-        };
-        let kinds: [(&str, Vec<u32>); 6] = [
-            ("delivered nothing at rest, and are masked", ids(&|found| found.baseline.is_none())),
-            ("are at the end of their range untouched, and are masked", ids(&at_its_end)),
-            (
-                "were not pressed, and so have no travel",
-                ids(&|f| f.baseline.is_some() && f.travel.is_none() && !self.is_lost(f)),
-            ),
-            (
-                "move the other way than the rest of them, and are masked (were they pressed during the rest?)",
-                ids(&|found| found.went_other_way && !found.moved && !at_its_end(found)),
-            ),
-            ("moved at rest, and are masked", ids(&|found| found.moved && !at_its_end(found))),
-            (
-                "are far noisier than the others at rest",
-                ids(&|found| usual > 0.0 && found.noise > LOUD_RATIO * usual && !found.moved),
-            ),
-        ];
-        kinds
-            .into_iter()
-            .filter(|(_, ids)| !ids.is_empty())
-            .map(|(what, ids)| format!("{} of {} sensors {what}: {}", ids.len(), self.sensors.len(), several(&ids)))
-            .chain(self.crosstalk.map(|found| found.to_string()))
-            .chain(self.forces_agree.clone())
-            .collect()
-    }
-
-    /// Whether nothing can be felt through `found`.
-    fn is_lost(&self, found: &Found) -> bool {
-        let end = self.raw_range.map(|[low, high]| if self.invert { low } else { high });
-        found.baseline.is_none() || found.moved || found.went_other_way || found.baseline == end
-    }
 }
 
 /// The range of raw values of sensors that rise to `end` and no further. `lowest` is the lowest value seen. The range begins at

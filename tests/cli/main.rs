@@ -2,6 +2,7 @@
 
 mod arduino;
 mod author;
+mod axes;
 mod bags;
 mod bags_db3;
 mod bags_merged;

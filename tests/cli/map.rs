@@ -109,10 +109,14 @@ fn messages() -> Vec<(String, String, i64, Vec<u8>)> {
 }
 
 fn write_mcap(path: &Path, messages: &[(String, String, i64, Vec<u8>)]) {
+    write_defined(path, DEFINITION, messages);
+}
+
+fn write_defined(path: &Path, definition: &str, messages: &[(String, String, i64, Vec<u8>)]) {
     let to = BufWriter::new(File::create(path).unwrap());
     let mut writer = mcap::WriteOptions::new().compression(None).profile("ros2").create(to).unwrap();
     for (sequence, (topic, kind, log_ns, data)) in (0..).zip(messages) {
-        let schema = writer.add_schema(kind, "ros2msg", DEFINITION.as_bytes()).unwrap();
+        let schema = writer.add_schema(kind, "ros2msg", definition.as_bytes()).unwrap();
         let channel_id = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
         let (log_time, publish_time) = (*log_ns as u64, *log_ns as u64);
         let header = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
@@ -421,4 +425,105 @@ fn registers_of_a_hand_are_frames() {
     assert!(why.contains("dex3: registers: name them, as registers = { palm = [4900, 112] }"), "{why}");
     let why = refused(2, &["run", "--source", "modbus://hand:x", "--map", "inspire", "--sink", "-"]);
     assert!(why.contains("`hand:x` is not a device; write modbus://HOST:PORT"), "{why}");
+}
+
+/// Sixteen taxels of a XELA sensor: of taxel `at` the forces are `at`, 1 and 2·`at` in frame 1, and nothing else.
+fn xela(frame: u32) -> Vec<u8> {
+    let mut bytes = Bytes(Vec::new());
+    bytes.words(&[1, 7 + frame]);
+    bytes.put(&1_695_696_620.5_f64.to_le_bytes());
+    bytes.words(&[7]);
+    bytes.0.extend_from_slice(b"uSPa44\0");
+    bytes.put(&[1]);
+    bytes.words(&[16]);
+    (0..48).for_each(|_| bytes.put(&49_331_u16.to_le_bytes()));
+    bytes.words(&[16]);
+    bytes
+        .floats((0..16).flat_map(|at: u8| [f32::from(at), 1.0, 2.0 * f32::from(at)]).map(|force| force * frame as f32));
+    [&[0, 1, 0, 0][..], &bytes.0].concat()
+}
+
+/// Nine pillars as the manual has them, with ids of 32 bits and no header: the forces of pillar `at` are −`at`, 0.5 and `at` in frame 1.
+fn papillarray(frame: u32) -> Vec<u8> {
+    let mut bytes = Bytes(Vec::new());
+    bytes.put(&123_i64.to_le_bytes());
+    bytes.words(&[9]);
+    for at in 0..9_u8 {
+        bytes.words(&[at.into()]);
+        bytes.floats([0.0, 0.0, 0.0]);
+        bytes.floats([-f32::from(at), 0.5, f32::from(at)].map(|force| force * frame as f32));
+        bytes.put(&[1]);
+        bytes.words(&[2]);
+    }
+    bytes.floats([0.0; 8]);
+    bytes.put(&[0]);
+    bytes.put(&[0]);
+    [&[0, 1, 0, 0][..], &bytes.0].concat()
+}
+
+const PILLARS: &str = "\
+int64 tus
+PillarState[] pillars
+float32 gfx
+float32 gfy
+float32 gfz
+float32 gtx
+float32 gty
+float32 gtz
+float32 friction_est
+float32 target_grip_force
+bool is_sd_active
+bool is_ref_loaded
+================================================================================
+MSG: sensor_interfaces/PillarState
+int32 id
+float32 dx
+float32 dy
+float32 dz
+float32 fx
+float32 fy
+float32 fz
+bool in_contact
+int32 slip_state
+";
+
+#[test]
+fn sensors_with_three_axes_come_from_bags_by_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let pillars: Vec<_> = (0..2)
+        .map(|frame| {
+            let kind = "sensor_interfaces/msg/SensorState".to_owned();
+            ("/hub_0/sensor_0".to_owned(), kind, 10_000_000 * i64::from(frame), papillarray(frame))
+        })
+        .collect();
+    write_defined(&path("pillars.mcap"), PILLARS, &pillars);
+    // Without a definition, as recorders before Iron have it.
+    let xela_kind = "xela_server_ros2/msg/SensStream".to_owned();
+    let sent: Vec<_> = (0..2)
+        .map(|frame| ("/xServTopic".to_owned(), xela_kind.clone(), 10_000_000 * i64::from(frame), xela(frame)))
+        .collect();
+    write_db3(&path("xela.db3"), &sent);
+    for (bag, map, says, taxels, last) in [
+        ("pillars.mcap", "contactile", "3 × 3 sensors", 9, ["-8", "0.5", "8"]),
+        ("xela.db3", "xela-ros2", "1 pads (sensor_1)", 16, ["15", "1", "30"]),
+    ] {
+        let (table, bag) = (path(&format!("{map}.csv")), path(bag));
+        let source = format!("ros2-mcap:{}", bag.display());
+        let made = output(&["convert", &source, text_of(&table), "--map", map]);
+        assert!(made.status.success() && stderr(&made).contains("untested"), "{}", stderr(&made));
+        let text = fs::read_to_string(&table).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        assert_eq!((rows.len(), rows[0].len()), (3, 1 + 3 * taxels), "{text}");
+        let at = |name: String| rows[0].iter().position(|head| **head == name).unwrap();
+        let number = taxels - 1;
+        let found =
+            [at(format!("{number}.u")), at(format!("{number}.v")), at(number.to_string())].map(|at| rows[2][at]);
+        assert_eq!(found, last, "{text}");
+        let run =
+            output(&["run", "--source", &source, "--map", map, "--backend", "reference", "--outputs", "total,shear"]);
+        assert!(stderr(&run).contains(says) && stderr(&run).contains("each has three axes"), "{}", stderr(&run));
+        let field = &frames(&String::from_utf8_lossy(&run.stdout))[1]["fields"];
+        assert!(field.as_array().unwrap().iter().any(|field| field["shear"].is_array()), "{field}");
+    }
 }

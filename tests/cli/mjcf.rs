@@ -156,3 +156,42 @@ fn what_is_wrong_with_a_model_is_one_line_with_its_place() {
     assert!(error.contains("not an MJCF"), "{error}");
     assert!(!output.exists());
 }
+
+#[test]
+fn a_ball_that_slides_in_mujoco_pulls_where_it_slides() {
+    let python = match python_with("mujoco", "import mujoco") {
+        Ok(python) => python,
+        Err(why) => return skip("MUJOCO", why),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (frames, map) = (folder.path().join("slide.ndjson"), folder.path().join("grid.toml"));
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mujoco/slide.py");
+    let output = Command::new(python).args([script, text_of(&frames)]).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let truth: Vec<[f64; 2]> = serde_json::from_slice(&output.stdout).unwrap();
+    // The grid looks up through the pad: its rows are drawn from above, and its y points down on paper.
+    let grid = "values = ['sensordata[0:81]', 'sensordata[81:162]', 'sensordata[162:243]']\naxes = 'n,u,-v'\ngrid = '9x9'\npitch = '5mm'\n";
+    std::fs::write(&map, grid).unwrap();
+    let source = format!("ndjson:{}", frames.display());
+    let asked = ["--map", text_of(&map), "--backend", "reference", "--outputs", "total,shear,shear_direction"];
+    let lines = done(&[&["run", "--source", &source][..], &asked].concat());
+    let directions: Vec<f64> = super::frames(&lines)
+        .iter()
+        .map(|frame| {
+            let fields = frame["fields"].as_array().unwrap();
+            fields.iter().find_map(|field| field["shear_direction"].as_f64()).expect("something pulls")
+        })
+        .collect();
+    assert_eq!((directions.len(), truth.len()), (24, 24));
+    for (found, [pulled, slid]) in directions.iter().zip(truth) {
+        for right in [pulled, slid] {
+            let off = (found - right).sin().atan2((found - right).cos()).abs().to_degrees();
+            assert!(off < 3.0, "{found} is {off}° from {right}");
+        }
+    }
+    // With the axes exchanged it is not.
+    std::fs::write(&map, grid.replace("n,u,-v", "n,-v,u")).unwrap();
+    let turned = super::frames(&done(&[&["run", "--source", &source][..], &asked].concat()));
+    let first = turned[0]["fields"].as_array().unwrap().iter().find_map(|field| field["shear_direction"].as_f64());
+    assert!((first.unwrap() - directions[0]).abs() > 0.3);
+}

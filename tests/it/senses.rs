@@ -312,3 +312,36 @@ fn a_skin_without_any_pressure_is_read_on_every_backend() {
         assert!(percepts.iter().all(|frame| frame.len() == 1 && frame[0].nearest.is_some()), "{kind:?}");
     }
 }
+
+#[test]
+fn the_first_frame_may_be_the_rest_of_tangential_values_too() {
+    let body = skin(1);
+    for kind in backends() {
+        let options = Options::default().backend(kind).tare(true);
+        let mut engine = Engine::new(&body, options).unwrap();
+        let frame = |engine: &Engine, t_s: f64, more: [f64; 3]| {
+            let mut frame = engine.frame(t_s);
+            for (i, _) in grid() {
+                for (axis, (rest, more)) in
+                    ["", ".u", ".v"].into_iter().zip([100.0, 510.0, 530.0].into_iter().zip(more))
+                {
+                    let index = engine.index_of(&format!("{i}{axis}")).unwrap();
+                    frame.values[index] = RawValue::new(rest + if i == 12 { more } else { 0.0 });
+                }
+            }
+            frame
+        };
+        let rest = frame(&engine, 0.0, [0.0; 3]);
+        assert!(engine.process_one(&rest).unwrap().frame(0).all(|percept| !percept.contact));
+        let state = engine.state().unwrap();
+        let pulled = frame(&engine, 0.1, [3.0, 1.0, -2.0]);
+        let percepts: Vec<Percept> = engine.process_one(&pulled).unwrap().frame(0).collect();
+        // t is the chart's +v and n × t its −u.
+        close(DVec2::from_array(percepts[1].shear.unwrap()), DVec2::new(2.0, 1.0), 1e-9);
+        assert_eq!(percepts[0].total, Some(3.0));
+        // An engine that goes on from there knows them.
+        let mut other = Engine::new(&body, Options::default().backend(kind).tare(true)).unwrap();
+        other.restore(&state).unwrap();
+        assert_eq!(other.process_one(&pulled).unwrap().frame(0).collect::<Vec<_>>(), percepts);
+    }
+}

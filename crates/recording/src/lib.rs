@@ -33,6 +33,7 @@ mod unpack;
 mod view;
 mod yaml_list;
 
+use somatic_skin::signal::Channel;
 use somatic_skin::{body, error, limits, output, signal};
 
 pub use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
@@ -83,29 +84,29 @@ pub fn nanoseconds(t_s: f64) -> u64 {
     whole as u64 * 1_000_000_000 + rest as u64
 }
 
-/// Ids in few characters, in their order: `0-35,64-103`.
+/// Channels in few characters, in their order: `0-35,64-103`, of taxels with three axes also `64.u-103.u`.
 fn words_of(ids: &[u32]) -> String {
-    let runs = ids.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    let runs = ids.chunk_by(|a, b| a.checked_add(1) == Some(*b) && Channel(*a).axis() == Channel(*b).axis());
     let word = |run: &[u32]| match run {
-        [one] => one.to_string(),
-        run => format!("{}-{}", run[0], run[run.len() - 1]),
+        [one] => Channel(*one).to_string(),
+        run => format!("{}-{}", Channel(run[0]), Channel(run[run.len() - 1])),
     };
     runs.map(word).collect::<Vec<_>>().join(",")
 }
 
-/// The highest channel that a body can have.
-const LAST_CHANNEL: u32 = (2 << 25) | body::MAX_TAXEL_ID;
-
-/// The ids that [`words_of`] wrote; `None` where it did not, or where there are more than a body can have.
+/// The channels that [`words_of`] wrote; `None` where it did not, or where there are more than a body can have.
 fn ids_of(words: &str) -> Option<Vec<u32>> {
     let mut ids = Vec::new();
     for word in words.split(',').filter(|word| !word.is_empty()) {
         let (first, last) = word.split_once('-').unwrap_or((word, word));
-        let (first, last): (u32, u32) = (first.parse().ok()?, last.parse().ok()?);
-        if last < first || last > LAST_CHANNEL || (last - first) as usize + ids.len() > body::MAX_TAXEL_ID as usize {
+        let run = Channel::run(first, last)?;
+        let last = Channel(*run.end());
+        if last.taxel() > body::MAX_TAXEL_ID
+            || (last.0 - run.start()) as usize + ids.len() > body::MAX_TAXEL_ID as usize
+        {
             return None;
         }
-        ids.extend(first..=last);
+        ids.extend(run);
     }
     Some(ids)
 }
@@ -113,14 +114,20 @@ fn ids_of(words: &str) -> Option<Vec<u32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::Axis;
 
     #[test]
     fn ids_come_back_from_their_words() {
-        for ids in [vec![], vec![7], vec![0, 1, 2, 5, 9, 10], vec![3, 2, 1, 1, 2]] {
+        let tangential = |taxel| [Axis::U, Axis::V].map(|axis| Channel::of_taxel(taxel, axis).0);
+        let ([four_u, four_v], [five_u, _]) = (tangential(4), tangential(5));
+        for ids in [vec![], vec![7], vec![0, 1, 2, 5, 9, 10], vec![3, 2, 1, 1, 2], vec![4, four_u, four_v, 5, five_u]] {
             assert_eq!(ids_of(&words_of(&ids)), Some(ids));
         }
         assert_eq!(words_of(&[0, 1, 2, 5]), "0-2,5");
-        for odd in ["a", "5-3", "1-", "0-4294967295", "-4"] {
+        assert_eq!(words_of(&[4, 5, four_u, five_u, four_v]), "4-5,4.u-5.u,4.v");
+        let last = tangential(body::MAX_TAXEL_ID)[0];
+        assert_eq!(ids_of(&words_of(&[last, four_v])), Some(vec![last, four_v]));
+        for odd in ["a", "5-3", "1-", "0-4294967295", "-4", "4.u-5", "4.w", "16777217"] {
             assert_eq!(ids_of(odd), None, "{odd}");
         }
     }

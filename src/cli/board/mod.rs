@@ -14,6 +14,7 @@ use somatic::internal::output::OutputLink;
 use somatic::internal::scene_file::hertz;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::bodies::load_body;
+use somatic::internal::signal::Channel;
 use somatic::internal::wire::{Bits, layout_hash};
 use somatic::signal::Wiring;
 use somatic::source::{CsvSource, NdjsonSource, Source, SourceSpec, VendorOptions};
@@ -269,7 +270,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, LineSettings, Play)> {
     }
     let wiring = arguments.wiring.as_ref().map(Wiring::load).transpose()?;
     let body = arguments.body.as_deref().or(live.then_some("hand")).map(load_body).transpose()?;
-    let ids: Vec<u32> = body.iter().flat_map(|body| &body.taxels).map(|taxel| taxel.id).collect();
+    let ids: Vec<u32> = body.iter().flat_map(Channel::all_of).collect();
     if let (Some(body), None) = (&body, &spec)
         && arguments.body.as_deref() != Some("hand")
     {
@@ -288,6 +289,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Station>, LineSettings, Play)> {
     if let Some(body) = &body
         && let Some(id) = taxels.iter().find(|id| !ids.contains(id))
     {
+        let id = Channel(*id);
         let what = format!("the source has taxel {id}, and the body has none of that number; is it for another body?");
         return Err(Error::failed(what).at(&body.name));
     }

@@ -2,7 +2,7 @@
 
 use somatic::internal::setup::attached;
 use somatic::internal::setup::{Input, Setup};
-use somatic::internal::signal::UnitOfP;
+use somatic::internal::signal::{Channel, UnitOfP};
 use somatic::scene::file::SceneFile;
 use somatic::source::{Lines, Source, SourceSpec, VendorOptions, VendorSource};
 use somatic::{Body, Error, Result};
@@ -36,7 +36,7 @@ impl Opened {
         let setup = set_up(scene);
         let input = input(&setup)?;
         let body = body_of(&setup, &input)?;
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let ids = Channel::all_of(&body);
         let is_live = !input.is_recording();
         if !ports.is_empty() {
             let source = lines.open(&ports, &ids, None)?;

@@ -247,9 +247,9 @@ pub(in crate::cli) struct RunFlags {
     #[command(flatten)]
     pub(in crate::cli) text: TextFlags,
 
-    /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
+    /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, tactile-state, xela or xela-ros2.
     ///
-    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. dex3 and inspire are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. All of them but tactile-state and mujoco are untested.
     #[arg(long, help_heading = RECORDINGS, value_name = "FILE")]
     pub(in crate::cli) map: Option<String>,
 

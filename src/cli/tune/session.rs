@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use console::Term;
+use somatic::internal::signal::{Axis, Channel};
 use somatic::internal::source::BoardState;
 use somatic::internal::survey::tuning::Tuning;
 use somatic::signal::Wiring;
@@ -94,7 +95,8 @@ impl TuningSession {
         let mut places = Vec::new();
         for (board, wired) in wiring.boards().iter().enumerate() {
             for (channel, (taxel, wiper)) in (0..).zip(wired.taxels.iter().zip(&wired.wipers)) {
-                if let (Some(taxel), Some(before)) = (*taxel, *wiper) {
+                let taxel = taxel.filter(|&taxel| Channel(taxel).axis() == Axis::Normal);
+                if let (Some(taxel), Some(before)) = (taxel, *wiper) {
                     let id = wired.id;
                     places.push(TunedChannel { board, id, channel, taxel, before, is_set: false, trouble: None });
                 }

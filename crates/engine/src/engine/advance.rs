@@ -1,5 +1,6 @@
 //! Engine → backend → post-processing: how a call's frames go through.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
@@ -13,7 +14,7 @@ use super::post::{Post, flag_stale, flag_stale_poses};
 use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
-use crate::signal::RawValue;
+use crate::signal::{Axis, Channel, RawValue};
 
 /// Frames until `go_on` is asked first.
 const FIRST_PART: usize = 256;
@@ -236,10 +237,30 @@ impl Engine {
                 self.plan.keep_up(channel, value as f32, false, &made);
             }
         }
+        self.take_as_tangential_baselines();
         if let Some(drift) = &mut self.drift {
             drift.restart(&self.plan);
         }
         self.recalibrate(check);
+    }
+
+    /// The same of tangential values: of taxels that have both.
+    fn take_as_tangential_baselines(&mut self) {
+        let Some(mut shear) = self.plan.senses.shear.take() else { return };
+        let channels = &self.plan.senses.channels;
+        let row = self.sensed.get(..channels.len()).unwrap_or_default();
+        let number_of: HashMap<Channel, f64> = channels
+            .iter()
+            .zip(row)
+            .filter_map(|(&channel, value)| Some((Channel(self.ids[channel]), value.number()?)))
+            .collect();
+        for (taxel, &id) in self.taxel_ids().iter().enumerate() {
+            let along = |axis| number_of.get(&Channel::of_taxel(id, axis)).copied();
+            if let (Some(u), Some(v)) = (along(Axis::U), along(Axis::V)) {
+                shear.own_baselines.insert(taxel, [u, v]);
+            }
+        }
+        self.plan.senses.shear = Some(shear);
     }
 
     /// Ends an epoch of drift compensation, and calibrates from now on with its outcome.

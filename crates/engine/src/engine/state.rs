@@ -7,7 +7,7 @@ use super::on_skin::{OnSkin, OnSkinState};
 use super::post::PostState;
 use crate::backend::BackendState;
 use crate::error::{Error, Result};
-use crate::signal::{FrameTime, IntakeState, TaxelCalibration};
+use crate::signal::{FrameTime, IntakeState, ShearCalibration, TaxelCalibration};
 use crate::stage::layout;
 
 /// Everything that the next percepts depend on beside the next frames.
@@ -37,8 +37,8 @@ pub struct EngineState {
     frames_done: u64,
     last_time: Option<FrameTime>,
     tare: bool,
-    /// By channel and by slot, if the calibration may change.
-    calibration: Option<(Vec<TaxelCalibration>, Vec<layout::Taxel>)>,
+    /// By channel and by slot, and of tangential values, if the calibration may change.
+    calibration: Option<(Vec<TaxelCalibration>, Vec<layout::Taxel>, Option<ShearCalibration>)>,
     intake: IntakeState,
     backend: BackendState,
     post: PostState,
@@ -66,7 +66,9 @@ impl Engine {
             frames_done: self.frames_done,
             last_time: self.last_time,
             tare: self.tare,
-            calibration: self.recalibrates.then(|| (self.plan.calibrations.clone(), self.plan.taxels.clone())),
+            calibration: self
+                .recalibrates
+                .then(|| (self.plan.calibrations.clone(), self.plan.taxels.clone(), self.plan.senses.shear.clone())),
             intake: self.intake.state().clone(),
             backend: self.backend.state()?,
             post: self.post.clone(),
@@ -94,9 +96,10 @@ impl Engine {
                 "the state is of an engine with another body, scene or calibration; restore it where it fits",
             ));
         }
-        if let Some((calibrations, taxels)) = &state.calibration {
+        if let Some((calibrations, taxels, shear)) = &state.calibration {
             self.plan.calibrations.clone_from(calibrations);
             self.plan.taxels.clone_from(taxels);
+            self.plan.senses.shear.clone_from(shear);
             self.plan.calibration_changes += 1;
             self.recalibrate(None);
         }

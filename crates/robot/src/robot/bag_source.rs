@@ -6,7 +6,7 @@ use super::places::{FRAME_TYPES, Places, not_read};
 use crate::body::Body;
 use crate::error::{Error, Result, failed};
 use crate::recording::{BagMessage, BagReader, WantedTopics};
-use crate::signal::{Frame, FrameTime};
+use crate::signal::{Channel, Frame, FrameTime};
 use crate::source::{BagName, SkippedBad, Source};
 
 /// The time `log_ns` by a recorder's clock.
@@ -58,16 +58,17 @@ impl BagSource {
     /// The bag cannot be read, or has no such topics, or some that are not read together.
     pub fn open(bag: &BagName, body: &Body) -> Result<Self> {
         let reader = frames_of(bag)?;
+        let places = Places::new(body);
         let kind = match reader.topics().len() {
             1 if reader.kind() == PointCloud2::TYPE => Kind::Cloud,
             1 => Kind::Array,
-            topics => Kind::Clouds(Box::new(CloudMerge::new(topics, body.taxels.len()))),
+            topics => Kind::Clouds(Box::new(CloudMerge::new(topics, places.ids().len()))),
         };
         Ok(Self {
             path: bag.path.display().to_string(),
             topics: reader.topics().to_vec(),
             bag: reader,
-            places: Places::new(body),
+            places,
             kind,
             notices: Vec::new(),
             skipped: SkippedBad::default(),
@@ -131,7 +132,7 @@ impl Kind {
                 places.points(&cloud, |index, value| values.push((index, value))).and_then(|()| {
                     let cloud = TopicCloud { topic: message.topic, time, log_s: log.s, values };
                     merge.push(cloud).map(|()| time.s).map_err(|(index, other)| {
-                        let (taxel, other) = (places.ids()[index], &topics[other]);
+                        let (taxel, other) = (Channel(places.ids()[index]), &topics[other]);
                         failed!("taxel {taxel} is in clouds of {other}, too; record each taxel on one topic")
                     })
                 })

@@ -3,14 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::messages::{Float32MultiArray, Message as _, PointCloud2, PointField};
-use crate::body::Body;
+use crate::body::{Body, Taxel};
 use crate::error::{Error, Result, failed};
-use crate::signal::{Frame, FrameTime, RawValue};
+use crate::signal::{Axis, Channel, Frame, FrameTime, RawValue};
 
 /// The types of messages that frames are read from.
 pub(super) const FRAME_TYPES: [&str; 2] = [PointCloud2::TYPE, Float32MultiArray::TYPE];
-/// Fields of a point that are its raw value, the first that is there; and those that are its taxel's id.
-const VALUE_FIELDS: [&str; 4] = ["value", "raw", "pressure", "intensity"];
+/// Fields of a point that are its raw value, the first that is there; and those that are its taxel's id. Of a taxel with three axes the
+/// tangential ones are called as the raw value with `_u` and `_v`, or `force_u` and `force_v`.
+const VALUE_FIELDS: [&str; 5] = ["value", "raw", "force", "pressure", "intensity"];
 const ID_FIELDS: [&str; 2] = ["taxel", "id"];
 
 /// That messages of the type `kind` are not frames.
@@ -23,11 +24,16 @@ pub(super) fn not_read(kind: &str) -> Error {
 
 /// Where the values of messages go in a frame of a body.
 pub(super) struct Places {
+    /// The channels of a frame: first the taxels' own, in the body's order.
     ids: Vec<u32>,
     index_of: HashMap<u32, usize>,
+    /// By taxel, where its tangential values are, if it has three axes.
+    tangential: Vec<Option<[usize; 2]>>,
     /// By link, its taxels in the body's order.
     of_link: BTreeMap<String, Vec<usize>>,
     all: Vec<usize>,
+    /// All channels, those of a taxel side by side.
+    side_by_side: Vec<usize>,
     body: String,
     /// Frames of coordinates that clouds may be in: the body's links, and others that were reported.
     frames: BTreeSet<String>,
@@ -37,18 +43,25 @@ pub(super) struct Places {
 
 impl Places {
     pub(super) fn new(body: &Body) -> Self {
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let ids = Channel::all_of(body);
         let mut of_link: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for (index, taxel) in body.taxels.iter().enumerate() {
             of_link.entry(body.links[taxel.link].name.clone()).or_default().push(index);
         }
-        let index_of = ids.iter().enumerate().map(|(index, id)| (*id, index)).collect();
+        let index_of: HashMap<u32, usize> = ids.iter().enumerate().map(|(index, id)| (*id, index)).collect();
+        let place = |id: u32, axis: Axis| index_of.get(&Channel::of_taxel(id, axis).0).copied();
+        let both = |taxel: &Taxel| Some([place(taxel.id, Axis::U)?, place(taxel.id, Axis::V)?]);
+        let tangential = body.taxels.iter().map(both).collect();
+        let mut side_by_side = ids.clone();
+        Channel::side_by_side(&mut side_by_side);
+        let side_by_side = side_by_side.iter().map(|id| index_of[id]).collect();
         let frames = body.links.iter().map(|link| link.name.clone()).collect();
+        let all = (0..body.taxels.len()).collect();
         let body = body.name.clone();
-        Self { all: (0..ids.len()).collect(), ids, index_of, of_link, body, frames, notices: Vec::new() }
+        Self { all, side_by_side, ids, index_of, tangential, of_link, body, frames, notices: Vec::new() }
     }
 
-    /// The ids of a frame's values, in their order: all of the body.
+    /// The channels of a frame's values, in their order: all of the body.
     pub(super) fn ids(&self) -> &[u32] {
         &self.ids
     }
@@ -81,15 +94,27 @@ impl Places {
             let fields: Vec<&str> = cloud.fields.iter().map(|field| field.name.as_str()).collect();
             return Err(failed!("its points have {}; name the raw value `value`", fields.join(", ")));
         };
-        let value = Column::new(cloud, value)?;
-        if let Some(id) = named(&ID_FIELDS) {
+        let points_of = Points::new(cloud, value)?;
+        let id = named(&ID_FIELDS);
+        if id.is_some() {
             self.look_at_frame(&cloud.header.frame_id);
+        }
+        let mut put = |taxel: usize, point: usize| {
+            put(taxel, RawValue::new(points_of.value.at(point)));
+            if let (Some(columns), Some(places)) = (&points_of.tangential, self.tangential[taxel]) {
+                for (column, place) in columns.iter().zip(places) {
+                    put(place, RawValue::new(column.at(point)));
+                }
+            }
+        };
+        if let Some(id) = id {
             let id = Column::new(cloud, id)?;
             let mut unknown = Vec::new();
             for point in 0..points {
                 let own = id.at(point);
-                match self.index_of.get(&(own as u32)).filter(|_| own == f64::from(own as u32)) {
-                    Some(&index) => put(index, RawValue::new(value.at(point))),
+                let taxel = self.index_of.get(&(own as u32)).filter(|&&index| index < self.all.len());
+                match taxel.filter(|_| own == f64::from(own as u32)) {
+                    Some(&taxel) => put(taxel, point),
                     None => unknown.push(own),
                 }
             }
@@ -112,12 +137,10 @@ impl Places {
             );
             return Err(failed!(
                 "a cloud has {points} points, and {of_link} and {} in all; give each point its taxel's id as a field `taxel`",
-                self.ids.len()
+                self.all.len()
             ));
         };
-        for (point, &index) in taxels.iter().enumerate() {
-            put(index, RawValue::new(value.at(point)));
-        }
+        taxels.iter().enumerate().for_each(|(point, &taxel)| put(taxel, point));
         Ok(())
     }
 
@@ -132,26 +155,51 @@ impl Places {
         }
     }
 
-    /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `time` at which it came.
+    /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `time` at which it came: one for each taxel, or
+    /// of those with three axes three side by side.
     ///
     /// # Errors
-    /// It has not one number for each taxel.
+    /// It has another number of them.
     pub(super) fn array(&self, array: &Float32MultiArray, time: FrameTime, frame: &mut Frame) -> Result<()> {
         self.empty(frame);
         frame.set_time(time);
         let values = array.data.get(array.layout.data_offset as usize..).unwrap_or_default();
-        if values.len() != self.ids.len() {
+        let places = [&self.all, &self.side_by_side].into_iter().find(|places| places.len() == values.len());
+        let Some(places) = places else {
+            let (values, taxels) = (values.len(), self.all.len());
+            let axes = match self.ids.len() {
+                all if all > taxels => format!(", or {all} with all axes of each side by side"),
+                _ => String::new(),
+            };
             return Err(failed!(
-                "an array has {} numbers, and the body {} taxels; send one for each, in the body's order (somatic inspect \
-                 BODY --json lists them)",
-                values.len(),
-                self.ids.len()
+                "an array has {values} numbers, and the body {taxels} taxels; send one for each{axes}, in the body's order (somatic \
+                 inspect BODY --json lists them)"
             ));
-        }
-        for (to, value) in frame.values.iter_mut().zip(values) {
-            *to = RawValue::new(f64::from(*value));
+        };
+        for (&place, value) in places.iter().zip(values) {
+            frame.values[place] = RawValue::new(f64::from(*value));
         }
         Ok(())
+    }
+}
+
+/// The values of all points.
+struct Points<'a> {
+    value: Column<'a>,
+    /// Along u and v.
+    tangential: Option<[Column<'a>; 2]>,
+}
+
+impl<'a> Points<'a> {
+    /// Of `cloud`, whose field `value` is the raw value.
+    fn new(cloud: &'a PointCloud2, value: &'a PointField) -> Result<Self> {
+        let named = |name: String| cloud.fields.iter().find(|field| field.name == name);
+        let both = |stem: &str| Some([named(format!("{stem}_u"))?, named(format!("{stem}_v"))?]);
+        let tangential = match both(&value.name).or_else(|| both("force")) {
+            Some([u, v]) => Some([Column::new(cloud, u)?, Column::new(cloud, v)?]),
+            None => None,
+        };
+        Ok(Self { value: Column::new(cloud, value)?, tangential })
     }
 }
 
@@ -231,6 +279,7 @@ impl<'a> Column<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::{Sheet, SheetCell, sheets};
     use crate::bundled;
     use crate::robot::messages::{Header, Time};
 
@@ -306,6 +355,44 @@ mod tests {
         let why =
             read(&mut places, &cloud(&link, &[("x", 0, 7), ("y", 0, 7)], 4, floats(all))).unwrap_err().to_string();
         assert!(why.contains("have x, y"), "{why}");
+    }
+
+    /// A pad of three taxels, of which 4 and 6 have three axes.
+    fn pad() -> Places {
+        let cell =
+            |id: u32| SheetCell::rectangle(id, [0.01 * f64::from(id), 0.0], 0.01, 0.01).with_axes(id.is_multiple_of(2));
+        let sheet = Sheet::new("pad", [4, 5, 6].map(cell).to_vec());
+        Places::new(&Body::from_bytes("pad", &sheets(&[sheet]).unwrap().to_bytes().unwrap()).unwrap())
+    }
+
+    #[test]
+    fn tangential_values_go_beside_those_along_the_normal() {
+        let mut places = pad();
+        let names: Vec<String> = places.ids.iter().map(|&id| Channel(id).to_string()).collect();
+        assert_eq!(names, ["4", "5", "6", "4.u", "6.u", "4.v", "6.v"]);
+        let data: Vec<u8> = (0..9_u8).flat_map(|number| f32::from(number).to_le_bytes()).collect();
+        for names in
+            [["value", "value_u", "value_v"], ["force", "force_u", "force_v"], ["pressure", "force_u", "force_v"]]
+        {
+            let fields = [(names[0], 0, 7), (names[1], 4, 7), (names[2], 8, 7)];
+            let frame = read(&mut places, &cloud("pad", &fields, 12, data.clone())).unwrap();
+            let values: Vec<Option<f64>> = frame.values.iter().map(|value| value.number()).collect();
+            // The one of taxel 5 has no place.
+            assert_eq!(values, [0.0, 3.0, 6.0, 1.0, 7.0, 2.0, 8.0].map(Some), "{names:?}");
+        }
+        let plain = read(&mut places, &cloud("pad", &[("value", 0, 7), ("value_u", 4, 7)], 12, data)).unwrap();
+        assert!(plain.values[3..].iter().all(|value| value.is_missing()));
+        let mut frame = Frame::missing(0.0, 7);
+        let mut array = Float32MultiArray { data: (0..7_u8).map(f32::from).collect(), ..Float32MultiArray::default() };
+        places.array(&array, 0.0.into(), &mut frame).unwrap();
+        let values: Vec<Option<f64>> = frame.values.iter().map(|value| value.number()).collect();
+        assert_eq!(values, [0.0, 3.0, 4.0, 1.0, 5.0, 2.0, 6.0].map(Some));
+        array.data.truncate(3);
+        places.array(&array, 0.0.into(), &mut frame).unwrap();
+        assert!(frame.values[2].number() == Some(2.0) && frame.values[3].is_missing());
+        array.data.truncate(2);
+        let why = places.array(&array, 0.0.into(), &mut frame).unwrap_err().to_string();
+        assert!(why.contains("3 taxels; send one for each, or 7 with all axes"), "{why}");
     }
 
     #[test]

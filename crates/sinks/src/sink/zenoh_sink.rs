@@ -1,6 +1,6 @@
 //! Sends the frames or the percepts of a limb to the computer that brings limbs together.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
 use super::handover::{Carrier, Handover, tell};
@@ -13,7 +13,7 @@ use crate::limb::{
 };
 use crate::percept::Percepts;
 use crate::scene::Plan;
-use crate::signal::RawValue;
+use crate::signal::{Channel, RawValue};
 
 /// Packets that wait for the network; then the oldest give way.
 const ROOM: usize = 64;
@@ -27,7 +27,8 @@ pub struct ZenohSink {
     packets: Handover<Vec<u8>>,
     sends: LimbSends,
     lines: LineWriter,
-    /// The indices of the values that are sent, of a frame's: those of the taxels of the plan's fields.
+    /// The indices of the values that are sent, of a frame's: those of the taxels of the plan's fields. Touches of the whole body read
+    /// others, too; those are for other limbs to send.
     sent: Vec<usize>,
     values: Vec<RawValue>,
     layout: u32,
@@ -44,13 +45,10 @@ impl ZenohSink {
     /// The session cannot be opened.
     pub fn open(key: &str, sends: LimbSends, session: &Session<'_>) -> Result<Self> {
         let read: Option<HashSet<u32>> = session.plan.zip(session.body).map(|(plan, body)| {
-            taxels_of_fields(plan)
-                .into_iter()
-                .filter_map(|index| body.taxels.get(index))
-                .map(|taxel| taxel.id)
-                .collect()
+            let taxels = plan.taxels_of_fields().into_keys();
+            taxels.filter_map(|index| body.taxels.get(index)).map(|taxel| taxel.id).collect()
         });
-        let is_read = |id: &u32| read.as_ref().is_none_or(|read| read.contains(id));
+        let is_read = |id: &u32| read.as_ref().is_none_or(|read| read.contains(&Channel(*id).taxel()));
         let sent: Vec<usize> = (0..session.taxels.len()).filter(|&index| is_read(&session.taxels[index])).collect();
         let taxels: Vec<u32> = sent.iter().map(|&index| session.taxels[index]).collect();
         let layout = hash(&taxels);
@@ -120,17 +118,10 @@ impl Sink for ZenohSink {
     }
 }
 
-/// The taxels of the fields of `plan`, as indices of the body. Touches of the whole body read the others, too; those are for other
-/// limbs to send.
-fn taxels_of_fields(plan: &Plan) -> BTreeSet<usize> {
-    let members = plan.fields.iter().flat_map(|field| plan.members_of(field));
-    members.map(|member| plan.body_taxels[plan.channel_of(member.slot as usize)]).collect()
-}
-
 /// Bytes of a frame of a limb whose engine has `plan`, without those of Zenoh and of the network.
 #[must_use]
 pub fn limb_frame_bytes(plan: &Plan) -> usize {
-    FRAME_BYTES + 4 * taxels_of_fields(plan).len()
+    FRAME_BYTES + 4 * plan.taxels_of_fields().values().sum::<usize>()
 }
 
 /// Bytes of `percepts`, all their frames, as a limb sends them, without those of Zenoh and of the network. Their touches are on `skin`.
@@ -215,8 +206,8 @@ mod tests {
         };
         let (without, with) = (plan(None), plan(Some(touch::Options::default())));
         assert!(without.channels() == 5 && with.channels() == body.taxels.len());
-        assert_eq!(taxels_of_fields(&with), taxels_of_fields(&without));
-        assert_eq!(taxels_of_fields(&with).into_iter().collect::<Vec<_>>(), without.body_taxels);
+        assert_eq!(with.taxels_of_fields(), without.taxels_of_fields());
+        assert_eq!(with.taxels_of_fields().into_keys().collect::<Vec<_>>(), without.body_taxels);
         assert_eq!(limb_frame_bytes(&with), FRAME_BYTES + 4 * 5);
     }
 

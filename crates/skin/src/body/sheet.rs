@@ -41,15 +41,23 @@ pub struct SheetCell {
     pub corners: [[f64; 2]; 4],
     /// The area that it measures, m².
     pub area_m2: f64,
+    /// What it measures; of three axes the tangential ones are along u and v.
+    pub modality: Modality,
 }
 
 impl SheetCell {
-    /// A rectangle around `centre`, `width_m` along u and `height_m` along v, which measures all of its area.
+    /// A rectangle around `centre`, `width_m` along u and `height_m` along v, which measures the pressure on all of its area.
     #[must_use]
     pub fn rectangle(id: u32, centre: [f64; 2], width_m: f64, height_m: f64) -> Self {
         let corner = |u: f64, v: f64| [centre[0] + u * width_m / 2.0, centre[1] + v * height_m / 2.0];
         let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-        Self { id, centre, corners, area_m2: width_m * height_m }
+        Self { id, centre, corners, area_m2: width_m * height_m, modality: Modality::Pressure }
+    }
+
+    /// The same that measures force along three axes, if `has_axes`.
+    #[must_use]
+    pub fn with_axes(self, has_axes: bool) -> Self {
+        if has_axes { Self { modality: Modality::Force3, ..self } } else { self }
     }
 
     /// Its corners, counter-clockwise seen from the side that is touched.
@@ -128,7 +136,7 @@ impl Sheet {
             position_in_link: in_link(cell.centre),
             normal_in_link: DVec3::Y,
             area: cell.area_m2,
-            modality: Modality::Pressure,
+            modality: cell.modality,
             tangent_in_link: None,
         };
         self.cells.iter().map(taxel).collect()
@@ -230,8 +238,19 @@ mod tests {
     }
 
     #[test]
+    fn three_axes_are_the_normal_and_those_of_the_paper() {
+        let mut sheet = grid(1, 2);
+        sheet.cells[1] = sheet.cells[1].with_axes(true);
+        let body = crate::body::Body::from_bytes("a.glb", &sheets(&[sheet]).unwrap().to_bytes().unwrap()).unwrap();
+        assert_eq!([0, 1].map(|at: usize| body.taxels[at].modality), [Modality::Pressure, Modality::Force3]);
+        // Right and up on paper are x and −z of the link.
+        assert_eq!(body.taxels[1].tangents_in_link(), [DVec3::X, DVec3::NEG_Z]);
+    }
+
+    #[test]
     fn cells_without_places_have_neither_mesh_nor_chart() {
-        let nowhere = |id| SheetCell { id, centre: [0.0; 2], corners: [[0.0; 2]; 4], area_m2: 0.0 };
+        let nowhere =
+            |id| SheetCell { corners: [[0.0; 2]; 4], area_m2: 0.0, ..SheetCell::rectangle(id, [0.0; 2], 0.0, 0.0) };
         let mut sheet = Sheet::new("left", vec![nowhere(1), nowhere(2)]);
         sheet.has_places = false;
         let body = crate::body::Body::from_bytes("a.glb", &sheets(&[sheet]).unwrap().to_bytes().unwrap()).unwrap();

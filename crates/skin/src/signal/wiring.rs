@@ -3,11 +3,14 @@
 mod to_toml;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::Path;
 
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::channel::{Axis, Channel};
+use crate::body::MAX_TAXEL_ID;
 use crate::error::{Error, Result};
 use crate::keys::Text;
 use crate::limits::{self, MAX_TOML_BYTES};
@@ -31,7 +34,7 @@ pub struct WiredBoard {
     pub port: Option<String>,
     /// The baud rate of its line, if given.
     pub baud: Option<u32>,
-    /// Per channel the taxel's id; `None` for an unused channel.
+    /// Per channel the taxel's id, of one with three axes the number of a [`Channel`]; `None` for an unused channel.
     pub taxels: Vec<Option<u32>>,
     /// Per channel the wiper to set on its potentiometer, if given.
     pub wipers: Vec<Option<u8>>,
@@ -60,8 +63,17 @@ struct RunKeys {
     channel: Spanned<i64>,
     first: Option<Spanned<i64>>,
     count: Option<Spanned<i64>>,
-    ids: Option<Vec<u32>>,
+    ids: Option<Vec<Spanned<Id>>>,
+    axes: Option<Spanned<i64>>,
     wipers: Option<Spanned<Vec<Spanned<i64>>>>,
+}
+
+/// An id, or the name of a channel such as `"4.u"`.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Id {
+    Number(u32),
+    Name(String),
 }
 
 impl Wiring {
@@ -92,7 +104,8 @@ impl Wiring {
             for (channel, taxel) in board.taxels.iter().enumerate().filter_map(|(c, taxel)| Some((c, (*taxel)?))) {
                 if let Some((id, before)) = channel_of.insert(taxel, (board.id, channel)) {
                     let what = format!(
-                        "taxel {taxel} is on channel {channel} of board {} and on channel {before} of board {id}",
+                        "taxel {} is on channel {channel} of board {} and on channel {before} of board {id}",
+                        Channel(taxel),
                         board.id
                     );
                     return Err(text.wrong(keys.id.span(), what));
@@ -112,13 +125,14 @@ impl Wiring {
         taxels.div_ceil(MAX_CHANNELS as usize)
     }
 
-    /// The default wiring: `boards` boards, numbered from `first_id`, share `taxels` evenly in ascending order of their ids.
+    /// The default wiring: `boards` boards, numbered from `first_id`, share `taxels` evenly in ascending order of their ids; the values of a
+    /// taxel with three axes are side by side.
     ///
     /// # Errors
     /// There are fewer taxels than boards, or a board would have more than 256 channels or an id over 65534.
     pub fn in_order(taxels: &[u32], first_id: u16, boards: usize) -> Result<Self> {
         let mut sorted = taxels.to_vec();
-        sorted.sort_unstable();
+        Channel::side_by_side(&mut sorted);
         if boards == 0 || sorted.len() < boards {
             let what = format!("{} taxels cannot be shared by {boards} boards", sorted.len());
             return Err(Error::usage(what));
@@ -190,18 +204,7 @@ impl BoardKeys {
         for keys in &self.taxels {
             let run = keys.get_ref();
             let channel = int("channel", Some(&run.channel), 0..MAX_CHANNELS)?.unwrap_or(0) as usize;
-            let first = int("first", run.first.as_ref(), 0..i64::from(u32::MAX))?;
-            let ids: Vec<u32> = match (&run.ids, first) {
-                (Some(ids), None) => {
-                    text.refuse("count", run.count.as_ref(), "with `ids`")?;
-                    ids.clone()
-                }
-                (None, Some(first)) => {
-                    let count = int("count", run.count.as_ref(), 1..MAX_CHANNELS + 1)?.unwrap_or(1);
-                    (0..count).map(|index| first.saturating_add(index)).collect()
-                }
-                _ => return Err(text.wrong(keys.span(), "give either `ids` or `first` with `count`")),
-            };
+            let ids = run.channels(keys.span(), text)?;
             let end = channel + ids.len();
             let most = channels.unwrap_or(MAX_CHANNELS as usize);
             if end > most {
@@ -229,6 +232,42 @@ impl BoardKeys {
             return Err(text.wrong(self.id.span(), format!("board {id} has no taxels; give `taxels`")));
         }
         Ok(WiredBoard { id, bits, port: self.port.clone(), baud, taxels, wipers })
+    }
+}
+
+impl RunKeys {
+    /// What its channels are of; `at` is where it stands in `text`.
+    fn channels(&self, at: Range<usize>, text: Text<'_>) -> Result<Vec<u32>> {
+        let first = text.int("first", self.first.as_ref(), 0..i64::from(u32::MAX))?;
+        let ids: Vec<u32> = match (&self.ids, first) {
+            (Some(ids), None) => {
+                text.refuse("count", self.count.as_ref(), "with `ids`")?;
+                ids.iter().map(|id| channel(id, text)).collect::<Result<_>>()?
+            }
+            (None, Some(first)) => {
+                let count = text.int("count", self.count.as_ref(), 1..MAX_CHANNELS + 1)?.unwrap_or(1);
+                (0..count).map(|index| first.saturating_add(index)).collect()
+            }
+            _ => return Err(text.wrong(at, "give either `ids` or `first` with `count`")),
+        };
+        let Some(axes) = &self.axes else { return Ok(ids) };
+        if *axes.get_ref() != 3 || ids.iter().any(|&id| id > MAX_TAXEL_ID) {
+            return Err(text.wrong(axes.span(), "`axes` is 3, for taxels with three axes; leave it out for others"));
+        }
+        let all = |id: u32| [Axis::Normal, Axis::U, Axis::V].map(|axis| Channel::of_taxel(id, axis).0);
+        Ok(ids.into_iter().flat_map(all).collect())
+    }
+}
+
+/// The channel that `id` is.
+fn channel(id: &Spanned<Id>, text: Text<'_>) -> Result<u32> {
+    match id.get_ref() {
+        Id::Number(number) => Ok(*number),
+        Id::Name(name) => Channel::named(name).map(|channel| channel.0).ok_or_else(|| {
+            let what =
+                format!("`ids` has `{name}`; write an id as 4, and of one with three axes also \"4.u\" and \"4.v\"");
+            text.wrong(id.span(), what)
+        }),
     }
 }
 
@@ -270,6 +309,26 @@ mod tests {
         let many: Vec<u32> = (0..600).collect();
         assert!(Wiring::in_order(&many, 0, 2).unwrap_err().to_string().contains("at least 3 boards"));
         assert!(Wiring::in_order(&many, 65534, 3).is_err());
+    }
+
+    #[test]
+    fn taxels_with_three_axes_have_three_channels() {
+        let names = |wiring: &Wiring, board: usize| -> Vec<String> {
+            wiring.boards()[board].taxels.iter().flatten().map(|&id| Channel(id).to_string()).collect()
+        };
+        let text = "[[board]]\nid = 1\ntaxels = [{ channel = 0, ids = [9, \"4.v\", \"4.u\"] }, { channel = 3, first = 6, count = 2, axes = 3 }]";
+        let wiring = Wiring::from_text(text).unwrap();
+        assert_eq!(names(&wiring, 0), ["9", "4.v", "4.u", "6", "6.u", "6.v", "7", "7.u", "7.v"]);
+        let ids: Vec<u32> = wiring.boards()[0].taxels.iter().flatten().copied().collect();
+        let shared = Wiring::in_order(&ids, 1, 2).unwrap();
+        assert_eq!(names(&shared, 0), ["4.u", "4.v", "6", "6.u", "6.v"]);
+        assert_eq!(names(&shared, 1), ["7", "7.u", "7.v", "9"]);
+        let why =
+            |run: &str| Wiring::from_text(&format!("[[board]]\nid = 1\ntaxels = [{run}]")).unwrap_err().to_string();
+        assert!(why("{ channel = 0, ids = [\"4.w\"] }").contains("`ids` has `4.w`"));
+        assert!(why("{ channel = 0, first = 1, axes = 2 }").contains("`axes` is 3"));
+        assert!(why("{ channel = 0, ids = [\"4.u\"], axes = 3 }").contains("`axes` is 3"));
+        assert!(why("{ channel = 0, ids = [\"4.u\", \"4.u\"] }").contains("taxel 4.u is on channel 1"));
     }
 
     #[test]

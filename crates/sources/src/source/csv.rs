@@ -21,7 +21,7 @@ use super::time_column::TimeColumn;
 use super::vendor::VendorOptions;
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_LINE_BYTES;
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Channel, Frame, RawValue};
 
 /// What is wrong with rows of words or quotes.
 const NO_NUMBER: &str = "a value that is not a number";
@@ -207,7 +207,8 @@ impl CsvSource {
         let (index, cell) = self.row.iter().enumerate().find(|(_, cell)| trimmed(cell).contains(&b'"'))?;
         let before = (0..index).filter(|&index| !self.is_sensor(index)).count();
         let taxel = self.is_sensor(index).then(|| self.taxels.get(index - before)).flatten();
-        let place = taxel.map_or(format!("column {}", index + 1), |id| format!("column {} (taxel {id})", index + 1));
+        let place = taxel
+            .map_or(format!("column {}", index + 1), |id| format!("column {} (taxel {})", index + 1, Channel(*id)));
         let word = shortened(&String::from_utf8_lossy(cell.trim_ascii()));
         Some(failed!("`{word}` has a quote; numbers have no quotes: remove it").at(place))
     }
@@ -271,7 +272,7 @@ impl CsvSource {
             Time::Rate(rate) => self.frames as f64 / *rate,
         };
         let set = |value: &mut RawValue, cell: &[u8], id: &u32| -> Result<()> {
-            *value = parse_value(cell).map_err(|e| at_line(e.at(format!("taxel {id}"))))?;
+            *value = parse_value(cell).map_err(|e| at_line(e.at(format!("taxel {}", Channel(*id)))))?;
             Ok(())
         };
         let values = frame.values.iter_mut().zip(&self.taxels);

@@ -84,7 +84,7 @@ pub(super) fn read(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> 
         return Err(Error::failed("the header names no taxel; it should be `t,<taxel id>,<taxel id>,...`"));
     }
     if header.time.is_none() {
-        let ids: Vec<String> = header.taxels.iter().take(4).map(ToString::to_string).collect();
+        let ids: Vec<String> = header.taxels.iter().take(4).map(|&id| Channel(id).to_string()).collect();
         let more = if header.taxels.len() > 4 { ",…" } else { "" };
         header.notes.push(format!(
             "row 1 ({}{more}) is read as the taxels' ids; if it is a frame, --grid {grid} reads it as one",
@@ -100,7 +100,7 @@ fn word(cell: &[u8]) -> String {
 
 /// The ids that `row` is, if each of its cells is one and none is there twice.
 fn ids(row: &ByteRecord) -> Option<Vec<u32>> {
-    let ids: Vec<u32> = row.iter().map(|cell| word(cell).parse().ok()).collect::<Option<_>>()?;
+    let ids: Vec<u32> = row.iter().map(|cell| Some(Channel::named(&word(cell))?.0)).collect::<Option<_>>()?;
     let mut sorted = ids.clone();
     sorted.sort_unstable();
     sorted.windows(2).all(|pair| pair[0] != pair[1]).then_some(ids)

@@ -8,6 +8,7 @@ use super::csv_header::Header;
 use super::text::{TextIds, TextOptions, TextTime};
 use super::time_column::{TimeColumn, unit_at_end, unit_in_head};
 use crate::error::{Error, Result};
+use crate::signal::Channel;
 
 /// How many names of columns a message lists.
 const LISTED: usize = 12;
@@ -81,18 +82,18 @@ fn sensors(names: &[String], asked: &TextOptions, time_at: Option<usize>) -> Res
 
 /// The taxels of the columns `sensors`.
 fn taxels(names: &[String], sensors: &[usize], asked: &TextOptions, ids: &[u32]) -> Result<Vec<u32>> {
-    let by_name: Option<Vec<u32>> = sensors.iter().map(|&at| names[at].parse().ok()).collect();
+    let by_name: Option<Vec<u32>> = sensors.iter().map(|&at| Some(Channel::named(&names[at])?.0)).collect();
     let taxels = match (&asked.ids, by_name) {
         (Some(TextIds::Listed(listed)), _) => listed.clone(),
         (_, Some(named)) => named,
         (Some(TextIds::Names), None) => {
             return Err(Error::usage(
-                "--ids names: not all columns of sensors are called by a number; list their taxels",
+                "--ids names: not all columns of sensors are called by a number, or as 4.u; list their taxels",
             ));
         }
         (None, None) => {
             let mut ids = ids.to_vec();
-            ids.sort_unstable();
+            Channel::side_by_side(&mut ids);
             ids
         }
     };
@@ -106,7 +107,7 @@ fn taxels(names: &[String], sensors: &[usize], asked: &TextOptions, ids: &[u32])
     let mut sorted = taxels.clone();
     sorted.sort_unstable();
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(twice) => Err(Error::usage(format!("taxel {} has two columns; give each one", twice[0]))),
+        Some(twice) => Err(Error::usage(format!("taxel {} has two columns; give each one", Channel(twice[0])))),
         None => Ok(taxels),
     }
 }

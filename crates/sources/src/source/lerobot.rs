@@ -19,7 +19,7 @@ use super::Source;
 use super::lerobot_name::LeRobotName;
 use crate::error::{Error, Result, failed};
 use crate::limits::{self, MAX_METADATA_BYTES};
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Channel, Frame, RawValue};
 
 /// Rows that are unpacked at once.
 const BATCH_ROWS: usize = 1 << 10;
@@ -103,7 +103,7 @@ impl LeRobotSource {
         let width =
             width.ok_or_else(|| failed!("feature `{}` has no values; name another one", feature.name).at(&place))?;
         let mut taxels = ids.to_vec();
-        taxels.sort_unstable();
+        Channel::side_by_side(&mut taxels);
         if taxels.len() != width {
             let what = format!(
                 "`{}` has {width} values a frame, and the body has {} taxels; give the body of this sensor with --body",

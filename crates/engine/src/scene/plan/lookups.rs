@@ -1,5 +1,7 @@
 //! What backends look up in a plan: by slot, by field, by knob.
 
+use std::collections::BTreeMap;
+
 use super::super::stages::Stages;
 use super::super::{Arithmetic, Knobs};
 use super::{Plan, PlanField};
@@ -10,6 +12,23 @@ use crate::stage::calibrate::Table;
 use crate::stage::{Sums, layout};
 
 impl Plan {
+    /// The taxels of its fields, as indices of the body, and how many values each has: three where its shear is asked for.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn taxels_of_fields(&self) -> BTreeMap<usize, usize> {
+        let members = self.fields.iter().flat_map(|field| self.members_of(field));
+        let pressed = members.map(|member| (self.body_taxels[self.channel_of(member.slot as usize)], 1));
+        let mut taxels: BTreeMap<usize, usize> = pressed.collect();
+        for field in self.fields.iter() {
+            let values = if self.letters[field.letter].receptor == Receptor::Shear { 3 } else { 1 };
+            for member in field.sensed.iter() {
+                let own = taxels.entry(member.taxel).or_default();
+                *own = values.max(*own);
+            }
+        }
+        taxels
+    }
+
     /// Per slot that is calibrated.
     #[doc(hidden)]
     pub fn curve_of(&self, slot: usize) -> Table<'_> {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{WiredBoard, Wiring};
+use super::{Axis, Channel, WiredBoard, Wiring};
 
 impl Wiring {
     /// The file's text, TOML.
@@ -39,8 +39,16 @@ impl WiredBoard {
     fn run(&self, from: usize, end: usize) -> String {
         let ids: Vec<u32> = self.taxels[from..end].iter().flatten().copied().collect();
         let ascends = ids.windows(2).all(|pair| pair[0].checked_add(1) == Some(pair[1]));
-        let what =
-            if ascends { format!("first = {}, count = {}", ids[0], ids.len()) } else { format!("ids = {ids:?}") };
+        let name = |&id: &u32| match Channel(id).axis() {
+            Axis::Normal => id.to_string(),
+            _ => format!("\"{}\"", Channel(id)),
+        };
+        let names: Vec<String> = ids.iter().map(name).collect();
+        let is_run = ascends && names.iter().all(|name| !name.starts_with('"'));
+        let what = match is_run {
+            true => format!("first = {}, count = {}", ids[0], ids.len()),
+            false => format!("ids = [{}]", names.join(", ")),
+        };
         let wipers: Vec<u8> = (from..end).filter_map(|channel| self.wipers.get(channel).copied().flatten()).collect();
         let wipers = if wipers.is_empty() { String::new() } else { format!(", wipers = {wipers:?}") };
         format!("  {{ channel = {from}, {what}{wipers} }},\n")

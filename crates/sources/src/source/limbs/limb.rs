@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::super::boards::{BoardFrame, BoardState, Clock, LimbPercepts, Shared, Verdict};
 use crate::error::Error;
 use crate::limb::{Packet, open, qualified, raw_value};
+use crate::signal::Channel;
 use crate::wire::{FrameCounts, Head, PacketOrder};
 
 /// A limb that sends nothing for this long is silent.
@@ -30,13 +31,14 @@ impl Taxels {
     fn claim(&self, limb: usize, taxels: &[u32]) -> Result<Arc<[Option<usize>]>, String> {
         let place = |id: &u32| {
             let place = self.places.get(id).copied();
-            place.ok_or_else(|| format!("the body has no taxel {id}, which it sends; is it the right body?"))
+            place
+                .ok_or_else(|| format!("the body has no taxel {}, which it sends; is it the right body?", Channel(*id)))
         };
         let places = taxels.iter().map(place).collect::<Result<Vec<_>, _>>()?;
         let mut owners = self.owners.lock().unwrap_or_else(PoisonError::into_inner);
         let taken = places.iter().zip(taxels).find(|(place, _)| owners[**place].is_some_and(|owner| owner != limb));
         if let Some((_, id)) = taken {
-            return Err(format!("another limb sends taxel {id} too; let each limb send its own"));
+            return Err(format!("another limb sends taxel {} too; let each limb send its own", Channel(*id)));
         }
         owners.iter_mut().filter(|owner| **owner == Some(limb)).for_each(|owner| *owner = None);
         places.iter().for_each(|&place| owners[place] = Some(limb));

@@ -9,6 +9,7 @@ use super::super::bag_name::type_of;
 use super::super::sizes::{USUAL_PITCH_M, grid_of, pitch_of};
 use super::super::text::TextIds;
 use super::super::time_column::{TimeUnit, unit_at_end, unit_in_head};
+use super::axes::Axes;
 use super::decoder::Decoder;
 use super::path::ArrayPath;
 use super::presets;
@@ -27,6 +28,7 @@ struct Keys {
     r#type: Option<String>,
     values: OneOrMany,
     names: Option<String>,
+    axes: Option<String>,
     ids: Option<String>,
     grid: Option<String>,
     pitch: Option<String>,
@@ -47,6 +49,12 @@ struct Keys {
 enum OneOrMany {
     One(String),
     Many(Vec<String>),
+}
+
+impl Default for OneOrMany {
+    fn default() -> Self {
+        Self::Many(Vec::new())
+    }
 }
 
 #[derive(Deserialize)]
@@ -100,7 +108,7 @@ pub struct ArrayMap {
     pub values: Vec<ArrayPath>,
     /// Where the sensors' names are, if they are read: one for each array at the path of values, or for each value.
     pub names: Option<ArrayPath>,
-    /// The taxels of the values, in their order.
+    /// The taxels of the values, in their order; of those with three axes, which have three values, once each.
     pub ids: Option<Vec<u32>>,
     /// Where the time is.
     pub time: MapTime,
@@ -110,6 +118,8 @@ pub struct ArrayMap {
     pub definition: Option<String>,
     /// What people should know of a preset, a line each.
     pub notes: Vec<String>,
+    /// Of taxels with three axes, which of their values is along which.
+    pub(in crate::source) axes: Option<Axes>,
     pub(in crate::source) pads: Vec<Pad>,
     pub(in crate::source) grid: Option<[u32; 2]>,
     pub(in crate::source) pitch_m: Option<[f64; 2]>,
@@ -161,12 +171,13 @@ impl ArrayMap {
     /// # Errors
     /// It is not a map.
     pub fn parse(text: &str) -> Result<Self> {
-        let keys: Keys = parse_toml(text)?;
+        let mut keys: Keys = parse_toml(text)?;
         let at = |key: &'static str| move |e: Error| failed!("{key}: {e}");
-        let values = match keys.values {
+        let values = match std::mem::take(&mut keys.values) {
             OneOrMany::One(path) => vec![path],
             OneOrMany::Many(paths) => paths,
         };
+        let axes = axes_of(&keys, values.len()).map_err(at("axes"))?;
         if values.is_empty() {
             return Err(Error::failed("values: name the array of the values, such as data or pads[*].pressure"));
         }
@@ -198,6 +209,7 @@ impl ArrayMap {
             name: "map".to_owned(),
             message: keys.message,
             kind: keys.r#type.map(whole).transpose()?,
+            axes,
             values: values.iter().map(|path| path.parse()).collect::<Result<_>>().map_err(at("values"))?,
             names: keys.names.as_deref().map(str::parse).transpose().map_err(at("names"))?,
             ids,
@@ -307,6 +319,16 @@ fn time_of(text: &str) -> Result<MapTime> {
     Ok(MapTime::At(path, unit.seconds()))
 }
 
+fn axes_of(keys: &Keys, paths: usize) -> Result<Option<Axes>> {
+    let Some(axes) = &keys.axes else { return Ok(None) };
+    let axes: Axes = axes.parse()?;
+    if keys.names.is_some() {
+        return Err(Error::failed("names of sensors are not read with it; leave out one of them"));
+    }
+    axes.check(paths, keys.pads.len())?;
+    Ok(Some(axes))
+}
+
 fn grid(text: &str) -> Result<[u32; 2]> {
     grid_of(text).ok_or_else(|| failed!("`{text}` is not rows and columns; write them as 3x4"))
 }
@@ -359,6 +381,8 @@ mod tests {
             ("values = 'a'\nscale = 0", "scale: "),
             ("values = 'a'\ntype = 'x'", "type: `x` is not a type"),
             ("values = 'a'\ntime = 't:h'", "time: `h` is not a unit"),
+            ("values = 'a'\naxes = 'xyz'", "axes: `xyz` does not name"),
+            ("values = ['a', 'b']\naxes = 'u,v,n'", "axes: each path of values has one axis"),
             ("values = 'a'\ndecoder = 'x'", "decoder: `x` is not a decoder"),
             ("values = 'a'\n[[pads]]\nname = 'p'\ngrid = 'a'", "pads: "),
         ] {

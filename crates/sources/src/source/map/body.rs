@@ -6,8 +6,9 @@ use super::super::sizes::USUAL_PITCH_M;
 use super::array_map::{ArrayMap, Pad};
 use crate::body::{Sheet, SheetCell, sheets};
 use crate::error::{Result, failed};
+use crate::signal::Channel;
 
-/// The pads of `count` values, and what is to be said of them.
+/// The pads of `count` taxels, and what is to be said of them.
 fn pads(map: &ArrayMap, count: usize) -> Result<(Vec<Pad>, String)> {
     if map.pads.is_empty() {
         let grid = map.grid.unwrap_or([1, u32::try_from(count).unwrap_or(u32::MAX)]);
@@ -59,20 +60,21 @@ fn pads(map: &ArrayMap, count: usize) -> Result<(Vec<Pad>, String)> {
     Ok((own, words))
 }
 
-/// A body for the values of taxels `ids` in their order, a `.glb`.
+/// A body for the values of the channels `ids` in their order, a `.glb`.
 ///
 /// # Errors
 /// The map's pads or grid have another number of sensors.
 pub(in crate::source) fn glb(map: &ArrayMap, ids: &[u32]) -> Result<Vec<u8>> {
-    let (pads, _) = pads(map, ids.len())?;
+    let taxels = Channel::taxels_of(ids);
+    let (pads, _) = pads(map, taxels.len())?;
     let from_middle = |index: usize, count: u32| index as f64 - (f64::from(count) - 1.0) / 2.0;
-    let mut ids = ids.iter();
+    let mut taxels = taxels.iter();
     let sheet = |pad: &Pad| {
         let [rows, columns] = pad.grid;
-        let cells = ids.by_ref().take(pad.cells()).enumerate().map(|(index, &id)| {
+        let cells = taxels.by_ref().take(pad.cells()).enumerate().map(|(index, &(id, has_axes))| {
             let (row, column) = (index / columns as usize, index % columns as usize);
             let centre = [from_middle(column, columns) * pad.pitch_m[1], -from_middle(row, rows) * pad.pitch_m[0]];
-            SheetCell::rectangle(id, centre, pad.pitch_m[1], pad.pitch_m[0])
+            SheetCell::rectangle(id, centre, pad.pitch_m[1], pad.pitch_m[0]).with_axes(has_axes)
         });
         let [u, v] = pad.at_m;
         Sheet::new(&pad.name, cells.collect()).at(DVec3::new(u, 0.0, -v))
@@ -81,8 +83,10 @@ pub(in crate::source) fn glb(map: &ArrayMap, ids: &[u32]) -> Result<Vec<u8>> {
 }
 
 /// What is to be said of that body.
-pub(in crate::source) fn about(map: &ArrayMap, count: usize) -> String {
-    pads(map, count).map_or_else(|e| e.to_string(), |(_, words)| format!("a body is made: {words}"))
+pub(in crate::source) fn about(map: &ArrayMap, ids: &[u32]) -> String {
+    let taxels = Channel::taxels_of(ids);
+    let axes = if taxels.iter().any(|&(_, has_axes)| has_axes) { "; each has three axes" } else { "" };
+    pads(map, taxels.len()).map_or_else(|e| e.to_string(), |(_, words)| format!("a body is made: {words}{axes}"))
 }
 
 #[cfg(test)]
@@ -99,7 +103,8 @@ mod tests {
             assert_eq!(body.taxels.len(), count as usize);
             assert_eq!(body.fields.iter().filter(|field| field.name.starts_with("pad_")).count(), links);
         }
-        assert!(about(&map, 84).contains("without the last 2"), "{}", about(&map, 84));
+        let some: Vec<u32> = (0..84).collect();
+        assert!(about(&map, &some).contains("without the last 2"), "{}", about(&map, &some));
         for wrong in [100, 120] {
             let why = glb(&map, &(0..wrong).collect::<Vec<u32>>()).unwrap_err().to_string();
             assert!(why.contains(&format!("a message has {wrong} values")), "{why}");
@@ -110,9 +115,9 @@ mod tests {
     fn without_pads_it_is_a_grid_or_a_row() {
         let ids: Vec<u32> = (0..6).collect();
         let row = ArrayMap::parse("values = 'a'").unwrap();
-        assert!(about(&row, 6).contains("a row of 6 sensors, 10 mm apart. This distance is a guess"));
+        assert!(about(&row, &ids).contains("a row of 6 sensors, 10 mm apart. This distance is a guess"));
         let grid = ArrayMap::parse("values = 'a'\ngrid = '2x3'\npitch = '4mm'").unwrap();
-        assert_eq!(about(&grid, 6), "a body is made: a grid of 2 × 3 sensors, 4 mm apart");
+        assert_eq!(about(&grid, &ids), "a body is made: a grid of 2 × 3 sensors, 4 mm apart");
         let body = Body::from_bytes("grid", &glb(&grid, &ids).unwrap()).unwrap();
         let [first, last] = [0, 5].map(|at: usize| body.taxels[at].position_in_link);
         assert!((first - last).abs().abs_diff_eq(DVec3::new(0.008, 0.0, 0.004), 1e-6), "{first} {last}");

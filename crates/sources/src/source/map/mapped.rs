@@ -6,8 +6,9 @@ use super::super::Source;
 use super::super::skipped_bad::SkippedBad;
 use super::array_map::ArrayMap;
 use super::body;
+use super::taxels::{MappedTaxels, turn};
 use crate::error::{Error, Result, failed};
-use crate::signal::{Frame, FrameTime, RawValue};
+use crate::signal::{Channel, Frame, FrameTime, RawValue};
 
 /// What was read of a message.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +71,8 @@ pub struct MappedSource {
     /// The first message, until it is given.
     first: Option<(FrameTime, Vec<RawValue>)>,
     values: Vec<RawValue>,
+    /// The places of values that point the other way.
+    turned: Vec<usize>,
     skipped: SkippedBad,
     notices: Vec<String>,
 }
@@ -89,6 +92,7 @@ impl MappedSource {
             named: Vec::new(),
             first: None,
             values: Vec::new(),
+            turned: Vec::new(),
             skipped: SkippedBad::new(skip_bad),
             notices: Vec::new(),
         };
@@ -104,14 +108,9 @@ impl MappedSource {
             );
         }
         source.first = Some((time, source.values.clone()));
-        source.ids = match &map.ids {
-            Some(ids) if ids.len() != count => {
-                let what = failed!("{}: ids names {} taxels, and a message has {count} values", map.name, ids.len());
-                return Err(what.at(source.messages.name()));
-            }
-            Some(ids) => ids.clone(),
-            None => (0..u32::try_from(count).unwrap_or(u32::MAX)).collect(),
-        };
+        let taxels = MappedTaxels::new(Some(map), None, count, None);
+        let taxels = taxels.map_err(|e| e.at(&map.name).at(source.messages.name()))?;
+        (source.ids, source.turned) = (taxels.channels, taxels.turned);
         source.named = source.messages.named().to_vec();
         let of_sensors = match &source.named[..] {
             [] => String::new(),
@@ -170,7 +169,7 @@ impl MappedSource {
     /// What is to be said of [`MappedSource::body`].
     #[must_use]
     pub fn about_body(&self) -> String {
-        body::about(&self.map, self.ids.len())
+        body::about(&self.map, &self.ids)
     }
 
     /// Makes its taxels those of a body that has `taxels`: where the map does not name them, they are the body's in ascending order.
@@ -179,22 +178,17 @@ impl MappedSource {
     /// There are more or fewer values than taxels, or the body lacks a taxel.
     pub fn for_body(mut self, taxels: &[u32]) -> Result<Self> {
         if self.map.ids.is_none() {
-            let mut ids = taxels.to_vec();
-            ids.sort_unstable();
-            if ids.len() != self.ids.len() {
-                let what = failed!(
-                    "a message has {} values, and the body {} taxels; name the values' taxels in the map: ids = \"0-15\"",
-                    self.ids.len(),
-                    ids.len()
-                );
-                return Err(what.at(self.messages.name()));
-            }
-            self.ids = ids;
+            let named = MappedTaxels::new(Some(&self.map), None, self.ids.len(), Some(taxels));
+            let named = named.map_err(|e| {
+                failed!("{e}; name the values' taxels in the map: ids = \"0-15\"").at(self.messages.name())
+            })?;
+            (self.ids, self.turned) = (named.channels, named.turned);
         }
         match self.ids.iter().find(|id| !taxels.contains(id)) {
             Some(id) => {
                 let what = failed!(
-                    "the body has no taxel {id}; is it the right body? ids in the map names the values' taxels"
+                    "the body has no taxel {}; is it the right body? ids in the map names the values' taxels",
+                    Channel(*id)
                 );
                 Err(what.at(self.messages.name()))
             }
@@ -226,6 +220,7 @@ impl Source for MappedSource {
         };
         frame.clear();
         frame.values.clone_from(&self.values);
+        self.turned.iter().for_each(|&index| turn(&mut frame.values[index]));
         frame.set_time(time);
         Ok(true)
     }
@@ -299,6 +294,36 @@ mod tests {
     }
 
     #[test]
+    fn taxels_with_three_axes_have_three_values() {
+        let named = |name: &str| Channel::named(name).unwrap().0;
+        let read = |map: &str, values: &[f64]| {
+            let map = ArrayMap::parse(map).unwrap();
+            MappedSource::new(Box::new(Given(vec![Ok(values.to_vec())])), &map, false)
+        };
+        let mut source = read("values = 'a'\naxes = 'uv-n'", &[1.0, 2.0, -3.0, 4.0, 5.0, -6.0]).unwrap();
+        assert_eq!(source.taxels(), ["0.u", "0.v", "0", "1.u", "1.v", "1"].map(named));
+        assert!(source.about_body().ends_with("each has three axes"), "{}", source.about_body());
+        let mut frame = Frame::default();
+        source.next_frame(&mut frame).unwrap();
+        let values: Vec<f64> = frame.values.iter().filter_map(|value| value.number()).collect();
+        assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let body = crate::body::Body::from_bytes("pad", &source.body().unwrap()).unwrap();
+        assert!(
+            body.taxels.len() == 2 && body.taxels.iter().all(|taxel| taxel.modality == crate::body::Modality::Force3)
+        );
+        let channels = Channel::all_of(&body);
+        assert_eq!(source.for_body(&channels).unwrap().taxels(), ["0.u", "0.v", "0", "1.u", "1.v", "1"].map(named));
+        let apart = "values = ['x', 'y', 'z']\naxes = 'u,v,n'\nids = '9,4'";
+        let source = read(apart, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+        assert_eq!(source.taxels(), ["9.u", "4.u", "9.v", "4.v", "9", "4"].map(named));
+        let why = read("values = 'a'\naxes = 'uvn'", &[1.0; 5]).unwrap_err().to_string();
+        assert!(why.contains("given: axes: 5 values are not three for each taxel"), "{why}");
+        let pressure =
+            read("values = 'a'\naxes = 'uvn'", &[1.0; 6]).unwrap().for_body(&[4, 9]).unwrap_err().to_string();
+        assert!(pressure.contains("a message has 2 taxels with three axes, and the body 0 taxels"), "{pressure}");
+    }
+
+    #[test]
     fn taxels_are_the_maps_or_the_bodys() {
         let source = |map: &str| {
             let map = ArrayMap::parse(map).unwrap();
@@ -309,6 +334,8 @@ mod tests {
         assert!(
             source("values = 'a'").for_body(&[4]).unwrap_err().to_string().contains("2 values, and the body 1 taxels")
         );
+        let [four_u, four_v] = ["4.u", "4.v"].map(|name| Channel::named(name).unwrap().0);
+        assert_eq!(source("values = 'a'\nids = '4.v,4'").for_body(&[4, four_u, four_v]).unwrap().taxels(), [four_v, 4]);
         assert!(source("values = 'a'\nids = '9,4'").for_body(&[4]).unwrap_err().to_string().contains("no taxel 9"));
     }
 }

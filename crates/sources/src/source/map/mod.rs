@@ -1,6 +1,7 @@
 //! Arrays within messages: which values of a message are sensors, and frames from these.
 
 mod array_map;
+mod axes;
 pub(in crate::source) mod body;
 mod decoder;
 mod json;
@@ -11,6 +12,7 @@ pub(in crate::source) mod modbus;
 pub(in crate::source) mod path;
 mod presets;
 mod sensor_names;
+mod taxels;
 
 pub use self::array_map::{ArrayMap, MapTime};
 pub use self::decoder::Decoder;
@@ -19,3 +21,4 @@ pub use self::layout::{Dimension, Lies, order};
 pub use self::mapped::{Came, MappedSource, Messages};
 pub use self::path::{ArrayPath, Step};
 pub use self::sensor_names::named_sensors;
+pub(in crate::source) use self::taxels::{MappedTaxels, turn};

@@ -132,7 +132,61 @@ fingerfive_palm_touch = [4708, 96]
 palm_touch = [4900, 112]
 "#;
 
-const PRESETS: [Preset; 4] = [
+/// As the reader of the maker, `xela_server_ros2`, takes the lines of its server apart: by sensor, three numbers for each taxel.
+const XELA: &str = r#"
+values = "1.calibrated"
+axes = "uvn"
+grid = "4x4"
+pitch = "4.7mm"
+"#;
+
+const XELA_ROS2: &str = r#"
+type = "xela_server_ros2/msg/SensStream"
+values = ["sensors[*].forces[*].x", "sensors[*].forces[*].y", "sensors[*].forces[*].z"]
+axes = "u,v,n"
+pads = [
+  { name = "sensor_1", grid = "4x4", pitch = "4.7mm", at_mm = [0, 0] },
+  { name = "sensor_2", grid = "4x4", pitch = "4.7mm", at_mm = [30, 0] },
+  { name = "sensor_3", grid = "4x4", pitch = "4.7mm", at_mm = [60, 0] },
+  { name = "sensor_4", grid = "4x4", pitch = "4.7mm", at_mm = [90, 0] },
+]
+"#;
+
+/// As the documentation of `xela_server_ros2` has it; counts go up to 65535 there, so that they are unsigned.
+const XELA_DEFINITION: &str = "\
+SensorFull[] sensors
+================================================================================
+MSG: xela_server_ros2/SensorFull
+uint32 message
+float64 time
+string model
+uint8 sensor_pos
+Taxel[] taxels
+Forces[] forces
+================================================================================
+MSG: xela_server_ros2/Taxel
+uint16 x
+uint16 y
+uint16 z
+================================================================================
+MSG: xela_server_ros2/Forces
+float32 x
+float32 y
+float32 z
+";
+
+/// The names are those of the maker's manual; sources differ about what is before them, so that messages have to define themselves.
+const CONTACTILE: &str = r#"
+values = ["pillars[*].fx", "pillars[*].fy", "pillars[*].fz"]
+axes = "u,v,n"
+grid = "3x3"
+pitch = "7mm"
+"#;
+
+const UNMEASURED_AXES: &str =
+    "x is taken for right and y for up on the pad, as drawn; drag over it, and correct `axes` in a map of your own";
+
+const PRESETS: [Preset; 7] = [
     Preset {
         name: "dex3",
         map: DEX3,
@@ -158,6 +212,39 @@ const PRESETS: [Preset; 4] = [
         notes: &[
             "the pads of an Inspire RH56 are drawn side by side, not measured",
             "public sources differ about the palm of an Inspire RH56: 14 × 8 here, 8 × 14 in others; none lists how its pads lie",
+        ],
+        is_untested: true,
+    },
+    Preset {
+        name: "xela",
+        map: XELA,
+        definition: None,
+        notes: &[
+            "sensor 1 of a XELA server, 4 × 4 taxels, drawn 4.7 mm apart; more sensors, or others, need a map of your own",
+            "values are the calibrated forces; counts are at 1.data, with decoder = \"hex16\"",
+            UNMEASURED_AXES,
+        ],
+        is_untested: true,
+    },
+    Preset {
+        name: "xela-ros2",
+        map: XELA_ROS2,
+        definition: Some(XELA_DEFINITION),
+        notes: &[
+            "sensors of XELA are taken to have 4 × 4 taxels each, drawn 4.7 mm apart, side by side",
+            UNMEASURED_AXES,
+        ],
+        is_untested: true,
+    },
+    Preset {
+        name: "contactile",
+        map: CONTACTILE,
+        definition: None,
+        notes: &[
+            "the nine pillars of a Contactile PapillArray are drawn 7 mm apart, row by row; its manual says that pillar 4 is in the middle",
+            "public sources differ about the messages of a PapillArray (a header, ids of 32 or 64 bits), so they have to be defined: by the \
+             bag, or by `definition` in a map",
+            UNMEASURED_AXES,
         ],
         is_untested: true,
     },

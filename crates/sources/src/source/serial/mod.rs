@@ -18,7 +18,7 @@ use self::session::{LineConfig, Session};
 use super::Source;
 use super::boards::{Lines, Merge, Merged, Pace, Shared};
 use crate::error::{Error, Result, failed};
-use crate::signal::{Frame, Wiring};
+use crate::signal::{Channel, Frame, Wiring};
 
 /// The default speed of a line, baud.
 const DEFAULT_BAUD: u32 = 57_600;
@@ -126,7 +126,7 @@ fn check(ports: &[(String, Option<u32>)], ids: &[u32], wiring: &Wiring) -> Resul
     for board in wiring.boards() {
         let strange = board.taxels.iter().enumerate().find(|(_, taxel)| taxel.is_some_and(|id| !there.contains(&id)));
         if let Some((channel, Some(id))) = strange {
-            let what = format!("the body has no taxel {id}; is it the right body?");
+            let what = format!("the body has no taxel {}; is it the right body?", Channel(*id));
             return Err(Error::failed(what).at(format!("wiring: board {}: channel {channel}", board.id)));
         }
     }

@@ -241,9 +241,13 @@ impl Assembler {
                 true => Ok(()),
                 false => Err(Wrong::Words),
             }),
-            Syntax::Json => self.named(text, counts, |each| {
-                json(text, each).map_err(|_| if text.starts_with(['{', '[']) { Wrong::Json } else { Wrong::Words })
-            }),
+            Syntax::Json => {
+                let decoded = self.form.decoded.clone();
+                self.named(text, counts, |each| {
+                    let wrong = if text.starts_with(['{', '[']) { Wrong::Json } else { Wrong::Words };
+                    json(text, decoded.as_deref(), each).map_err(|_| wrong)
+                })
+            }
         }
     }
 
@@ -319,6 +323,10 @@ impl Assembler {
         })?;
         if has_word {
             return Err(Wrong::Word);
+        }
+        if found.is_empty() && self.form.has_paths {
+            self.skipped.other(text);
+            return Err(Wrong::Other);
         }
         if found.is_empty() {
             return Err(if strange { Wrong::Names } else { Wrong::Words });

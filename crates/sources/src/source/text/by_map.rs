@@ -11,11 +11,8 @@ use crate::error::{Error, Result};
 /// It says what such lines do not have.
 pub(super) fn options_of(map: &ArrayMap) -> Result<TextOptions> {
     let bad = |what: &str| Err(Error::usage(format!("{}: {what}", map.name)));
-    let [values] = &map.values[..] else {
-        return bad("of lines that come live one path is read; name one in values, or send them to --source -");
-    };
-    if map.decoder.is_some() || map.message.is_some() {
-        return bad("message and decoder are for bags and NDJSON; send the lines to --source -");
+    if map.message.is_some() {
+        return bad("message is for bags and NDJSON; send the lines to --source -");
     }
     let column = |path: &ArrayPath, unit| {
         TextTime::Column(TimeColumnName { column: Column::Path(path.clone()), unit: Some(unit) })
@@ -34,8 +31,9 @@ pub(super) fn options_of(map: &ArrayMap) -> Result<TextOptions> {
         )),
     };
     Ok(TextOptions {
-        columns: Some(TextColumns(vec![Column::Path(values.clone())])),
-        ids: map.ids.clone().map(TextIds::Listed),
+        columns: Some(TextColumns(map.values.iter().cloned().map(Column::Path).collect())),
+        // With three axes a taxel has three columns.
+        ids: map.ids.clone().filter(|_| map.axes.is_none()).map(TextIds::Listed),
         frame_end: None,
         time,
     })

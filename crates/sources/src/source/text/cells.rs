@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::super::csv_cells::trimmed;
+use super::super::map::{ArrayPath, Decoder};
 
 /// A cell of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,31 +146,59 @@ pub(super) fn may_be_json(line: &str) -> bool {
     line.starts_with(['{', '['])
 }
 
-/// The numbers within `line`, a line of JSON, each with its path such as `values.4` or `rows[0][3]`. Words that are not numbers are
-/// given too; what is true or false is left out.
+/// How texts at some paths of JSON are numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Decoded {
+    pub(super) decoder: Decoder,
+    pub(super) paths: Vec<ArrayPath>,
+}
+
+impl Decoded {
+    /// The numbers in `word`, which is at `path`, as `path[0]` and so on; `false` where it has none.
+    fn give(&self, word: &str, path: &str, each: &mut dyn FnMut(&str, Cell<'_>)) -> bool {
+        let mut numbers = Vec::new();
+        if !self.paths.iter().any(|own| own.leads_to(path))
+            || self.decoder.text(word, |number| numbers.push(number)).is_err()
+        {
+            return false;
+        }
+        for (index, number) in numbers.into_iter().enumerate() {
+            each(&format!("{path}[{index}]"), Cell::Number(number));
+        }
+        true
+    }
+}
+
+/// The numbers within `line`, a line of JSON, each with its path such as `values.4` or `rows[0][3]`, also those in texts that are
+/// `decoded`. Words that are not numbers are given too; what is true or false is left out.
 ///
 /// # Errors
 /// It is not JSON.
-pub(super) fn json(line: &str, each: &mut dyn FnMut(&str, Cell<'_>)) -> Result<(), serde_json::Error> {
+pub(super) fn json(
+    line: &str,
+    decoded: Option<&Decoded>,
+    each: &mut dyn FnMut(&str, Cell<'_>),
+) -> Result<(), serde_json::Error> {
     let value: Value = serde_json::from_str(line)?;
     let mut path = String::new();
-    walk(&value, &mut path, each);
+    walk(&value, &mut path, decoded, each);
     Ok(())
 }
 
-fn walk(value: &Value, path: &mut String, each: &mut dyn FnMut(&str, Cell<'_>)) {
+fn walk(value: &Value, path: &mut String, decoded: Option<&Decoded>, each: &mut dyn FnMut(&str, Cell<'_>)) {
     use std::fmt::Write as _;
     let length = path.len();
     match value {
         Value::Null => each(path, Cell::Blank),
         Value::Bool(_) => {}
         Value::Number(number) => each(path, number.as_f64().map_or(Cell::Blank, Cell::Number)),
+        Value::String(word) if decoded.is_some_and(|decoded| decoded.give(word, path, each)) => {}
         Value::String(word) => each(path, cell(word, false)),
         Value::Array(values) => {
             for (index, value) in values.iter().enumerate() {
                 // Writing to a string does not fail.
                 let _ = write!(path, "[{index}]");
-                walk(value, path, each);
+                walk(value, path, decoded, each);
                 path.truncate(length);
             }
         }
@@ -179,7 +208,7 @@ fn walk(value: &Value, path: &mut String, each: &mut dyn FnMut(&str, Cell<'_>)) 
                     path.push('.');
                 }
                 path.push_str(key);
-                walk(value, path, each);
+                walk(value, path, decoded, each);
                 path.truncate(length);
             }
         }
@@ -237,7 +266,7 @@ mod tests {
     #[test]
     fn numbers_in_json_have_their_paths() {
         let mut found = Vec::new();
-        json(r#"{"t":3,"v":{"4":1.5,"5":null},"m":[[1,2],["nan",4]],"ok":true}"#, &mut |path, cell| {
+        json(r#"{"t":3,"v":{"4":1.5,"5":null},"m":[[1,2],["nan",4]],"ok":true}"#, None, &mut |path, cell| {
             found.push(format!("{path}={cell:?}"));
         })
         .unwrap();
@@ -252,6 +281,11 @@ mod tests {
             "v.5=Blank",
         ];
         assert_eq!(found, wanted);
-        assert!(json("{", &mut |_, _| {}).is_err());
+        assert!(json("{", None, &mut |_, _| {}).is_err());
+        let decoded = Decoded { decoder: "hex16".parse().unwrap(), paths: vec!["1.data".parse().unwrap()] };
+        let mut found = Vec::new();
+        let line = r#"{"1":{"model":"ABCD","data":"7FFF,8001"}}"#;
+        json(line, Some(&decoded), &mut |path, cell| found.push(format!("{path}={cell:?}"))).unwrap();
+        assert_eq!(found, ["1.data[0]=Number(32767.0)", "1.data[1]=Number(32769.0)", "1.model=Word(\"ABCD\")"]);
     }
 }

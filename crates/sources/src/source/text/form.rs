@@ -1,10 +1,12 @@
 //! How lines of text are understood: what their columns are, and how many lines make a frame.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use super::super::column_names::columns;
 use super::super::time_column::TimeUnit;
-use super::cells::Separator;
+use super::cells::{Decoded, Separator};
+use crate::signal::Channel;
 
 /// How the values of a line are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,14 +107,28 @@ pub(super) struct Form {
     /// Rows and columns of the grid that the sensors are, if they are one.
     pub(super) grid: Option<[usize; 2]>,
     pub(super) is_grid_guessed: bool,
-    /// The taxels of the sensors, where names or flags say them.
+    /// The channels of the sensors, where names or flags say them.
     pub(super) ids: Option<Vec<u32>>,
+    /// How texts within JSON are numbers.
+    pub(super) decoded: Option<Arc<Decoded>>,
+    /// Whether paths say what is read of JSON, so that messages without these are of something else.
+    pub(super) has_paths: bool,
+    /// Whether each taxel has three sensors, as a map says.
+    pub(super) has_axes: bool,
 }
 
 impl Form {
     /// Sensors of a frame.
     pub(super) fn sensors(&self) -> usize {
         self.width * self.rows
+    }
+
+    /// Taxels of a frame: those with three axes have three sensors each.
+    pub(super) fn taxels(&self) -> usize {
+        match &self.ids {
+            Some(ids) => Channel::taxels_of(ids).len(),
+            None => self.sensors() / if self.has_axes { 3 } else { 1 },
+        }
     }
 
     /// What the columns in `which` are called in messages: `columns 2–17`, or their names.
@@ -144,7 +160,7 @@ impl Form {
         let sensors = self.which(|column| matches!(column, Use::Sensor(_)));
         let called = self.called(&sensors);
         let verb = if sensors.len() == 1 { "is" } else { "are" };
-        let count = self.sensors();
+        let count = self.taxels();
         let what = match self.grid {
             Some([rows, columns]) => format!("a {rows} × {columns} grid"),
             None if count == 1 => "a sensor".to_owned(),

@@ -33,11 +33,11 @@ use self::recognise::Known;
 use self::splitter::Splitter;
 use self::stamps::Stamps;
 use super::Source;
-use super::map::{self, ArrayMap};
+use super::map::{self, ArrayMap, MappedTaxels};
 use super::sizes::USUAL_PITCH_M;
 use super::vendor::VendorOptions;
 use crate::error::{Error, Result, failed};
-use crate::signal::{Frame, RawValue};
+use crate::signal::{Channel, Frame, RawValue};
 
 /// A board is silent after this time without a line, if it is also this many of its usual periods.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
@@ -55,6 +55,8 @@ pub struct TextSource {
     assembler: Assembler,
     form: Form,
     ids: Vec<u32>,
+    /// The places of values that point the other way.
+    turned: Vec<usize>,
     pitch_m: Option<[f64; 2]>,
     map: Option<ArrayMap>,
     start: Instant,
@@ -109,15 +111,19 @@ impl TextSource {
             grid,
             is_joined,
             has_rate: options.rate_hz.is_some(),
+            decoder: options.map.as_ref().and_then(|map| map.decoder),
+            has_axes: options.map.as_ref().is_some_and(|map| map.axes.is_some()),
         };
         let Opened { form, kept, is_ended } = listen(&mut link, place, start, known, tell).map_err(|e| e.at(place))?;
-        let ids = form.ids.clone().unwrap_or_else(|| (0..form.sensors() as u32).collect());
+        let named = MappedTaxels::new(options.map.as_ref(), form.ids.as_deref(), form.sensors(), None)
+            .map_err(|e| e.at(place))?;
         let mut source = Self {
             name: place.to_string(),
             link,
             splitter: Splitter::default(),
             assembler: Assembler::new(form.clone(), is_joined),
-            ids,
+            ids: named.channels,
+            turned: named.turned,
             pitch_m: options.pitch_m.or(options.map.as_ref().and_then(|map| map.pitch_m)),
             map: options.map.clone(),
             start,
@@ -162,7 +168,7 @@ impl TextSource {
 
     /// Rows and columns of its sensors; one row where it is not known that they are a grid.
     fn size(&self) -> [usize; 2] {
-        self.form.grid.unwrap_or([1, self.form.sensors()])
+        self.form.grid.unwrap_or([1, Channel::taxels_of(&self.ids).len()])
     }
 
     /// A body for it, a `.glb`: a grid, or a row of sensors, as far apart as the options say, else 10 mm.
@@ -181,7 +187,7 @@ impl TextSource {
     #[must_use]
     pub fn about_body(&self) -> String {
         if let Some(map) = self.map.as_ref().filter(|map| !map.pads.is_empty()) {
-            return map::body::about(map, self.ids.len());
+            return map::body::about(map, &self.ids);
         }
         let [rows, columns] = self.size();
         let what = match rows {
@@ -204,23 +210,17 @@ impl TextSource {
     /// # Errors
     /// It has another number of sensors than the body has taxels, or the body lacks a taxel.
     pub fn for_body(mut self, taxels: &[u32]) -> Result<Self> {
-        if self.form.ids.is_none() {
-            let mut ids = taxels.to_vec();
-            ids.sort_unstable();
-            if ids.len() != self.ids.len() {
-                let what = format!(
-                    "a frame has {} sensors, and the body {} taxels; --ids says which these are, --columns which columns are sensors",
-                    self.ids.len(),
-                    ids.len()
-                );
-                return Err(Error::failed(what).at(&self.name));
-            }
-            self.ids = ids;
+        if self.form.ids.is_none() && self.map.as_ref().is_none_or(|map| map.ids.is_none()) {
+            let named = MappedTaxels::new(self.map.as_ref(), None, self.ids.len(), Some(taxels));
+            let advice = "--ids says which these are, --columns which columns are sensors";
+            let named = named.map_err(|e| failed!("{e}; {advice}").at(&self.name))?;
+            (self.ids, self.turned) = (named.channels, named.turned);
         }
         match self.ids.iter().find(|id| !taxels.contains(id)) {
             Some(id) => {
                 let what = failed!(
-                    "the body has no taxel {id}; is it the right body? --ids says which taxels the sensors are"
+                    "the body has no taxel {}; is it the right body? --ids says which taxels the sensors are",
+                    Channel(*id)
                 );
                 Err(what.at(&self.name))
             }
@@ -294,6 +294,7 @@ impl TextSource {
             for value in &mut next.values {
                 *value = value.number().map_or(*value, |number| map.value(number));
             }
+            self.turned.iter().for_each(|&index| map::turn(&mut next.values[index]));
         }
         self.assembler.give_back(std::mem::replace(frame, next));
         self.last = Some((Instant::now(), frame.t_s));

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use super::super::map::path::ArrayPath;
 use super::super::time_column::TimeUnit;
 use crate::error::{Error, Result};
+use crate::signal::Channel;
 
 /// The most columns or ids that a range may name.
 const MAX_RANGE: usize = 1 << 20;
@@ -106,9 +107,9 @@ impl FromStr for TextColumns {
 /// The taxels of the columns of sensors, in their order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TextIds {
-    /// These, such as `4-19` or `7,3,12-20`.
+    /// These, such as `4-19` or `7,3,12-20`, or of taxels with three axes `4,4.u,4.v`, as [`Channel`] numbers.
     Listed(Vec<u32>),
-    /// `names`: the columns are called by the ids of their taxels.
+    /// `names`: the columns are called by the ids of their taxels, or as `4.u`.
     Names,
 }
 
@@ -120,23 +121,23 @@ impl FromStr for TextIds {
             return Ok(Self::Names);
         }
         let bad = || {
-            Error::usage(format!("--ids {text} is not a list of taxels; write them as 4-19, as 7,3,12-20, or names"))
+            Error::usage(format!(
+                "--ids {text} is not a list of taxels; write them as 4-19, as 7,3,12-20, as 4,4.u,4.v, or names"
+            ))
         };
         let mut ids = Vec::new();
         for part in text.split(',') {
             let (low, high) = part.split_once(['-', '–']).unwrap_or((part, part));
-            let (Ok(low), Ok(high)) = (low.trim().parse::<u32>(), high.trim().parse::<u32>()) else {
-                return Err(bad());
-            };
-            if high < low || (high - low) as usize >= MAX_RANGE - ids.len() {
+            let run = Channel::run(low.trim(), high.trim()).ok_or_else(bad)?;
+            if (run.end() - run.start()) as usize >= MAX_RANGE - ids.len() {
                 return Err(bad());
             }
-            ids.extend(low..=high);
+            ids.extend(run);
         }
         let mut sorted = ids.clone();
         sorted.sort_unstable();
         match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            Some(twice) => Err(Error::usage(format!("--ids {text} names taxel {} twice", twice[0]))),
+            Some(twice) => Err(Error::usage(format!("--ids {text} names taxel {} twice", Channel(twice[0])))),
             None => Ok(Self::Listed(ids)),
         }
     }
@@ -223,6 +224,9 @@ mod tests {
         assert!(is(0, Some("A0")) && !is(0, Some("B0")));
         assert_eq!("4-6,2".parse::<TextIds>().unwrap(), TextIds::Listed(vec![4, 5, 6, 2]));
         assert_eq!("names".parse::<TextIds>().unwrap(), TextIds::Names);
+        let TextIds::Listed(ids) = "4,4.u,4.v,8.u-9.u".parse().unwrap() else { panic!() };
+        let names: Vec<String> = ids.iter().map(|&id| Channel(id).to_string()).collect();
+        assert_eq!(names, ["4", "4.u", "4.v", "8.u", "9.u"]);
         let time = |column, unit| TextTime::Column(TimeColumnName { column, unit });
         assert_eq!("1:ms".parse::<TextTime>().unwrap(), time(Column::Numbers(1, 1), Some(TimeUnit::Milliseconds)));
         assert_eq!("stamp".parse::<TextTime>().unwrap(), time(Column::Name("stamp".to_owned()), None));
@@ -230,7 +234,7 @@ mod tests {
         for wrong in ["", "0", "4-2", "2-", "1,,2", "-3", "1-99999999"] {
             assert!(wrong.parse::<TextColumns>().is_err(), "{wrong}");
         }
-        for wrong in ["", "a", "3-1", "1,1", "0-4294967295"] {
+        for wrong in ["", "a", "3-1", "1,1", "0-4294967295", "4.w", "4-5.u", "4.u,4.u"] {
             assert!(wrong.parse::<TextIds>().unwrap_err().is_usage(), "{wrong}");
         }
         for wrong in ["", "1:h", "1-2", "1:"] {

@@ -16,6 +16,8 @@ pub(super) enum Wrong {
     Names,
     Garbled,
     Long,
+    /// A message of something else, which is no loss.
+    Other,
 }
 
 /// Each kind with its message.
@@ -43,6 +45,7 @@ struct Kind {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Skipped {
     kinds: [Kind; KINDS.len()],
+    has_others: bool,
     notices: Vec<String>,
 }
 
@@ -59,6 +62,17 @@ impl Skipped {
                 KINDS[index].1,
                 kind.shown()
             ));
+        }
+    }
+
+    /// Says of `line`, the first that has nothing of what the map names, that it is not used.
+    pub(super) fn other(&mut self, line: &str) {
+        if !std::mem::replace(&mut self.has_others, true) {
+            let what = format!(
+                "a message has nothing that the map names, and is left out as are others like it: `{}`",
+                short(line)
+            );
+            self.notices.push(what);
         }
     }
 

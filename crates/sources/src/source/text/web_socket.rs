@@ -59,8 +59,70 @@ mod tests {
     use std::time::Duration;
 
     use super::super::TextSource;
-    use crate::signal::Frame;
+    use crate::body::{Body, Modality};
+    use crate::signal::{Channel, Frame};
     use crate::source::{ArrayMap, Source as _, TextPlace, VendorOptions};
+
+    /// What a server of XELA sends: a welcome, then sixteen taxels with three numbers each, as counts and as forces; of taxel `at` these are
+    /// `at`, −`at` and 2·`at`.
+    fn xela_line(message: usize) -> String {
+        let counts: Vec<String> = (0..16)
+            .flat_map(|at: u16| [32_768 + at, 32_768 - at, 32_768 + 2 * at])
+            .map(|raw| format!("{raw:04X}"))
+            .collect();
+        let forces: Vec<String> = (0..16).flat_map(|at| [at, -at, 2 * at]).map(|force| format!("{force}.5")).collect();
+        format!(
+            "{{\"type\":\"routine\",\"message\":{message},\"time\":{}.25,\"sensors\":1,\"1\":{{\"time\":{message}.25,\"model\":\"uSPa44\",\
+             \"sensor\":\"1\",\"taxels\":16,\"data\":\"{}\",\"calibrated\":[{}]}}}}",
+            1_695_690_788 + message,
+            counts.join(","),
+            forces.join(",")
+        )
+    }
+
+    fn xela_server() -> (TextPlace, thread::JoinHandle<()>) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let place = format!("ws://{}", listener.local_addr().unwrap()).parse().unwrap();
+        let server = thread::spawn(move || {
+            let mut socket = tungstenite::accept(listener.accept().unwrap().0).unwrap();
+            let welcome = "{\"ip\":\"127.0.0.1\",\"port\":5000,\"connections\":0,\"sensors\":[\"uSPa44\"],\"message\":\"Welcome\"}";
+            let mut lines = std::iter::once(welcome.to_owned()).chain((1..).map(xela_line));
+            while lines.next().is_some_and(|line| socket.send(line.into()).is_ok()) {
+                thread::sleep(Duration::from_millis(20));
+            }
+        });
+        (place, server)
+    }
+
+    #[test]
+    fn a_server_of_three_axis_sensors_is_read_by_name_as_forces_and_by_a_map_as_counts() {
+        let counts = "values = '1.data'\ndecoder = 'hex16'\naxes = 'uvn'\ngrid = '4x4'\npitch = '4.7mm'";
+        for (map, zero) in [(ArrayMap::named("xela").unwrap(), 0.0), (ArrayMap::parse(counts).unwrap(), 32_768.0)] {
+            let (place, server) = xela_server();
+            let options = VendorOptions { map: Some(map), ..VendorOptions::default() };
+            let mut source = TextSource::open(&place, &options, &mut |_| {}).unwrap();
+            let names: Vec<String> = source.taxels().iter().map(|&id| Channel(id).to_string()).collect();
+            assert_eq!((names.len(), names[..4].join(" ").as_str()), (48, "0.u 0.v 0 1.u"));
+            let body = Body::from_bytes("pad", &source.body().unwrap()).unwrap();
+            assert!(body.taxels.len() == 16 && body.taxels.iter().all(|taxel| taxel.modality == Modality::Force3));
+            let mut frame = Frame::default();
+            for _ in 0..3 {
+                assert!(source.next_frame(&mut frame).unwrap());
+                let value = |at: usize| frame.values[at].number().unwrap() - zero;
+                let at = |taxel: usize| [value(3 * taxel), value(3 * taxel + 1), value(3 * taxel + 2)].map(f64::round);
+                if zero > 0.0 {
+                    assert_eq!(at(7), [7.0, -7.0, 14.0]);
+                } else {
+                    assert_eq!([value(21), value(22), value(23)], [7.5, -7.5, 14.5]);
+                }
+            }
+            let said = source.notices().join("\n");
+            assert!(said.contains("are a 4 × 4 grid") && said.contains("Welcome"), "{said}");
+            assert!(source.losses().is_empty(), "{:?}", source.losses());
+            drop(source);
+            server.join().unwrap();
+        }
+    }
 
     #[test]
     fn messages_are_frames_and_a_server_that_is_none_is_refused() {

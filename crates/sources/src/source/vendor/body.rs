@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::layout::{Cell, Layout, Panel};
-use crate::body::{Sheet, SheetCell, sheets};
+use crate::body::{Modality, Sheet, SheetCell, sheets};
 use crate::error::Result;
 
 /// A `.glb` with the sensors of `layout`. The page's x is x and its y is −z; y is the normal.
@@ -20,5 +20,5 @@ fn sheet(panel: &Panel) -> Sheet {
 }
 
 fn cell(&Cell { id, centre_m, corners_m, area_m2 }: &Cell) -> SheetCell {
-    SheetCell { id, centre: centre_m, corners: corners_m, area_m2 }
+    SheetCell { id, centre: centre_m, corners: corners_m, area_m2, modality: Modality::Pressure }
 }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::LineState;
+use crate::signal::Channel;
 use crate::source::boards::WiperTrouble;
 use crate::wire::{Command, Ended, Outcome, Status};
 
@@ -24,7 +25,7 @@ impl LineState {
         let (Command::Wiper { channel, wiper }, Some((board, id))) = (ended.command, self.joined) else { return };
         let mut state = self.config.shared.lock();
         let taxel = self.config.wiring.taxel(id, channel);
-        let on = taxel.map_or_else(|| format!("channel {channel}"), |taxel| format!("taxel {taxel}"));
+        let on = taxel.map_or_else(|| format!("channel {channel}"), |taxel| format!("taxel {}", Channel(taxel)));
         let Some(channel_wiper) = state.wipers[board].get_mut(usize::from(channel)) else { return };
         let what = match ended.outcome {
             Outcome::Done { value } if value == u32::from(wiper) => return channel_wiper.set = Some(wiper),

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use super::super::super::map::{ArrayPath, Decoder};
 use super::super::cells::{Cell, Separator, json, may_be_json, pairs};
-use super::super::options::TextOptions;
+use super::super::options::{Column, TextOptions};
 
 /// A line as it came, without blanks around it, and when.
 #[derive(Clone, Debug)]
@@ -29,7 +30,7 @@ pub(in crate::source::text) fn kind(line: &str) -> Kind {
     }
     if may_be_json(line) {
         let mut numbers = 0;
-        if json(line, &mut |_, cell| numbers += usize::from(matches!(cell, Cell::Number(_)))).is_ok() {
+        if json(line, None, &mut |_, cell| numbers += usize::from(matches!(cell, Cell::Number(_)))).is_ok() {
             return if numbers > 0 { Kind::Json } else { Kind::Words };
         }
     }
@@ -51,6 +52,19 @@ pub(in crate::source::text) struct Known<'a> {
     pub(in crate::source::text) is_joined: bool,
     /// Whether frames are stamped by a rate.
     pub(in crate::source::text) has_rate: bool,
+    /// How texts within JSON are numbers, where a map says it.
+    pub(in crate::source::text) decoder: Option<Decoder>,
+    /// Whether a map says that taxels have three axes.
+    pub(in crate::source::text) has_axes: bool,
+}
+
+impl Known<'_> {
+    /// The paths of what is read of JSON.
+    pub(super) fn paths(&self) -> Vec<ArrayPath> {
+        let columns = self.options.columns.iter().flat_map(|columns| &columns.0);
+        let path = |column: &Column| if let Column::Path(path) = column { Some(path.clone()) } else { None };
+        columns.filter_map(path).collect()
+    }
 }
 
 /// The grid of `count` sensors that nobody says anything of: a square where they make one and are many.

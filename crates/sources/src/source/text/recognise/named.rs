@@ -1,16 +1,18 @@
 //! Lines whose values have names: pairs and JSON; and what flags say of columns.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::super::super::column_names::is_beside_sensors;
 use super::super::super::time_column::{TimeUnit, unit_in_head};
-use super::super::cells::{Cell, json, pairs};
+use super::super::cells::{Cell, Decoded, json, pairs};
 use super::super::form::{Form, Syntax, Use, short};
 use super::super::options::{Column, TextIds, TextTime};
 use super::clock::{Rising, rising};
 use super::heard::{Heard, Known, guessed_grid};
 use crate::error::{Result, failed};
+use crate::signal::Channel;
 
 /// Columns while it is found out what they are.
 #[derive(Debug, Default)]
@@ -43,7 +45,7 @@ struct Said {
     values: Vec<(String, Option<f64>)>,
 }
 
-fn said(line: &Heard, is_json: bool) -> Said {
+fn said(line: &Heard, is_json: bool, decoded: Option<&Decoded>) -> Said {
     let mut values: Vec<(String, Option<f64>)> = Vec::new();
     let mut each = |name: &str, cell: Cell<'_>| match cell {
         Cell::Number(number) => values.push((name.to_owned(), Some(number))),
@@ -52,7 +54,7 @@ fn said(line: &Heard, is_json: bool) -> Said {
     };
     if is_json {
         // It was JSON a moment ago.
-        let _ = json(&line.text, &mut each);
+        let _ = json(&line.text, decoded, &mut each);
     } else {
         pairs(&line.text, &mut each);
     }
@@ -61,7 +63,9 @@ fn said(line: &Heard, is_json: bool) -> Said {
 
 /// How `lines` of pairs, or of JSON, are written.
 pub(super) fn named(lines: &[&Heard], is_json: bool, known: Known<'_>) -> Result<Form> {
-    let said: Vec<Said> = lines.iter().map(|line| said(line, is_json)).collect();
+    let paths = known.paths();
+    let decoded = known.decoder.map(|decoder| Arc::new(Decoded { decoder, paths: paths.clone() }));
+    let said: Vec<Said> = lines.iter().map(|line| said(line, is_json, decoded.as_deref())).collect();
     let mut counts: HashMap<&str, usize> = HashMap::new();
     let mut names: Vec<String> = Vec::new();
     for (name, _) in said.iter().flat_map(|said| &said.values) {
@@ -97,6 +101,9 @@ pub(super) fn named(lines: &[&Heard], is_json: bool, known: Known<'_>) -> Result
         grid: None,
         is_grid_guessed: false,
         ids,
+        decoded,
+        has_paths: !paths.is_empty(),
+        has_axes: known.has_axes,
     };
     sized(form, matrix, known)
 }
@@ -104,6 +111,15 @@ pub(super) fn named(lines: &[&Heard], is_json: bool, known: Known<'_>) -> Result
 /// The last part of a path such as `values.4`.
 fn last_part(name: &str) -> &str {
     name.rsplit('.').next().unwrap_or(name)
+}
+
+/// The channel that a path such as `values.4` or `values.4.u` ends with.
+fn channel_in(name: &str) -> Option<Channel> {
+    let last = last_part(name);
+    // `u` of `4.u` is behind the last dot.
+    let start = name.len() - last.len();
+    let whole = matches!(last, "u" | "v").then(|| last_part(&name[..start.saturating_sub(1)]).len() + 1);
+    Channel::named(&name[start - whole.unwrap_or(0)..])
 }
 
 /// Which names are of a time, and which of no sensor.
@@ -208,14 +224,19 @@ pub(super) fn by_options(columns: &mut Columns, known: Known<'_>) -> Result<()> 
         let what = "lines have their own times; leave out --rate, or add --time arrival";
         return Err(failed!("{what}").into_usage());
     }
-    let mut next = 0;
-    for column in &mut columns.uses {
-        if matches!(column, Use::Sensor(_)) {
-            *column = Use::Sensor(next);
-            next += 1;
-        }
+    // Those of one path follow those of the one before.
+    let paths = known.paths();
+    let path_of = |index: usize| {
+        let name = columns.names.get(index).filter(|_| paths.len() > 1);
+        name.and_then(|name| paths.iter().position(|path| path.leads_to(name)))
+    };
+    let mut sensors: Vec<usize> =
+        (0..columns.uses.len()).filter(|&index| matches!(columns.uses[index], Use::Sensor(_))).collect();
+    sensors.sort_by_cached_key(|&index| path_of(index));
+    for (place, &index) in sensors.iter().enumerate() {
+        columns.uses[index] = Use::Sensor(place);
     }
-    if next == 0 {
+    if sensors.is_empty() {
         return Err(failed!("no column is a sensor; --columns says which are"));
     }
     Ok(())
@@ -230,24 +251,24 @@ pub(super) fn ids(columns: &Columns, count: usize, known: Known<'_>) -> Result<O
         return Ok(Some(ids.clone()));
     }
     let sensors = columns.names.iter().zip(&columns.uses).filter(|(_, column)| matches!(column, Use::Sensor(_)));
-    let ids: Option<Vec<u32>> = sensors.map(|(name, _)| last_part(name).parse().ok()).collect();
+    let ids: Option<Vec<u32>> = sensors.map(|(name, _)| Some(channel_in(name)?.0)).collect();
     let ids = ids.filter(|ids| ids.len() == count && count > 0).filter(|ids| {
         let mut sorted = ids.clone();
         sorted.sort_unstable();
         sorted.windows(2).all(|pair| pair[0] != pair[1])
     });
     match (&known.options.ids, ids) {
-        (Some(TextIds::Names), None) => {
-            Err(failed!("--ids names needs columns that are called by whole numbers, each by a different one")
-                .into_usage())
-        }
+        (Some(TextIds::Names), None) => Err(failed!(
+            "--ids names needs columns that are called by whole numbers, or as 4.u, each by a different one"
+        )
+        .into_usage()),
         (_, ids) => Ok(ids),
     }
 }
 
 /// `form` with the grid that is asked for, that `matrix` says, or that is guessed.
 pub(super) fn sized(mut form: Form, matrix: Option<[usize; 2]>, known: Known<'_>) -> Result<Form> {
-    let count = form.sensors();
+    let count = form.taxels();
     if let Some([rows, columns]) = known.grid {
         if rows * columns != count {
             return Err(failed!(

@@ -71,6 +71,9 @@ pub(super) fn numbers(lines: &[Heard], kinds: &[Kind], known: Known<'_>) -> Resu
         grid: None,
         is_grid_guessed: false,
         ids,
+        decoded: None,
+        has_paths: false,
+        has_axes: false,
     };
     sized(form, None, known)
 }
@@ -252,6 +255,8 @@ fn by_grid(frames: &mut Frames, sensors: usize, known: Known<'_>) -> Result<()> 
     if let Some([rows, columns]) = known.grid {
         frames.rows = match sensors {
             _ if sensors == rows * columns => 1,
+            // Each with three axes.
+            _ if sensors == 3 * rows * columns => 1,
             _ if sensors == columns => rows,
             _ => {
                 return Err(failed!(

@@ -1,0 +1,149 @@
+//! Values of a survey's frames that no press shows: tangential ones, and those of sensors that feel something else.
+
+use std::collections::BTreeMap;
+
+use super::at_rest::rest_of;
+use super::{Apart, AtRest, Findings, Survey, several};
+use crate::signal::{Axis, Channel, RawValue};
+
+impl Apart {
+    /// The channels among `ids` that feel what presses on them, and the others; `None` where there are no others.
+    pub(super) fn of(ids: &[u32], is_pressed: impl Fn(u32) -> bool) -> Option<(Vec<u32>, Self)> {
+        let is_pressed = |index: &usize| is_pressed(Channel(ids[*index]).taxel());
+        let is_own = |index: &usize| Channel(ids[*index]).axis() == Axis::Normal;
+        let (own, tangential): (Vec<usize>, Vec<usize>) = (0..ids.len()).filter(is_pressed).partition(is_own);
+        if own.len() == ids.len() {
+            return None;
+        }
+        let of = |places: &[usize]| -> Vec<u32> { places.iter().map(|&place| ids[place]).collect() };
+        let survey = Survey::of_pressed(&of(&tangential));
+        Some((of(&own), Self { all: ids.to_vec(), own, tangential, survey }))
+    }
+
+    /// Takes a frame at rest; gives the values that are not apart.
+    pub(super) fn rest(&mut self, values: &[RawValue]) -> Vec<RawValue> {
+        self.survey.rest(&of(values, &self.tangential));
+        of(values, &self.own)
+    }
+
+    /// Takes a frame in which sensors are pressed; gives the values that are not apart.
+    pub(super) fn press(&mut self, values: &[RawValue]) -> Vec<RawValue> {
+        self.survey.press(&of(values, &self.tangential));
+        of(values, &self.own)
+    }
+
+    /// By tangential channel its raw value at rest, by the rule for pressures; `None` where it delivered nothing, or moved.
+    pub(super) fn baselines(&self) -> BTreeMap<u32, Option<f64>> {
+        let survey = &self.survey;
+        let at_rest: Vec<AtRest> = survey.rest.iter().map(|kept| rest_of(kept, survey.step())).collect();
+        let range = survey.seen_range();
+        let moved = survey.moved(&at_rest, range, range > 0.0);
+        let baseline = |place: usize| at_rest[place].filter(|_| !moved[place]).map(|(baseline, _)| baseline);
+        survey.ids.iter().enumerate().map(|(place, &id)| (id, baseline(place))).collect()
+    }
+}
+
+fn of(values: &[RawValue], places: &[usize]) -> Vec<RawValue> {
+    places.iter().map(|&place| values[place]).collect()
+}
+
+impl Findings {
+    /// The raw values of taxel `id` at rest along t and n × t, if both are known and not both 0.
+    pub(super) fn shear_baseline(&self, id: u32) -> Option<[f64; 2]> {
+        let along = |axis| *self.tangential.get(&Channel::of_taxel(id, axis).0)?;
+        let both = [along(Axis::U)?, along(Axis::V)?];
+        (both != [0.0; 2]).then_some(both)
+    }
+
+    /// Which axes have no baseline, in words.
+    pub(super) fn unknown_axes(&self) -> Option<String> {
+        let unknown: Vec<u32> =
+            self.tangential.iter().filter(|(_, baseline)| baseline.is_none()).map(|(&id, _)| id).collect();
+        (!unknown.is_empty()).then(|| {
+            format!(
+                "{} of {} tangential values delivered nothing at rest, or moved, and have no baseline: {}",
+                unknown.len(),
+                self.tangential.len(),
+                several(&unknown)
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::body::{Body, Modality, Sheet, SheetCell, sheets};
+    use crate::signal::{Channel, RawValue};
+    use crate::survey::{Survey, Wishes};
+    use crate::{Calibration, Engine, Options};
+
+    fn channels(names: &[&str]) -> Vec<u32> {
+        names.iter().map(|name| Channel::named(name).unwrap().0).collect()
+    }
+
+    /// Two taxels with three axes and a thermometer. The first's tangential values rest at 510 and 530, `moving` adds to the second's.
+    fn survey(moving: impl Fn(usize) -> f64) -> (Survey, Body) {
+        let cell = |id: u32| SheetCell::rectangle(id, [0.01 * f64::from(id), 0.0], 0.01, 0.01).with_axes(id < 3);
+        let mut cells = [1, 2, 3].map(cell);
+        cells[2].modality = Modality::Temperature;
+        let bytes = sheets(&[Sheet::new("pad", cells.to_vec())]).unwrap().to_bytes().unwrap();
+        let body = Body::from_bytes("pad", &bytes).unwrap();
+        let ids = channels(&["1.u", "1", "1.v", "3", "2", "2.u", "2.v"]);
+        let mut survey = Survey::new(&ids).on(&body).unwrap();
+        let values = |raw: [f64; 7]| raw.map(RawValue::new);
+        for n in 0..300 {
+            let noise = [0.0, 1.0, 0.0, -1.0][n % 4];
+            survey.rest(&values([
+                510.0 + noise,
+                100.0 + noise,
+                530.0 - noise,
+                2000.0 + n as f64,
+                90.0,
+                7.0 + moving(n),
+                9.0,
+            ]));
+        }
+        for n in 0..100 {
+            let depth = f64::from(n.min(99 - n));
+            survey.press(&values([
+                510.0 + 4.0 * depth,
+                100.0 + 8.0 * depth,
+                530.0,
+                2300.0,
+                90.0 + 8.0 * depth,
+                7.0,
+                9.0 - depth,
+            ]));
+        }
+        (survey, body)
+    }
+
+    #[test]
+    fn tangential_values_get_baselines_and_tell_nothing_of_presses() {
+        let (survey, body) = survey(|_| 0.0);
+        let found = survey.finish(Wishes::default()).unwrap();
+        assert_eq!(found.sensors.iter().map(|found| found.id).collect::<Vec<u32>>(), [1, 2]);
+        assert!(!found.invert && !found.remarks().join(" ").contains("tangential"), "{:?}", found.remarks());
+        let text = found.calibration("pad");
+        assert!(text.contains("[taxel.1]\n") && text.contains("shear_baseline = [510, 530]"), "{text}");
+        assert!(text.contains("shear_baseline = [7, 9]"), "{text}");
+        // At rest there is no shear, as `run` reads the file.
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let calibration = Calibration::parse(&text, &ids).unwrap();
+        assert_eq!(calibration.shear.own_baselines[&0], [510.0, 530.0]);
+        assert!(Engine::new(&body, Options::default().calibration(calibration)).is_ok());
+    }
+
+    #[test]
+    fn an_axis_that_moved_at_rest_has_no_baseline_and_is_named() {
+        let (survey, _) = survey(|n| if (100..200).contains(&n) { 300.0 } else { 0.0 });
+        let found = survey.finish(Wishes::default()).unwrap();
+        assert!(!found.calibration("pad").contains("[7, 9]"));
+        let remarks = found.remarks().join("\n");
+        assert!(
+            remarks.contains("1 of 4 tangential values delivered nothing at rest, or moved")
+                && remarks.ends_with("2.u"),
+            "{remarks}"
+        );
+    }
+}
