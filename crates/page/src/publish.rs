@@ -24,6 +24,8 @@ pub struct PageInput<'a> {
     pub frame: &'a Frame,
     /// The values that its percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
     pub values_read: Option<&'a [RawValue]>,
+    /// The values that its letters beside pressure are made of ([`Engine::values_sensed`](somatic_engine::Engine::values_sensed)).
+    pub values_sensed: &'a [RawValue],
     /// The engine's plan as it is after the call.
     pub plan: &'a Plan,
     /// When the frame arrived, if not just now.
@@ -105,6 +107,8 @@ impl Publisher {
                 _ => own,
             };
         }
+        snapshot.sensed.clear();
+        snapshot.sensed.extend_from_slice(input.values_sensed);
         snapshot.poses.clear();
         let links = input.frame.pose.iter();
         snapshot.poses.extend(links.filter_map(|(name, pose)| Some((*self.index_of_link.get(name)?, *pose))));

@@ -1,10 +1,11 @@
 //! Pressure and health of every taxel, from a frame's raw values: on the server's thread, and only for frames that a
 //! viewer gets.
 
+use super::senses::PageSenses;
 use super::snapshot::Snapshot;
-use crate::signal::RawValue;
+use crate::signal::{RawValue, Reading as SenseReading, Receptor};
 use somatic_engine::percept::Flags;
-use somatic_engine::scene::Plan;
+use somatic_engine::scene::{Plan, SenseRanges, SensedValue};
 use somatic_engine::stage::calibrate::{UNUSABLE, reference};
 
 /// How a taxel is doing, as frames number it.
@@ -43,6 +44,7 @@ impl Health {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reading {
     pub(super) raw: Option<f64>,
+    /// Its pressure; of taxels that measure something else °C or m.
     pub(super) pressure: Option<f64>,
     pub(super) health: Health,
 }
@@ -53,25 +55,62 @@ pub(super) struct Readings {
     plan: Plan,
     /// By the plan's channels, whether frames have their values.
     is_sent: Vec<bool>,
-    /// By taxel; NaN where there is none.
+    /// By taxel; NaN where there is none. Of taxels that measure something else, °C or m.
     pressures: Vec<f32>,
     /// By taxel, as [`Health`].
     health: Vec<u8>,
     /// What they are made of.
     raw: Vec<RawValue>,
+    /// Taxels that read something else, if there are any; their values and states are among those above.
+    senses: Option<Sensed>,
     /// Counts the frames that read differently from the one before.
     changes: u64,
 }
 
+/// Readings of other letters than pressure.
+#[derive(Debug)]
+struct Sensed {
+    of: PageSenses,
+    /// What they are made of.
+    raw: Vec<RawValue>,
+    /// Along both tangents of each taxel with three axes; NaN where they are not known.
+    shears: Vec<f32>,
+    ranges: SenseRanges,
+}
+
+impl Sensed {
+    /// What the value `value` of `senses` says of its taxel, whose values are at `channels`.
+    fn reading(&self, value: &SensedValue, channels: [usize; 2]) -> Reading {
+        let is_sent = channels.iter().any(|&channel| self.of.is_sent[channel]);
+        let (number, health) = match value.reading {
+            SenseReading::Missing if !is_sent => (None, Health::NotSent),
+            SenseReading::Missing if value.raw == RawValue::STALE => (None, Health::Stale),
+            SenseReading::Missing => (None, Health::Missing),
+            SenseReading::Faulty => (None, Health::Faulty),
+            // Nothing is near.
+            SenseReading::Value(_, false) if value.receptor == Receptor::Proximity => (None, Health::OutOfRange),
+            SenseReading::Value(number, false) => (Some(number), Health::OutOfRange),
+            SenseReading::Value(number, true) => (Some(number), Health::Good),
+        };
+        Reading { raw: value.raw.number(), pressure: number, health }
+    }
+}
+
 impl Readings {
     /// For `taxels` taxels; `plan` reads some of them. `value_of` has the index of each channel's value in a frame.
-    pub(super) fn new(plan: Plan, taxels: usize, value_of: &[Option<usize>]) -> Self {
+    pub(super) fn new(plan: Plan, taxels: usize, value_of: &[Option<usize>], senses: Option<&PageSenses>) -> Self {
         Self {
             is_sent: value_of.iter().map(Option::is_some).collect(),
             plan,
             pressures: vec![f32::NAN; taxels],
             health: vec![Health::LeftOut as u8; taxels],
             raw: Vec::new(),
+            senses: senses.map(|of| Sensed {
+                of: of.clone(),
+                raw: Vec::new(),
+                shears: Vec::new(),
+                ranges: SenseRanges::default(),
+            }),
             changes: 0,
         }
     }
@@ -88,9 +127,20 @@ impl Readings {
         self.changes
     }
 
+    /// The tangential forces of taxels with three axes, two of each, if there are such taxels.
+    pub(super) fn shears(&self) -> &[f32] {
+        self.senses.as_ref().map_or(&[], |senses| &senses.shears)
+    }
+
+    /// The least and greatest temperatures and distances that were read.
+    pub(super) fn sense_ranges(&self) -> SenseRanges {
+        self.senses.as_ref().map_or_else(SenseRanges::default, |senses| senses.ranges)
+    }
+
     /// Reads `snapshot`; the largest pressure in it.
     pub(super) fn read(&mut self, snapshot: &Snapshot) -> f64 {
-        if self.take_baselines(snapshot) || self.raw != snapshot.raw {
+        let has_sensed = self.senses.as_ref().is_some_and(|senses| senses.raw != snapshot.sensed);
+        if self.take_baselines(snapshot) || self.raw != snapshot.raw || has_sensed {
             self.raw.clone_from(&snapshot.raw);
             self.changes += 1;
             for channel in 0..self.raw.len() {
@@ -99,15 +149,45 @@ impl Readings {
                 self.pressures[taxel] = reading.pressure.map_or(f32::NAN, |pressure| pressure as f32);
                 self.health[taxel] = reading.health as u8;
             }
+            self.read_senses(snapshot);
         }
         // NaN is not a maximum.
-        f64::from(self.pressures.iter().copied().fold(0.0, f32::max))
+        let pressed = self.plan.body_taxels.iter().map(|&taxel| self.pressures[taxel]);
+        f64::from(pressed.fold(0.0, f32::max))
+    }
+
+    /// Reads what is not pressure; those with three axes are pressed, too.
+    fn read_senses(&mut self, snapshot: &Snapshot) {
+        let Some(mut senses) = self.senses.take() else { return };
+        senses.raw.clone_from(&snapshot.sensed);
+        senses.shears.clear();
+        senses.ranges = SenseRanges::default();
+        let places = senses.of.taxels.all().map(|(_, _, channels)| channels);
+        let values: Vec<(SensedValue, [usize; 2])> =
+            senses.of.taxels.read(&self.plan, &self.raw, &senses.raw).zip(places).collect();
+        for (value, channels) in values {
+            senses.ranges.see(&value);
+            if value.receptor == Receptor::Shear {
+                let is_known = matches!(value.reading, SenseReading::Value(..));
+                senses.shears.extend(value.shear.map(|along| if is_known { along as f32 } else { f32::NAN }));
+                continue;
+            }
+            let reading = senses.reading(&value, channels);
+            self.pressures[value.taxel] = reading.pressure.map_or(f32::NAN, |number| number as f32);
+            self.health[value.taxel] = reading.health as u8;
+        }
+        self.senses = Some(senses);
     }
 
     /// What the taxel at index `taxel` reads in `snapshot`.
     pub(super) fn taxel(&mut self, snapshot: &Snapshot, taxel: usize) -> Reading {
         let Ok(channel) = self.plan.body_taxels.binary_search(&taxel) else {
-            return Reading { raw: None, pressure: None, health: Health::LeftOut };
+            let sensed = self.senses.as_ref().and_then(|senses| {
+                let (at, (_, _, channels)) = senses.of.taxels.all().enumerate().find(|(_, own)| own.0 == taxel)?;
+                let value = senses.of.taxels.read(&self.plan, &snapshot.raw, &snapshot.sensed).nth(at)?;
+                Some(senses.reading(&value, channels))
+            });
+            return sensed.unwrap_or(Reading { raw: None, pressure: None, health: Health::LeftOut });
         };
         if self.take_baselines(snapshot) {
             // What is read of all taxels is of another calibration.
@@ -179,7 +259,7 @@ mod tests {
         for (raw, (value, ..)) in snapshot.raw.iter_mut().zip(values) {
             *raw = value;
         }
-        let mut readings = Readings::new(plan, body.taxels.len() + 1, &value_of);
+        let mut readings = Readings::new(plan, body.taxels.len() + 1, &value_of, None);
         assert_eq!(readings.read(&snapshot), 200.0);
         for (index, (_, pressure, health)) in values.into_iter().enumerate() {
             assert_eq!(readings.health()[index], health as u8);

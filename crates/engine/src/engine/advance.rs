@@ -21,6 +21,13 @@ const FIRST_PART: usize = 256;
 const PART: Duration = Duration::from_millis(100);
 
 impl Engine {
+    /// The values that the last frame's letters beside pressure were made of, by
+    /// [`SensedTaxels::channels`](crate::scene::SensedTaxels::channels); empty before the first frame.
+    #[must_use]
+    pub fn values_sensed(&self) -> &[RawValue] {
+        &self.sensed[self.sensed.len().saturating_sub(self.plan.senses.channels.len())..]
+    }
+
     /// All of `input`, epoch by epoch where there is drift compensation; with `check`, on the reference too. `false` if `go_on` said so.
     pub(super) fn advance(
         &mut self,

@@ -262,12 +262,8 @@ impl Cell<'_> {
                 made.flags |= if is_missing { Flags::INCOMPLETE } else { Flags::FAULTY_INPUT };
                 continue;
             };
-            let gain = by.own_gains.get(&member.taxel).copied().or(by.gain);
-            // A gain of its own is in the file's unit, as the normal one was before it came into N or Pa.
-            let gain = gain.map_or(calibration.gain.abs(), |gain| gain * calibration.unit_factor);
-            let [u_rest, v_rest] = by.own_baselines.get(&member.taxel).copied().unwrap_or(by.baselines);
-            let felt = DVec3::new(own.value, gain * (u - u_rest), gain * (v - v_rest));
-            let [su, sv] = by.cross_axis.map(|shares| DVec3::from_array(shares).dot(felt));
+            let gain = by.gain_of(member.taxel, calibration.gain, calibration.unit_factor);
+            let [su, sv] = by.forces(member.taxel, gain, own.value, [u, v]);
             let [tu, tv] = member.tangents_in_chart;
             quantity = Some(calibration.quantity);
             members.push(index);

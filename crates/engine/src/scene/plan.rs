@@ -5,7 +5,7 @@ mod make;
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::Knobs;
 use super::curves::Curves;
@@ -148,6 +148,11 @@ impl PlanField {
     #[must_use]
     pub fn taxels(&self) -> usize {
         self.count + self.sensed.len()
+    }
+
+    /// Of a letter that the host makes, its taxels' (u, v) in the field's chart, m.
+    pub fn sensed_places_m(&self) -> impl Iterator<Item = DVec2> + '_ {
+        self.sensed.iter().map(|member| member.place_m)
     }
 
     /// Whether it has enough members for the CPU to take sixteen of them side by side.

@@ -82,7 +82,8 @@ export class PerceptPanel {
     for (const column of welcome.columns) {
       const row = this.rows.get(column.name);
       if (!row) continue;
-      row.row.hidden = column.name === "total" && force !== null && Number.isFinite(force[0]);
+      const isTold = column.name === "total" && force !== null && Number.isFinite(force[0]);
+      row.row.hidden = isTold || column.sense !== about.sense;
       const value = model.forPeople(field, column.name);
       const text = value
         ? vectorWithUnit(value, column.unit, model.quantity)
