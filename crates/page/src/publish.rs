@@ -49,10 +49,10 @@ pub struct Publisher {
     index_of_link: HashMap<String, u32>,
     /// Poses of the last frame that was not late with them.
     last_poses: Vec<(u32, Pose)>,
-    /// Number of fields.
-    fields: usize,
     /// Of the last frame; none where a pass over the recording logs them.
     contacts: Option<Contacts>,
+    /// Before the first frame.
+    no_contacts: Contacts,
     /// Where touches were.
     trails: TouchTrails,
     number: Option<u64>,
@@ -73,8 +73,8 @@ impl Publisher {
             value_of: scene.value_of.clone(),
             index_of_link: scene.index_of_link.clone(),
             last_poses: Vec::new(),
-            fields: scene.plan.fields.len(),
-            contacts: Some(Contacts::new(scene.plan.fields.len())),
+            contacts: Some(Contacts::new(&scene.plan)),
+            no_contacts: Contacts::new(&scene.plan),
             trails: TouchTrails::default(),
             number: None,
             published: 0,
@@ -175,7 +175,7 @@ impl Publisher {
     /// Leaves onsets and releases to a pass over the whole recording, to which it gives what logs them.
     pub fn recording_events(&mut self) -> RecordingEvents {
         self.contacts = None;
-        RecordingEvents { exchange: Arc::clone(&self.exchange), contacts: Contacts::new(self.fields) }
+        RecordingEvents { exchange: Arc::clone(&self.exchange), contacts: self.no_contacts.clone() }
     }
 
     /// Logs an event: a message about a board or another notice.

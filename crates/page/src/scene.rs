@@ -11,14 +11,14 @@ use super::message::{Counts, VERSION};
 use super::poses::Poses;
 use super::scale::Scale;
 use super::sense_scale::SenseScales;
-use super::senses::{PageSenses, sense_of_column, sense_of_letter};
+use super::senses::{PageSenses, sense_word};
 use super::text::Names;
 use super::touches::TouchPlaces;
 use crate::body::{Body, ChartKind};
 use crate::colours::pressure_colours;
 use crate::signal::{Quantity, Wiring};
 use somatic_engine::percept::{Column, Flags, Outputs, TouchFlags, Unit};
-use somatic_engine::scene::{Plan, PlanField, SenseRanges};
+use somatic_engine::scene::{Plan, PlanField, SenseRanges, receptor_of};
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,15 +163,16 @@ fn channels(body: &Body, wiring: &Wiring) -> Vec<Option<[usize; 2]>> {
 
 fn column_json(column: &Column, plan: &Plan) -> Value {
     let unit = match (column.unit, plan.common_quantity()) {
-        (Unit::P, Some(quantity)) => quantity.symbol(),
-        (unit, _) => unit.symbol(),
+        (Unit::P, Some(quantity)) => quantity.symbol().to_owned(),
+        (Unit::PMetre, Some(quantity)) => format!("{} m", quantity.symbol()),
+        (unit, _) => unit.symbol().to_owned(),
     };
     json!({
         "name": column.name,
         "unit": unit,
         "components": column.components,
         "help": column.help,
-        "sense": sense_of_column(column),
+        "sense": sense_word(receptor_of(column)),
     })
 }
 
@@ -205,7 +206,7 @@ fn fields(body: &Body, plan: &Plan) -> Vec<Value> {
         json!({
             "name": field.name,
             "letter": (!letter.is_empty()).then(|| letter.join(" ")),
-            "sense": sense_of_letter(plan, field.letter),
+            "sense": sense_word(plan.letters()[field.letter].receptor),
             "label": plan.label(index),
             "parent": parent,
             "link": field.anchor,

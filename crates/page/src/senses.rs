@@ -6,7 +6,6 @@ use super::sense_scale::SenseScales;
 use crate::body::Body;
 use crate::colours::{distance_colours, temperature_colours};
 use crate::signal::Receptor;
-use somatic_engine::percept::Column;
 use somatic_engine::scene::{Plan, SenseRanges, SensedTaxels};
 
 /// Such taxels of a scene, and their scales.
@@ -56,20 +55,12 @@ impl PageSenses {
     }
 }
 
-/// What letters say of taxels.
-pub(super) fn sense_of_letter(plan: &Plan, letter: usize) -> &'static str {
-    match plan.letters()[letter].receptor {
+/// What messages call what a letter reads.
+pub(super) fn sense_word(receptor: Receptor) -> &'static str {
+    match receptor {
         Receptor::Sustained | Receptor::Change => "pressure",
         Receptor::Shear => "shear",
         Receptor::Temperature => "temperature",
         Receptor::Proximity => "proximity",
-    }
-}
-
-/// Of what sense `column` is.
-pub(super) fn sense_of_column(column: &Column) -> &'static str {
-    match column.stage {
-        "shear" | "temperature" | "proximity" => column.stage,
-        _ => "pressure",
     }
 }

@@ -13,7 +13,8 @@ use super::post::{Post, flag_stale, flag_stale_poses};
 use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
-use crate::signal::RawValue;
+use crate::scene::{SensedTaxels, SensedValue};
+use crate::signal::{Frame, RawValue};
 
 /// Frames until `go_on` is asked first.
 const FIRST_PART: usize = 256;
@@ -21,6 +22,22 @@ const FIRST_PART: usize = 256;
 const PART: Duration = Duration::from_millis(100);
 
 impl Engine {
+    /// Puts into `to`, in place of what it holds, what `sensed` read in `frame`, which must be the last one: to look at, as
+    /// [`Engine::pressures`].
+    pub fn sensed(&self, frame: &Frame, sensed: &SensedTaxels, to: &mut Vec<SensedValue>) {
+        to.clear();
+        if sensed.channels().is_empty() {
+            return;
+        }
+        let mut raw = vec![RawValue::MISSING; self.plan.channels()];
+        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+            if let Some(channel) = self.channel_of_taxel[taxel] {
+                raw[channel as usize] = self.intake.read(taxel, value);
+            }
+        }
+        to.extend(sensed.read(&self.plan, &raw, self.values_sensed()));
+    }
+
     /// The values that the last frame's letters beside pressure were made of, by
     /// [`SensedTaxels::channels`](crate::scene::SensedTaxels::channels); empty before the first frame.
     #[must_use]

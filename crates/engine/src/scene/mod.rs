@@ -24,6 +24,7 @@ pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, Orien
 pub(crate) use layer::{Around, REACH};
 pub use plan::{Plan, PlanField, PlannedField};
 pub use sensed_taxels::{SenseRanges, SensedTaxels, SensedValue};
+pub use senses::receptor_of;
 pub(crate) use senses::{SensedMember, outputs_of};
 pub(crate) use stages::Stages;
 

@@ -278,6 +278,15 @@ impl Plan {
         &self.letters
     }
 
+    /// Which of the letters field `field` is of.
+    ///
+    /// # Panics
+    /// There is no such field.
+    #[must_use]
+    pub fn letter_of(&self, field: usize) -> usize {
+        self.fields[field].letter
+    }
+
     /// By field, which of the letters it is of; empty where all are of one.
     pub(crate) fn letter_by_field(&self) -> Arc<[u8]> {
         if self.letters.len() < 2 {
@@ -312,11 +321,12 @@ impl Plan {
         self.fields.get(field).map_or(Quantity::Count, |field| field.quantity)
     }
 
-    /// What P is in all fields, if it is the same in all.
+    /// What P is in all fields that have it, if it is the same in all.
     #[must_use]
     pub fn common_quantity(&self) -> Option<Quantity> {
-        let first = self.quantity(0);
-        self.fields.iter().all(|field| field.quantity == first).then_some(first)
+        let mut of_pressure = self.fields.iter().filter(|field| field.sensed.is_empty()).map(|field| field.quantity);
+        let first = of_pressure.next().unwrap_or(Quantity::Count);
+        of_pressure.all(|quantity| quantity == first).then_some(first)
     }
 
     /// What people call field `field` of the percepts: its name, and what is to be said of its letter.
