@@ -59,6 +59,8 @@ mod ros2_live;
 mod ros2_peer;
 mod run;
 mod self_contacts;
+#[cfg(feature = "gpu")]
+mod senses;
 #[cfg(unix)]
 mod serial;
 #[cfg(unix)]

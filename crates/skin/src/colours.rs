@@ -172,6 +172,45 @@ mod tests {
         assert!(lightness(linear(middle)) > 90.0, "{middle:?}");
     }
 
+    /// Oklab, in which distances are about as large as they look.
+    fn oklab(rgb: [f64; 3]) -> [f64; 3] {
+        const CONES: [[f64; 3]; 3] = [
+            [0.412_221_470_8, 0.536_332_536_3, 0.051_445_992_9],
+            [0.211_903_498_2, 0.680_699_545_1, 0.107_396_956_6],
+            [0.088_302_461_9, 0.281_718_837_6, 0.629_978_700_5],
+        ];
+        const LAB: [[f64; 3]; 3] = [
+            [0.210_454_255_3, 0.793_617_785, -0.004_072_046_8],
+            [1.977_998_495_1, -2.428_592_205, 0.450_593_709_9],
+            [0.025_904_037_1, 0.782_771_766_2, -0.808_675_766],
+        ];
+        let by =
+            |matrix: [[f64; 3]; 3], of: [f64; 3]| matrix.map(|row| row.iter().zip(of).map(|(a, b)| a * b).sum::<f64>());
+        by(LAB, by(CONES, rgb).map(f64::cbrt))
+    }
+
+    fn apart(one: [u8; 3], other: [u8; 3], sight: &[[f64; 3]; 3]) -> f64 {
+        let seen = |colour: [u8; 3]| {
+            let rgb = linear(colour);
+            oklab(sight.map(|row| row.iter().zip(rgb).map(|(a, b)| a * b).sum::<f64>().clamp(0.0, 1.0)))
+        };
+        seen(one).iter().zip(seen(other)).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    }
+
+    #[test]
+    fn what_is_cold_and_what_is_warm_differ_for_every_kind_of_sight() {
+        let colours = temperature_colours();
+        // As far from the middle, on both sides: as far apart as two greys whose lightness differs by a tenth.
+        for sight in &SIGHTS {
+            for off in [32, 64, 96, 127] {
+                let distance = apart(colours[127 - off], colours[128 + off], sight);
+                assert!(distance >= 0.1, "{off}: {distance}");
+            }
+        }
+        // Green and red of one lightness would not do.
+        assert!(apart([120, 125, 40], [200, 80, 60], &SIGHTS[2]) < 0.1);
+    }
+
     #[test]
     fn no_colour_is_grey() {
         for colour in pressure_colours() {
