@@ -92,6 +92,13 @@ fn count(picture: &[[u8; 3]], colour: [u8; 3]) -> usize {
 }
 
 #[test]
+fn the_kinds_of_taxels_are_counted() {
+    let skin = Skin::new();
+    assert!(done(&["inspect", text_of(&skin.at("pad.glb"))]).contains("2 temperature, 2 proximity, 2 force3"));
+    assert!(!done(&["inspect", "hand"]).contains("pressure"));
+}
+
+#[test]
 fn each_quantity_is_plotted_in_the_letter_that_gives_it_with_its_unit() {
     let skin = Skin::new();
     let lines = skin.plot("temperature,nearest,shear,friction,torsion");
