@@ -28,11 +28,11 @@ export function arrowOf(model, taxel) {
 }
 
 /**
- * Whether arrows are shown: in letters of pressure and shear.
+ * Whether arrows are shown: of a moment, in letters of pressure and shear.
  * @param {import("./model.js").Model} model
  */
-export function hasArrows({ senses, sense, frame, peaks }) {
-  return !!senses?.pulled.size && (sense === "pressure" || sense === "shear") && !!frame && !peaks;
+export function hasArrows({ senses, sense, peaks }) {
+  return !!senses?.pulled.size && (sense === "pressure" || sense === "shear") && !peaks;
 }
 
 /**
