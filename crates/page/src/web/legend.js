@@ -88,11 +88,13 @@ export class Legend {
     const fields = this.model.welcome?.fields ?? [];
     const letters = [...new Set(fields.map((field) => field.letter))];
     this.letters.hidden = !this.model.senses || letters.length < 2;
+    const { letter: chosen } = this.choices;
+    const shown = letters.includes(chosen) ? chosen : letters[0];
     this.letters.replaceChildren(
       ...letters.map((letter) => {
         const button = make("button", "small", letterName(letter, fields));
         button.title = `Colour taxels by ${button.textContent}`;
-        button.setAttribute("aria-pressed", String(letter === this.choices.letter));
+        button.setAttribute("aria-pressed", String(letter === shown));
         button.addEventListener("click", () => this.choices.chooseLetter(letter));
         return button;
       }),
