@@ -104,7 +104,7 @@ const SKIN = [
   [22, 0.019, 0.005, "proximity"],
 ];
 const CALIBRATION =
-  '[all]\nunit = "N"\np_max = 0.3\n[shear]\nslips_at = 0.6\n[temperature]\nraw_range = [0, 60]\n[proximity]\nunit = "mm"\nrange = 80\n';
+  '[all]\nunit = "N"\np_max = 0.6\n[shear]\nslips_at = 0.6\n[temperature]\nraw_range = [0, 60]\n[proximity]\nunit = "mm"\nrange = 80\n';
 let server;
 
 before(async () => {
@@ -122,7 +122,7 @@ before(async () => {
   const header = ["t", ...own, ...pulled.map((id) => `${id}.u`), ...pulled.map((id) => `${id}.v`)];
   // Pressed and pulled along x; the second proximity taxel has nothing near.
   const frame = (t) =>
-    [t, 0.3, 0.15, 0.15, 0, 10, 50, 20, 90, 0.15, 0.075, 0.075, 0, 0, 0, 0, 0].map(String).join(",");
+    [t, 0.6, 0.3, 0.3, 0, 10, 50, 20, 90, 0.3, 0.15, 0.15, 0, 0, 0, 0, 0].map(String).join(",");
   writeFileSync(at("senses.csv"), `${header.join(",")}\n${frame(0)}\n${frame(0.5)}\n`);
   server = await view("--body", at("senses.glb"), "--calibration", at("senses.toml"), at("senses.csv"));
 });
@@ -166,10 +166,7 @@ test("a letter colours its taxels as its legend says, and no others", async () =
   assert.equal(await title(), "Force of a taxel, N");
   assert.ok(near(pressures.get(1), at("pressure", 1)), String(pressures.get(1)));
   assert.ok(near(pressures.get(2), at("pressure", 0.5)));
-  assert.equal(
-    await page.locator(".legend-arrow").textContent(),
-    "arrow as long as a taxel is wide: 0.100 N",
-  );
+  assert.equal(await page.locator(".legend-arrow").textContent(), "arrow a taxel wide: 0.200 N");
 
   const temperatures = await coloured(page, "temperature");
   await picture(page, "senses-temperature.png");
@@ -225,13 +222,13 @@ test("fields and percepts have the quantities of the letter, with their units", 
   assert.equal(temperature.rows.get("warmest taxel"), "12");
   assert.ok(!temperature.rows.has("peak") && !temperature.rows.has("nearest"));
   const proximity = await said("proximity");
-  assert.equal(proximity.tree, "20 mm");
+  assert.equal(proximity.tree, "20.0 mm");
   assert.equal(proximity.rows.get("covered"), "1");
   const shear = await said("shear");
-  assert.equal(shear.tree, "0.300 N");
+  assert.equal(shear.tree, "0.600 N");
   assert.equal(shear.rows.get("friction"), "0.500");
   const pressure = await said("pressure");
-  assert.equal(pressure.rows.get("peak"), "0.300 N");
+  assert.equal(pressure.rows.get("peak"), "0.600 N");
   assert.ok(!pressure.rows.has("friction") && !pressure.rows.has("temperature"));
   // What is shown is in the address.
   await coloured(page, "temperature");

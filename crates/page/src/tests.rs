@@ -329,7 +329,7 @@ fn frames_hold_what_the_engine_computed() {
     let totals = &everything["percepts"]["columns"]["0"];
     assert_eq!(totals[at], 4.0 + 2.0 * 50.0 + 0.5);
     // A field of two links answers in the world, relative to the scene's origin.
-    assert_eq!(everything["percepts"]["present"][0].as_u64().unwrap() >> 31, 1);
+    assert_eq!(everything["percepts"]["present"][1].as_u64().unwrap() >> 31, 1);
     let samples = &everything["samples"];
     assert_eq!((&samples["answers"], &samples["t"]), (&1.into(), &json!([0.02, 0.03, 0.04])));
     assert_eq!(samples["values"][0], json!([102.5, 103.5, 104.5]));

@@ -238,7 +238,7 @@ export class Inspector {
  * @param {import("./model.js").Model} model
  * @param {number} taxel
  */
-function readingRows({ senses, pressure, quantity }, taxel) {
+export function readingRows({ senses, pressure, quantity }, taxel) {
   const value = (senses?.values ?? pressure)[taxel];
   const sense = senses?.of[taxel] ?? "pressure";
   if (sense === "temperature") return [[sense, withUnit(value, "°C", "")]];

@@ -119,7 +119,7 @@ export class Legend {
     this.paint(welcome.colours);
     this.arrow.hidden = !hasArrows(model);
     const width = model.scaleMax / WIDTHS_AT_MOST;
-    setText(this.arrow, `arrow as long as a taxel is wide: ${withUnit(width, "P", model.quantity)}`);
+    setText(this.arrow, `arrow a taxel wide: ${withUnit(width, "P", model.quantity)}`);
     if (own) {
       const { title, unit, factor } = OWN[sense];
       const ends = model.senses?.ends(sense);
@@ -165,7 +165,7 @@ export class Legend {
       case "calibration":
         return "fixed by the calibration";
       case "raw range":
-        return sense === "proximity" ? "fixed to the sensors’ range" : "fixed to the raw range";
+        return sense === "proximity" ? "fixed to the range" : "fixed to the raw range";
       case "recording":
         return sense === "temperature"
           ? "fixed to the recording’s range"

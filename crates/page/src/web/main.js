@@ -164,7 +164,10 @@ model.on("scale", () => {
 });
 choices.on("letter", () => {
   peaks.show(false);
+  choices.follow(model);
+  plots.follow(choices.smallestTouched(model));
   marks.drawn = true;
+  updatePlots();
 });
 choices.on("look field hover touch", () => {
   view.ringsChanged = true;

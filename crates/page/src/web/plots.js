@@ -326,7 +326,7 @@ export class Plots {
     close.title = "Take this line away";
     close.addEventListener("click", () => this.remove(s));
     chip.title = field?.name ?? "";
-    chip.append(swatch, make("span", "", `${field?.label ?? ""}${this.labelOf(s)}`), close);
+    chip.append(swatch, make("span", "", `${field?.name ?? ""}${this.labelOf(s)}`), close);
     return chip;
   }
 
