@@ -326,8 +326,7 @@ fn frames_hold_what_the_engine_computed() {
     assert_eq!((&welcome["fields"][0]["link"], &welcome["fields"][4]["link"]), (&json!(null), &json!(1)));
     assert_eq!(welcome["channels"], json!([null, [5, 0], [5, 1], [6, 0], [6, 1]]));
     let at = everything["percepts"]["field"].as_array().unwrap().iter().position(|field| field == 2).unwrap();
-    let totals = &everything["percepts"]["columns"]["0"];
-    assert_eq!(totals[at], 4.0 + 2.0 * 50.0 + 0.5);
+    assert_eq!(everything["percepts"]["columns"]["0"][at], 4.0 + 2.0 * 50.0 + 0.5);
     // A field of two links answers in the world, relative to the scene's origin.
     assert_eq!(everything["percepts"]["present"][1].as_u64().unwrap() >> 31, 1);
     let samples = &everything["samples"];
