@@ -1,5 +1,6 @@
 //! Labels of a picture: title, captions, legend and scale bar.
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -196,24 +197,8 @@ impl Labels {
             }
             area.draw_text(&name, &text(size, INK, HPos::Right), place(left - scaled(8), y)).map_err(cannot)?;
         }
-        if let Some(Legend { colours, ends: [least, most], unit, note }) = &self.colours {
-            let (top, low) = (scaled(14), scaled(12));
-            let ends = [(short(*least), HPos::Right), (format!("{} {unit}", short(*most)), HPos::Left)];
-            let right = width - side - ink::width(&ends[1].0, size)? - scaled(8);
-            let left = right - scaled(160);
-            for x in left..right {
-                let [r, g, b] = colours[((x - left) * 255 / (right - left)) as usize];
-                let column = [place(x, top + scaled(5)), place(x + 1, top + scaled(5) + low)];
-                area.draw(&Rectangle::new(column, RGBColor(r, g, b).filled())).map_err(cannot)?;
-            }
-            for ((text_of, side), x) in ends.iter().zip([left - scaled(8), right + scaled(8)]) {
-                area.draw_text(text_of, &text(size, INK, *side), place(x, top + scaled(11))).map_err(cannot)?;
-            }
-            let taken = side + ink::width(&self.title, self.title_size())? + ink::width(&ends[0].0, size)? + scaled(44);
-            if ink::width(note, size)? + taken <= left {
-                let x = left - scaled(24) - ink::width(&ends[0].0, size)?;
-                area.draw_text(note, &text(size, FAINT, HPos::Right), place(x, top + scaled(11))).map_err(cannot)?;
-            }
+        if let Some(legend) = &self.colours {
+            self.draw_colours(&area, legend)?;
         }
         if let Some([x, y]) = self.axes {
             let (x, y) = (x.round() as i32, y.round() as i32);
@@ -232,6 +217,35 @@ impl Labels {
             }
         }
         area.present().map_err(cannot)
+    }
+
+    /// Draws a bar of colours at the right of the title.
+    fn draw_colours<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, legend: &Legend) -> Result<()> {
+        let Legend { colours, ends: [least, most], unit, note } = legend;
+        let (side, size) = (self.scaled(SIDE), self.scaled(SIZE));
+        let text = |pixels: u32, colour: RGBColor, side: HPos| {
+            (FAMILY, pixels).into_font().color(&colour).pos(Pos::new(side, VPos::Center))
+        };
+        let place = |x: u32, y: u32| (x as i32, y as i32);
+        let (scaled, width) = (|pixels: u32| self.scaled(pixels), self.width);
+        let (top, low) = (scaled(14), scaled(12));
+        let ends = [(short(*least), HPos::Right), (format!("{} {unit}", short(*most)), HPos::Left)];
+        let right = width - side - ink::width(&ends[1].0, size)? - scaled(8);
+        let left = right - scaled(160);
+        for x in left..right {
+            let [r, g, b] = colours[((x - left) * 255 / (right - left)) as usize];
+            let column = [place(x, top + scaled(5)), place(x + 1, top + scaled(5) + low)];
+            area.draw(&Rectangle::new(column, RGBColor(r, g, b).filled())).map_err(cannot)?;
+        }
+        for ((text_of, side), x) in ends.iter().zip([left - scaled(8), right + scaled(8)]) {
+            area.draw_text(text_of, &text(size, INK, *side), place(x, top + scaled(11))).map_err(cannot)?;
+        }
+        let taken = side + ink::width(&self.title, self.title_size())? + ink::width(&ends[0].0, size)? + scaled(44);
+        if ink::width(note, size)? + taken <= left {
+            let x = left - scaled(24) - ink::width(&ends[0].0, size)?;
+            area.draw_text(note, &text(size, FAINT, HPos::Right), place(x, top + scaled(11))).map_err(cannot)?;
+        }
+        Ok(())
     }
 }
 
