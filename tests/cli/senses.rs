@@ -97,6 +97,10 @@ fn the_kinds_of_taxels_are_counted() {
     let skin = Skin::new();
     assert!(done(&["inspect", text_of(&skin.at("pad.glb"))]).contains("2 temperature, 2 proximity, 2 force3"));
     assert!(!done(&["inspect", "hand"]).contains("pressure"));
+    // A recording has three values of a taxel with three axes.
+    let recording = done(&["info", text_of(&skin.at("touch.csv")), "--json"]);
+    let known: serde_json::Value = serde_json::from_str(&recording).unwrap();
+    assert_eq!(known["taxels"], 6, "{known}");
 }
 
 #[test]

@@ -17,7 +17,7 @@ pub(super) fn said(percept: &Percept, factor: f64, unit: &str) -> Option<String>
         vec![
             Some(format!("{} mm away", millimetres(nearest))),
             percept.covered.map(|covered| format!("near {covered}")),
-            percept.approach_speed.map(|speed| format!("{:+.0} mm/s nearer", speed * 1e3)),
+            percept.approach_speed.map(|speed| format!("{:+.0} mm/s nearer", (speed * 1e3).round() + 0.0)),
         ]
     } else {
         let force = percept.shear_vector.map(|force| force.iter().map(|x| x * x).sum::<f64>().sqrt());
