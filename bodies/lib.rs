@@ -11,11 +11,18 @@ pub const MAT: &[u8] = include_bytes!("mat.glb");
 /// A humanoid of a small child's shape with 960 taxels, skinned to 17 links.
 pub const HUMANOID: &[u8] = include_bytes!("humanoid.glb");
 
+/// [`HAND`] with more senses: three-axis taxels in its fingers, temperature and proximity in its palm.
+pub const SENSING_HAND: &[u8] = include_bytes!("sensing-hand.glb");
+
 /// Some seconds of touch on [`HAND`], as CSV. It is computed, not measured.
 pub const TOUCH: &[u8] = include_bytes!("touch.csv");
 
+/// Another hand comes near [`SENSING_HAND`], warms and presses its palm, then drags its index finger; as CSV, in N, °C and mm. It is
+/// computed, not measured.
+pub const MEETING: &[u8] = include_bytes!("meeting.csv");
+
 /// What the bundled bodies are called.
-pub const BODIES: [&str; 3] = ["hand", "mat", "humanoid"];
+pub const BODIES: [&str; 4] = ["hand", "mat", "humanoid", "sensing-hand"];
 
 /// The bundled body called `name`, one of [`BODIES`].
 #[must_use]
@@ -24,6 +31,7 @@ pub fn body(name: &str) -> Option<&'static [u8]> {
         "hand" => Some(HAND),
         "mat" => Some(MAT),
         "humanoid" => Some(HUMANOID),
+        "sensing-hand" => Some(SENSING_HAND),
         _ => None,
     }
 }

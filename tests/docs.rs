@@ -1,6 +1,9 @@
 //! Every command that the documentation shows is run, as written, in a folder with what a reader would have there.
 #![cfg(feature = "cli")]
 
+#[path = "docs/table.rs"]
+mod table;
+
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

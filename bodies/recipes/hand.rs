@@ -25,6 +25,19 @@ const BACK_CHANNEL: u32 = 16;
 const SIDE_CHANNELS: [u32; 2] = [BACK_CHANNEL + 9, BACK_CHANNEL + 10];
 const MIDHAND_CHANNEL: u32 = 32;
 
+/// Which sensors a hand has.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Senses {
+    /// 40 force-sensing resistors.
+    Pressure,
+    /// Those of the fingers measure along three axes; the palm has nine thermometers and four distance sensors between its own.
+    All,
+}
+
+/// Ids of the first thermometer and of the first distance sensor.
+pub(crate) const THERMOMETERS: u32 = 64;
+pub(crate) const DISTANCES: u32 = 80;
+
 /// The hand as a file, and its sensors.
 pub(crate) struct Hand {
     pub(crate) glb: Glb,
@@ -39,6 +52,9 @@ pub(crate) struct Sensor {
     pub(crate) field: &'static str,
     pub(crate) position_in_hand: DVec3,
     pub(crate) normal: DVec3,
+    pub(crate) modality: Modality,
+    /// Of one with three axes.
+    pub(crate) tangent: Option<DVec3>,
 }
 
 /// A finger: where it leaves the palm, its axes, and how long it is beside the others.
@@ -169,17 +185,51 @@ fn taxels(sensors: &[Sensor], origin_in_hand: DVec3) -> Vec<Taxel> {
             position_in_link: sensor.position_in_hand - origin_in_hand,
             normal_in_link: sensor.normal,
             area: std::f64::consts::PI * SENSOR_RADIUS * SENSOR_RADIUS,
-            modality: Modality::Pressure,
-            tangent_in_link: None,
+            modality: sensor.modality,
+            tangent_in_link: sensor.tangent,
         })
         .collect()
 }
 
+/// Gives the sensors of fingers three axes: along the finger, and across it.
+fn pull(sensors: &mut [Sensor], links: &[(usize, Finger)]) {
+    for (five, (_, finger)) in sensors.chunks_mut(5).zip(links) {
+        for sensor in five {
+            sensor.modality = Modality::Force3;
+            let forward = finger.forward - sensor.normal * finger.forward.dot(sensor.normal);
+            sensor.tangent = Some(forward.normalize());
+        }
+    }
+}
+
+/// The palm's thermometers, a third of a pitch from its nine pressure sensors, and a distance sensor between each four of these.
+fn palm_senses(mesh: &MeshData) -> Vec<Sensor> {
+    let sensor = |id: u32, modality, inside: DVec3| {
+        let (position_in_hand, normal) =
+            exit_point(mesh, inside, DVec3::NEG_Y).expect("the palm surrounds its middle plane");
+        Sensor { id, field: "hand/palm", position_in_hand, normal, modality, tangent: None }
+    };
+    let place = |row: f64, column: f64| DVec3::new(PITCH[0] * (1.0 - column), 0.0, PITCH[1] * (1.0 - row));
+    let thermometer = |i: u32| {
+        let inside = place(f64::from(i / 3), f64::from(i % 3)) + DVec3::Z * (PITCH[1] / 3.0);
+        sensor(THERMOMETERS + i, Modality::Temperature, inside)
+    };
+    let distance =
+        |i: u32| sensor(DISTANCES + i, Modality::Proximity, place(f64::from(i / 2) + 0.5, f64::from(i % 2) + 0.5));
+    (0..9).map(thermometer).chain((0..4).map(distance)).collect()
+}
+
 /// Makes the hand.
-pub(crate) fn make() -> Hand {
+pub(crate) fn make(senses: Senses) -> Hand {
     let mut glb = Glb::new();
     glb.describe(&BTreeMap::from([
-        ("title", "A right hand with 40 force-sensing resistors"),
+        (
+            "title",
+            match senses {
+                Senses::Pressure => "A right hand with 40 force-sensing resistors",
+                Senses::All => "A right hand that feels force along three axes, temperature and distance",
+            },
+        ),
         ("after", "Stiehl, Lalla, Breazeal: Applying a \"Somatic Alphabet\" Approach, section III"),
         ("taxel_id", "channel of the mid-hand processing board, 0-63"),
     ]));
@@ -195,6 +245,8 @@ pub(crate) fn make() -> Hand {
             field,
             position_in_hand: origin + position,
             normal,
+            modality: Modality::Pressure,
+            tangent: None,
         }));
     };
     let nine = |first: u32| (first..first + 9).collect::<Vec<u32>>();
@@ -211,7 +263,12 @@ pub(crate) fn make() -> Hand {
         links.push((node, finger));
     }
 
-    let (boards, digits) = sensors.split_at(20);
+    if senses == Senses::All {
+        pull(&mut sensors[20..], &links);
+        let more = palm_senses(&palm);
+        sensors.splice(20..20, more);
+    }
+    let (boards, digits) = sensors.split_at(sensors.len() - 20);
     glb.taxels("hand taxels", Some(hand), &taxels(boards, DVec3::ZERO), None);
     for ((node, finger), five) in links.iter().zip(digits.chunks(5)) {
         let name = format!("{} taxels", finger.link);
@@ -219,7 +276,8 @@ pub(crate) fn make() -> Hand {
     }
 
     glb.field(&field("hand", None, []), Some(hand), DVec3::ZERO);
-    glb.field(&field("hand/palm", Some("hand"), nine(0)), Some(hand), DVec3::NEG_Y * PALM.y);
+    let of_palm = boards.iter().filter(|sensor| sensor.field == "hand/palm").map(|sensor| sensor.id);
+    glb.field(&field("hand/palm", Some("hand"), of_palm), Some(hand), DVec3::NEG_Y * PALM.y);
     for (name, row, column) in
         [("radial_distal", 0, 0), ("ulnar_distal", 0, 1), ("radial_proximal", 1, 0), ("ulnar_proximal", 1, 1)]
     {

@@ -4,6 +4,7 @@ pub(crate) mod figure;
 pub(crate) mod hand;
 pub(crate) mod humanoid;
 pub(crate) mod mat;
+pub(crate) mod meeting;
 pub(crate) mod solid;
 pub(crate) mod touch;
 
@@ -17,10 +18,13 @@ use somatic::internal::field::TaxelGraph;
 
 /// Every file that the recipes make: its name in `bodies/`, and its bytes.
 pub(crate) fn files() -> Result<Vec<(&'static str, Vec<u8>)>> {
-    let hand = hand::make();
+    let hand = hand::make(hand::Senses::Pressure);
+    let sensing = hand::make(hand::Senses::All);
     Ok(vec![
         ("hand.glb", with_edges(hand.glb)?),
         ("touch.csv", touch::csv(&hand.sensors).into_bytes()),
+        ("sensing-hand.glb", with_edges(sensing.glb)?),
+        ("meeting.csv", meeting::csv(&sensing.sensors).into_bytes()),
         ("mat.glb", with_edges(mat::make())?),
         ("humanoid.glb", humanoid::make()?),
     ])

@@ -229,6 +229,7 @@ def calibrate(
     ids: str | None = None,
     frame_end: str | None = None,
     time: str | None = None,
+    map: str | None = None,
     gains_from: _native.Recording | _Path | None = None,
     calibration: _native.Calibration | None = None,
     stamp: float | None = None,
@@ -250,7 +251,7 @@ def calibrate(
     known, on
         The force of every press, such as '4.9N' or '500g', or of presses that follow each other, such as '1N,2N,5N'; and what they pressed on: each
         'taxel', or the 'field' of all together, which gives one scale. P is in newtons then. Several forces on taxels make curves.
-    rate_hz, wiring, live_rate_hz, board_rate_hz, columns, ids, frame_end, time
+    rate_hz, wiring, live_rate_hz, board_rate_hz, columns, ids, frame_end, time, map
         How the source is read: see docs/reference/scene.md.
     gains_from, calibration, stamp
         In the place of `source`, a recording of ordinary touches, from which gains and the layer's width are found, for the calibration that has
@@ -287,7 +288,7 @@ def calibrate(
     if gains_from is not None:
         if source is not None or calibration is None:
             raise UsageError("gains are added to a calibration: give gains_from= and calibration=, and no source")
-        text, made = _native._gains(body, gains_from, calibration, stamp, rate_hz, progress)
+        text, made = _native._gains(body, gains_from, calibration, stamp, rate_hz, map, progress)
     elif source is None or calibration is not None or stamp is not None:
         raise UsageError("give a source; calibration= and stamp= are for gains_from=")
     else:
@@ -305,6 +306,7 @@ def calibrate(
             "live_rate_hz": live_rate_hz,
             "board_rate_hz": board_rate_hz,
             "text": [columns, ids, frame_end, time],
+            "map": map,
         }
         text, made = _native._calibrate(body, source, asked, say)
     return Calibrated(json.loads(text), _native.Calibration(made, body))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -10,6 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ._errors import UnknownNameError
+
+
+def of_json(rows: str) -> Table:
+    """The table of a list of objects."""
+    return Table(json.loads(rows))
 
 
 class Table:

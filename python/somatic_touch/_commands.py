@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, TypedDict, Unpack
 
 import numpy as np
@@ -50,6 +51,8 @@ def info(
     map: str | None = None,
     threshold: str | None = None,
     shortest_s: float = 0.05,
+    contacts: bool | _Path = False,
+    force: bool = False,
 ) -> dict[str, Any]:
     """What is in the recording at `source`, as `somatic info` tells it.
 
@@ -57,7 +60,8 @@ def info(
     `topics` and `attached` too, of an export `unit` and `panels`; of a ROS 2 bag its `topics`. Where the body comes with it, `fields` has those
     that are touched, a dict each: `contacts`, the `longest` and the mean one, `stance` (s), `mean` and `peak` of the `quantity`, force or total,
     in `unit`. A contact begins over `threshold`, a force such as "20N" or a share of the peak such as "5%", ends at half of it, and lasts
-    `shortest_s` or more. The other keywords are those of `read`.
+    `shortest_s` or more. With `contacts` there is a `Table` of them too, a row each, as `contacts`; a path writes it there, a .csv, which is
+    replaced only with `force`. The other keywords are those of `read`.
 
     >>> import pathlib, tempfile
     >>> import somatic_touch as st
@@ -66,11 +70,25 @@ def info(
     >>> known = st.info(path)
     >>> known["kind"], known["frames"], known["duration"], [file["name"] for file in known["attached"]]
     ('MCAP', 280, 5.58, ['hand'])
+    >>> palm = [row for row in st.info(path, contacts=True)["contacts"] if row["field"] == "hand/palm"]
+    >>> [(row["contact"], row["whole"], row["total_peak"]) for row in palm]
+    [(1, True, 1099.0)]
     """
-    known: dict[str, Any] = json.loads(
-        _native._info(os.fspath(source), rate_hz, format, grid, pitch, unit, layout, map, threshold, shortest_s)
+    table = None if isinstance(contacts, bool) else contacts
+    is_asked = contacts is not False
+    told, rows = _native._info(
+        os.fspath(source), rate_hz, format, grid, pitch, unit, layout, map, threshold, shortest_s, is_asked, table, force
     )
+    known: dict[str, Any] = json.loads(told)
+    if rows is not None:
+        known["contacts"] = Table([_contact(row) for row in csv.DictReader(rows.splitlines())])
     return known
+
+
+def _contact(row: dict[str, str]) -> dict[str, Any]:
+    """A row of the table of contacts with numbers as such; what is blank is absent."""
+    others: dict[str, Callable[[str], Any]] = {"recording": str, "field": str, "unit": str, "contact": int, "whole": "true".__eq__}
+    return {name: others.get(name, float)(text) if text else None for name, text in row.items()}
 
 
 def inspect(
@@ -177,7 +195,7 @@ def bench(
     engine = _native.Engine(body, scene, calibration, backend, batch=frames)
     fields = body.fields
     members = sum(len(fields[name]) for name in engine.fields if name in fields)
-    values = np.random.default_rng(1).uniform(1, 1000, (frames, len(body.taxels))).astype(np.float32)
+    values = np.random.default_rng(1).uniform(1, 1000, (frames, len(engine.channels))).astype(np.float32)
     times = np.arange(frames) * 0.01
     took: list[float] = []
     start = time.perf_counter()
@@ -199,12 +217,13 @@ def plot(
     *,
     outputs: Sequence[str] = (),
     fields: str | Sequence[str] = (),
+    calibration: _native.Calibration | None = None,
     force: bool = False,
     **reading: Unpack[_Reading],
 ) -> None:
     """Draws recordings side by side into `path`, a .svg or .png, as `somatic plot` does: quantities over time, and the highest pressures.
 
-    `outputs` are drawn over time in the place of load and area; `fields` are globs. Other keywords, such as `body`, `from_s` and `to_s`, are those
+    `outputs` are drawn over time in the place of load and area; `fields` are globs; `calibration` is laid over the recordings' own. Other keywords, such as `body`, `from_s` and `to_s`, are those
     of `read`, for recordings that are paths. `Percepts.plot` draws on matplotlib's axes.
 
     >>> import pathlib, tempfile
@@ -216,7 +235,7 @@ def plot(
     """
     several = [recordings] if isinstance(recordings, str | os.PathLike | _native.Recording) else recordings
     read = [one if isinstance(one, _native.Recording) else _native.read(one, **reading) for one in several]
-    _native._plot(read, path, list(outputs), [fields] if isinstance(fields, str) else list(fields), force)
+    _native._plot(read, path, list(outputs), [fields] if isinstance(fields, str) else list(fields), calibration, force)
 
 
 for _public in (Compared, info, inspect, compare, outputs, plan, bench, plot):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import re
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._channels import called, in_frames
 from ._errors import InputError, SomaticError, UsageError
 
 # By how much a second is more than one of these. Seconds have no ending, as most datasets of times.
@@ -34,7 +36,7 @@ def read(
     try:
         with h5py.File(path, "r") as file:
             found = _datasets(file, h5py)
-            values = _frames(path, found, dataset)
+            values, shape = _frames(path, found, dataset)
             t = _times(path, found, time, rate_hz, len(values))
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file or directory", path) from error
@@ -47,9 +49,9 @@ def read(
     start = t[0] if len(t) else 0.0
     kept = (t - start >= (0 if from_s is None else from_s)) & (t - start <= (np.inf if to_s is None else to_s))
     whole = slice(None) if from_s is None and to_s is None else kept
-    taxels = _taxels(path, values.shape[1], body)
+    channels = _channels(path, shape, body)
     made: _native.Recording = _native.Recording._of_parts(  # type: ignore[attr-defined]
-        path, taxels, t[whole], np.ascontiguousarray(values[whole]), {}, body, None, False, []
+        path, channels, t[whole], np.ascontiguousarray(values[whole]), {}, body, None, False, []
     )
     return made
 
@@ -72,8 +74,8 @@ def _listed(found: dict[str, Any]) -> str:
     return (", ".join(words[:_LISTED]) + more) or "none of numbers"
 
 
-def _frames(path: str, found: dict[str, Any], wanted: str | None) -> npt.NDArray[np.float32]:
-    """The values, [frames, taxels]; frames of several dimensions row by row."""
+def _frames(path: str, found: dict[str, Any], wanted: str | None) -> tuple[npt.NDArray[np.float32], tuple[int, ...]]:
+    """The values, [frames, values], of several dimensions row by row; and the shape of a frame."""
     if wanted is None:
         many = [name for name, thing in found.items() if thing.ndim > 1]
         if len(many) != 1:
@@ -83,7 +85,8 @@ def _frames(path: str, found: dict[str, Any], wanted: str | None) -> npt.NDArray
     if thing is None:
         raise UsageError(f"{path}: there is no dataset `{wanted}`; there are {_listed(found)}", path)
     values = np.asarray(thing[()], np.float32)
-    return values.reshape(len(values), -1) if values.ndim > 1 else values[:, None]
+    shape = values.shape[1:] or (1,)
+    return values.reshape(len(values), math.prod(shape)), shape
 
 
 def _times(path: str, found: dict[str, Any], wanted: str | None, rate_hz: float | None, frames: int) -> npt.NDArray[np.float64]:
@@ -117,10 +120,10 @@ def _a_second(name: str, thing: Any) -> float:
     return next((_UNITS[word] for word in words if word in _UNITS), 1)
 
 
-def _taxels(path: str, width: int, body: _native.Body | None) -> list[int]:
-    if body is None:
-        return list(range(width))
-    ids: list[int] = sorted(body.taxels["id"].tolist())
-    if len(ids) != width:
-        raise UsageError(f"{path}: a frame has {width} values, and body `{body.name}` has {len(ids)} taxels; give the body of this sensor", path)
-    return ids
+def _channels(path: str, shape: tuple[int, ...], body: _native.Body | None) -> list[str]:
+    names = in_frames(shape, body)
+    if names is None:
+        assert body is not None
+        what = f"a frame has {math.prod(shape)} values, and body `{body.name}` has {called(body)}"
+        raise UsageError(f"{path}: {what}; give the body of this sensor", path)
+    return names

@@ -93,7 +93,7 @@ def recording(read: _native.Recording) -> str:
     rows: list[list[object]] = [
         ["frames", len(read)],
         ["rate", f"{_number(1 / float(np.median(steps)))} Hz" if len(steps) else "unknown"],
-        ["taxels", len(read.taxels)],
+        ["taxels", len(set(read.taxels))],
         ["missing values", f"{_number(100 * float(read.mask.mean()))} %" if read.mask.size else "none"],
         ["links with poses", ", ".join(read.pose) or "none"],
         ["body", read.body if read.body is not None else "none; read it with body="],

@@ -34,7 +34,7 @@ class Job:
     ) -> Job:
         """What the keywords of `percepts` say."""
         if isinstance(body, str):
-            names: list[Any] = ["hand", "mat", "humanoid"]
+            names: list[Any] = ["hand", "sensing-hand", "mat", "humanoid"]
             body = _native.Body.bundled(body) if body in names else _native.Body.load(body)  # type: ignore[arg-type]
         if isinstance(calibration, _native.Calibration):
             calibration = calibration.text

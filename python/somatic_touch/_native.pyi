@@ -1,10 +1,12 @@
 import datetime
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, Never, TypeAlias, TypedDict, TypeVar, final, overload
 
 import numpy as np
 import numpy.typing as npt
+
+from ._columns import Table
 
 __all__ = [
     "Body",
@@ -58,8 +60,12 @@ _Doubles: TypeAlias = npt.NDArray[np.float64]
 _Joints: TypeAlias = dict[str, npt.ArrayLike]
 _Time: TypeAlias = float | datetime.datetime | np.datetime64
 _Times: TypeAlias = npt.ArrayLike | Sequence[datetime.datetime]
-_ById: TypeAlias = dict[int, float] | dict[int, float | None]
-_Frames: TypeAlias = npt.ArrayLike | list[dict[int, float]] | list[dict[int, float | None]]
+_Value: TypeAlias = float | None | Sequence[float | None] | npt.NDArray[Any]
+_ById: TypeAlias = Mapping[int, _Value] | Mapping[str, _Value] | Mapping[int | str, _Value]
+_Frames: TypeAlias = npt.ArrayLike | Sequence[_ById]
+_Letter: TypeAlias = Literal["sustained", "change", "shear", "temperature", "proximity"]
+_Modality: TypeAlias = Literal["pressure", "force3", "temperature", "proximity"]
+_Taxels: TypeAlias = Sequence[int] | Sequence[str] | Sequence[int | str] | npt.NDArray[np.integer[Any]]
 _Surface: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 _Progress: TypeAlias = bool | Callable[[int], object]
 
@@ -93,7 +99,7 @@ class Body:
     @staticmethod
     def load(path: _Path) -> Body: ...
     @staticmethod
-    def bundled(name: Literal["hand", "mat", "humanoid"]) -> Body: ...
+    def bundled(name: Literal["hand", "sensing-hand", "mat", "humanoid"]) -> Body: ...
     @staticmethod
     def grid(
         rows: int,
@@ -117,6 +123,8 @@ class Body:
     @property
     def taxels(self) -> npt.NDArray[np.void]: ...
     @property
+    def channels(self) -> list[str]: ...
+    @property
     def fields(self) -> dict[str, Field]: ...
     @property
     def triangles(self) -> _Doubles: ...
@@ -132,6 +140,8 @@ class Body:
         link: str | Sequence[str] | None = None,
         ids: Sequence[int] | npt.NDArray[np.integer[Any]] | None = None,
         areas: npt.ArrayLike | None = None,
+        modality: _Modality | Sequence[_Modality] | npt.NDArray[np.str_] | None = None,
+        tangents: npt.ArrayLike | None = None,
         surface: _Surface | dict[str, _Surface] | None = None,
         name: str = "skin",
     ) -> Body: ...
@@ -143,7 +153,9 @@ class Body:
         ax: Any = None,
         surface: bool = True,
         unit: str | None = None,
+        letter: Literal["sustained", "shear", "temperature", "proximity"] | None = None,
     ) -> Any: ...
+    def _at_rest(self, vectors: npt.ArrayLike) -> _Doubles: ...
     def _repr_html_(self) -> str: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -211,7 +223,7 @@ class Engine:
         calibration: Calibration | None = None,
         backend: _Backend | None = None,
         *,
-        taxels: Sequence[int] | npt.NDArray[np.integer[Any]] | None = None,
+        taxels: _Taxels | None = None,
         batch: int = 256,
     ) -> Engine: ...
     def process(
@@ -247,8 +259,13 @@ class Engine:
     def state(self) -> EngineState: ...
     def restore(self, state: EngineState) -> None: ...
     def plan(self) -> dict[str, Any]: ...
+    def columns(self, table: Literal["fields", "touches", "self_contacts"] = "fields") -> Table: ...
     @property
     def fields(self) -> list[str]: ...
+    @property
+    def letters(self) -> list[str]: ...
+    @property
+    def channels(self) -> list[str]: ...
     @property
     def outputs(self) -> list[str]: ...
     @property
@@ -279,7 +296,9 @@ class Percepts:
     @overload
     def get(self, name: str, default: _T) -> npt.NDArray[Any] | _T: ...
     def between(self, t0: _Time | None = None, t1: _Time | None = None) -> Percepts: ...
-    def select(self, fields: str | Sequence[str]) -> Percepts: ...
+    def select(
+        self, fields: str | Sequence[str] | None = None, *, letters: _Letter | Sequence[_Letter] | None = None
+    ) -> Percepts: ...
     def plot(
         self, output: str | None = None, *, fields: str | Sequence[str] | None = None, ax: Any = None
     ) -> Any: ...
@@ -304,6 +323,8 @@ class Percepts:
     def first_frame(self) -> int: ...
     @property
     def fields(self) -> list[str]: ...
+    @property
+    def letters(self) -> list[str]: ...
     @property
     def touches(self) -> Touches: ...
     @property
@@ -417,6 +438,8 @@ class Recording:
     @property
     def taxels(self) -> list[int]: ...
     @property
+    def channels(self) -> list[str]: ...
+    @property
     def pose(self) -> dict[str, npt.ArrayLike]: ...
     @property
     def body(self) -> Body | None: ...
@@ -445,6 +468,8 @@ class Parts:
     @property
     def taxels(self) -> list[int]: ...
     @property
+    def channels(self) -> list[str]: ...
+    @property
     def body(self) -> Body | None: ...
     @property
     def calibration(self) -> Calibration | None: ...
@@ -471,6 +496,10 @@ class Live:
     def body(self) -> Body: ...
     @property
     def taxels(self) -> list[int]: ...
+    @property
+    def channels(self) -> list[str]: ...
+    @property
+    def boards(self) -> Table: ...
     @property
     def fields(self) -> list[str]: ...
     @property
@@ -594,7 +623,7 @@ def run(
 ) -> _Ran: ...
 def metadata(path: _Path) -> dict[str, str]: ...
 def author(
-    shape: _Path | None = None,
+    shape: Body | _Path | None = None,
     recipe: _Path | None = None,
     *,
     taxels: int | None = None,
@@ -606,6 +635,7 @@ def author(
     hidden: Literal["drop", "keep"] | None = None,
     clear: str | None = None,
     mirror: Literal["y"] | None = None,
+    zones: _Path | dict[int, str] | None = None,
     up: Literal["y", "z"] | None = None,
     package: dict[str, _Path] | None = None,
     geometry: Literal["visual", "collision", "none"] | None = None,
@@ -653,6 +683,7 @@ def _gains(
     calibration: Calibration,
     stamp_m: float | None,
     rate_hz: float | None,
+    map: str | None,
     progress: bool | Callable[[float], object] | None,
 ) -> tuple[str, str]: ...
 def _live(scene: Scene | dict[str, Any] | _Path | None, keys: dict[str, Any]) -> Live: ...
@@ -667,12 +698,20 @@ def _info(
     map: str | None,
     threshold: str | None,
     shortest_s: float | None,
-) -> str: ...
+    contacts: bool,
+    table: _Path | None,
+    force: bool,
+) -> tuple[str, str | None]: ...
 def _inspect(
     body: Body, contact_tolerance_m: float | None, errors: bool, joints: _Path | None, up: str | None
 ) -> str: ...
 def _compare(first: Body, second: Body, touches: int) -> str: ...
 def _outputs() -> str: ...
 def _plot(
-    recordings: Sequence[Recording], to: _Path, outputs: Sequence[str], fields: Sequence[str], force: bool
+    recordings: Sequence[Recording],
+    to: _Path,
+    outputs: Sequence[str],
+    fields: Sequence[str],
+    calibration: Calibration | None,
+    force: bool,
 ) -> None: ...

@@ -85,11 +85,13 @@ def _finished(ax: Any, is_own: bool, label: str, quantity: str) -> Any:
 
 def percepts(p: _native.Percepts, output: str | None, fields: Any, ax: Any) -> Any:
     """See `Percepts.plot`."""
+    shown = p if fields is None else p.select(fields)
     if output is None:
-        output = next((name for name in ("force", "total", "peak", *p.keys()) if name in p), None)
+        names = [name for name in ("force", "total", "peak", *p.keys()) if name in p]
+        # Of one letter the columns of others are empty.
+        output = next((name for name in names if shown.present(name).any()), next(iter(names), None))
     if output is None:
         raise UsageError("these percepts have touches alone; see `.touches.plot()`")
-    shown = p if fields is None else p.select(fields)
     values, t, unit = shown[output], shown.t, shown.unit(output)
     there = shown.present(output)
     pressed = there & shown.contact
@@ -129,9 +131,11 @@ def touches(found: _native.Touches, quantity: str, ax: Any) -> Any:
     return _finished(ax, is_own, label, _named(quantity, found.unit(quantity)))
 
 
-def body(shape: _native.Body, values: Any, ax: Any, surface: bool, unit: str | None) -> Any:
+def body(shape: _native.Body, values: Any, ax: Any, surface: bool, unit: str | None, letter: str | None) -> Any:
     """See `Body.plot`."""
     taxels = shape.taxels
+    if letter is not None and letter not in _READS:
+        raise UsageError(f"there is no letter `{letter}` to plot; plot one of {', '.join(_READS)}")
     places: npt.NDArray[np.float64] = taxels["place"]
     ax, is_own = _axes(ax, (8, 6), projection="3d")
     if not hasattr(ax, "get_zlim"):
@@ -156,15 +160,7 @@ def body(shape: _native.Body, values: Any, ax: Any, surface: bool, unit: str | N
         if len(shape.links) > 1:
             _legend(ax, is_own)
     else:
-        values = np.asarray(values, np.float64)
-        if values.shape != (len(places),):
-            raise UsageError(f"values should have shape [taxels] = [{len(places)}], one a taxel by ascending id; this has shape {list(values.shape)}")
-        there = np.isfinite(values)
-        ax.scatter(*places[~there].T, s=10, facecolors="none", edgecolors="0.5", depthshade=False, zorder=2, label="no value")
-        points = ax.scatter(*places[there].T, s=12, c=values[there], cmap="viridis", depthshade=False, zorder=3)
-        ax.figure.colorbar(points, ax=ax, shrink=0.6, pad=0.12, label=unit or "")
-        if not there.all():
-            ax.legend(fontsize="small", loc="upper left")
+        _values(ax, shape, np.asarray(values, np.float64), unit, letter)
     if len(corners):
         low, high = corners.min(axis=0), corners.max(axis=0)
         # One scale for all axes; what is flat gets some room.
@@ -179,6 +175,67 @@ def body(shape: _native.Body, values: Any, ax: Any, surface: bool, unit: str | N
     ax.set_zlabel("z, up [m]", labelpad=10)
     ax.set_title(shape.name, fontsize="medium")
     return ax
+
+
+# The kinds of taxels that a letter reads.
+_READS = {
+    "sustained": ("pressure", "force3"),
+    "shear": ("force3",),
+    "temperature": ("temperature",),
+    "proximity": ("proximity",),
+}
+_COLORS = {"temperature": "RdBu_r", "proximity": "viridis_r"}
+# The longest arrow, as a share of the body.
+_LONGEST = 0.12
+
+
+def _values(ax: Any, shape: _native.Body, values: npt.NDArray[np.float64], unit: str | None, letter: str | None) -> None:
+    """A colour for each taxel that `letter` reads, and an arrow for the tangential part of three values."""
+    taxels = shape.taxels
+    places: npt.NDArray[np.float64] = taxels["place"]
+    modality = taxels["modality"]
+    if values.shape not in ((len(places),), (len(places), 3)):
+        what = f"values should have shape [taxels] = [{len(places)}] or [taxels, 3], by ascending id"
+        raise UsageError(f"{what}; this has shape {list(values.shape)}")
+    if letter is None:
+        one = [name for name, kinds in _READS.items() if name != "shear" and np.isin(modality, kinds).all()]
+        letter = one[0] if one else None
+    read = np.isin(modality, _READS[letter]) if letter else np.full(len(places), True)
+    if not read.any():
+        raise UsageError(f"no taxel of this body is of letter `{letter}`")
+    if not read.all():
+        ax.scatter(*places[~read].T, s=3, color="0.7", depthshade=False, zorder=2)
+    numbers = values if values.ndim == 1 else values[:, 0]
+    there = read & np.isfinite(numbers)
+    ax.scatter(*places[read & ~there].T, s=10, facecolors="none", edgecolors="0.5", depthshade=False, zorder=2, label="no value")
+    colors: dict[str, Any] = {"cmap": _COLORS.get(letter or "", "viridis")}
+    if letter == "temperature" and there.any():
+        middle = float(np.median(numbers[there]))
+        # At least a degree, so that noise is no picture.
+        reach = max(float(np.abs(numbers[there] - middle).max()), 0.5)
+        colors |= {"vmin": middle - reach, "vmax": middle + reach}
+    points = ax.scatter(*places[there].T, s=12, c=numbers[there], depthshade=False, zorder=3, **colors)
+    ax.figure.colorbar(points, ax=ax, shrink=0.6, pad=0.12, label=unit or "")
+    if not there[read].all():
+        ax.legend(fontsize="small", loc="upper left")
+    if values.ndim == 2:
+        _arrows(ax, shape, values, there & np.isfinite(values).all(axis=1) & (modality == "force3"))
+
+
+def _arrows(ax: Any, shape: _native.Body, values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_]) -> None:
+    """The tangential parts of forces, the largest as long as `_LONGEST` says."""
+    taxels = shape.taxels
+    if not there.any():
+        return
+    tangents = taxels["tangent"]
+    in_links = np.where(there[:, None], values[:, 1:2] * tangents + values[:, 2:3] * np.cross(taxels["normal"], tangents), 0.0)
+    forces = shape._at_rest(in_links)[there]
+    largest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    if largest == 0.0:
+        return
+    places = taxels["place"]
+    scale = _LONGEST * float(np.ptp(places, axis=0).max(initial=1e-3)) / largest
+    ax.quiver(*places[there].T, *(scale * forces).T, color="0.1", linewidth=1, arrow_length_ratio=0.3, zorder=4)
 
 
 def _ticks(axis: Any, middle: float, share: float) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-_COMPONENTS = {"position": "xyz", "normal": "xyz", "place": "xyz", "velocity": "xyz", "direction": "xyz"} | {
+_COMPONENTS = {"position": "xyz", "normal": "xyz", "place": "xyz", "velocity": "xyz", "direction": "xyz", "tangent": "xyz"} | {
     "force": "xyz",
     "torque": "xyz",
     "principal_axis": "xyz",

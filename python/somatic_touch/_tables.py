@@ -65,7 +65,7 @@ def _are_same_rows(a: Any, b: Any) -> bool:
 def are_same_recordings(a: _native.Recording, b: _native.Recording) -> bool:
     """Whether both have the same bits."""
     return (
-        a.taxels == b.taxels
+        a.channels == b.channels
         and a.losses == b.losses
         and a.body == b.body
         and a.calibration == b.calibration

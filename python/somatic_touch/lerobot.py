@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import Body, Calibration, Recording, Scene, UsageError
+from ._channels import called, in_frames
 from ._lerobot import PERCEPTS, Dataset, Numbers, Stats, copy_rest, stats, with_features, write_about
 
 __all__ = ["Episode", "add_percepts", "read"]
@@ -49,24 +50,22 @@ class Episode:
 def _body(body: Body | str | os.PathLike[str] | None) -> Body | None:
     if body is None or isinstance(body, Body):
         return body
-    names: list[Any] = ["hand", "mat", "humanoid"]
+    names: list[Any] = ["hand", "sensing-hand", "mat", "humanoid"]
     return Body.bundled(body) if body in names else Body.load(body)  # type: ignore[arg-type]
 
 
-def _taxels(dataset: Dataset, feature: str, body: Body | None) -> list[int]:
-    """The taxel of each value: the body's, ascending."""
-    width = dataset.width(feature)
-    if body is None:
-        return list(range(width))
-    ids: list[int] = sorted(body.taxels["id"].tolist())
-    if len(ids) != width:
-        what = f"`{feature}` has {width} values a frame, and body `{body.name}` has {len(ids)} taxels; give the body of this sensor"
+def _channels(dataset: Dataset, feature: str, body: Body | None) -> list[str]:
+    """The channel of each value: the body's, ascending."""
+    names = in_frames(tuple(dataset.features[feature]["shape"]), body)
+    if names is None:
+        assert body is not None
+        what = f"`{feature}` has {dataset.width(feature)} values a frame, and body `{body.name}` has {called(body)}; give the body of this sensor"
         raise UsageError(f"{dataset.root}: {what}", str(dataset.root))
-    return ids
+    return names
 
 
-def _recording(name: str, taxels: list[int], t: npt.NDArray[np.float64], values: Numbers, body: Body | None) -> Recording:
-    made: Recording = Recording._of_parts(name, taxels, t, np.ascontiguousarray(values), {}, body, None, False, [])  # type: ignore[attr-defined]
+def _recording(name: str, channels: list[str], t: npt.NDArray[np.float64], values: Numbers, body: Body | None) -> Recording:
+    made: Recording = Recording._of_parts(name, channels, t, np.ascontiguousarray(values), {}, body, None, False, [])  # type: ignore[attr-defined]
     return made
 
 
@@ -80,7 +79,8 @@ def read(
     """The episodes of the dataset in the folder `path`, each as a recording; all of them, or those with the numbers `episodes`.
 
     `feature` is that of touch, such as "observation.tactile"; without it, the only one that looks like touch. A feature of several
-    dimensions is read row by row; `body` has a taxel for each value, in ascending order of ids. An engine of a recording begins anew, so
+    dimensions is read row by row; `body` has a taxel for each value, in ascending order of ids, or a taxel with three axes for each three
+    of the last dimension. An engine of a recording begins anew, so
     that identities of touches end with their episode.
 
     >>> import somatic_touch.lerobot
@@ -91,7 +91,7 @@ def read(
     """
     dataset = Dataset(path)
     name, skin = dataset.feature(feature), _body(body)
-    taxels, about = _taxels(dataset, name, skin), dataset.about_episodes()
+    channels, about = _channels(dataset, name, skin), dataset.about_episodes()
     wanted = None if episodes is None else [episodes] if isinstance(episodes, int) else sorted(set(episodes))
     joints = dataset.names(_STATE) if _STATE in dataset.features and _STATE != name else None
     columns = [name, "timestamp", "episode_index", *([_STATE] if joints else [])]
@@ -104,7 +104,7 @@ def read(
         values, t = dataset.numbers(file, table, name), dataset.times(file, table)
         states = dataset.numbers(file, table, _STATE).astype(np.float64) if joints else None
         for index, rows in dataset.parts(file, table):
-            recording = _recording(f"{dataset.root}#{index}", taxels, t[rows], values[rows], skin)
+            recording = _recording(f"{dataset.root}#{index}", channels, t[rows], values[rows], skin)
             placed = {} if states is None or joints is None else {joint: states[rows, at] for at, joint in enumerate(joints)}
             found.append(Episode(index, name, recording, placed, list(about.get(index, {}).get("tasks") or [])))
     missing = set(wanted or ()) - {episode.index for episode in found}
@@ -134,7 +134,7 @@ def add_percepts(
     """
     dataset, target = Dataset(path), pathlib.Path(out)
     name, skin = dataset.feature(feature), _body(body)
-    taxels = _taxels(dataset, name, skin)
+    channels = _channels(dataset, name, skin)
     asked = [outputs] if isinstance(outputs, str) else list(outputs)
     if any(output.split(".")[0] in ("touches", "self_contacts") for output in asked):
         raise UsageError("outputs: touches come and go, and a feature has a value in every frame; name outputs of fields, such as `total`")
@@ -148,7 +148,7 @@ def add_percepts(
             values, t = dataset.numbers(file, table, name), dataset.times(file, table)
             columns: dict[str, list[Numbers]] = {}
             for index, rows in dataset.parts(file, table):
-                recording = _recording(f"{dataset.root}#{index}", taxels, t[rows], values[rows], skin)
+                recording = _recording(f"{dataset.root}#{index}", channels, t[rows], values[rows], skin)
                 if engine is None or start is None:
                     engine = recording.engine(scene, calibration, backend)
                     start = engine.state()

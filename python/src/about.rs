@@ -10,13 +10,14 @@ use somatic::body::Up;
 use somatic::field::FieldSet;
 use somatic::internal::author::{DrawnPoses, lint_with_progress};
 use somatic::internal::contents::{
-    Contacts, Contents, FoundContacts, Quantity, Rule, Threshold, bag_as_json, of_fields, of_touches,
+    ContactTable, Contacts, Contents, FoundContacts, Quantity, Rule, Threshold, bag_as_json, of_fields, of_touches,
 };
 use somatic::internal::expected::{TestTouches, compare_layouts, expected_and_ideal_errors};
 use somatic::internal::field::{ContactTolerance, TaxelGraph, rest_overlaps};
 use somatic::internal::recording::BagSurvey;
 use somatic::internal::robot::drawn_poses;
 use somatic::internal::setup::{Tell, open_mapped, source_of};
+use somatic::output::OutputPaths;
 use somatic::recording::Reader;
 use somatic::robot::Kinematics;
 use somatic::source::{CsvSource, Source, SourceSpec, VendorOptions, VendorSource};
@@ -62,7 +63,13 @@ fn of_mcap(path: &Path, known: &mut Contents, rule: Rule, raised: &mut Option<Py
     }
 }
 
-fn known(text: &str, options: &VendorOptions, rule: Rule, raised: &mut Option<PyErr>) -> Result<Value> {
+/// What is in the recording called `text`, and the rows of a table of its contacts, if it has its body.
+fn known(
+    text: &str,
+    options: &VendorOptions,
+    rule: Rule,
+    raised: &mut Option<PyErr>,
+) -> Result<(Value, Option<String>)> {
     let mapped = options.map.is_some();
     let kinds: &[&str] =
         if mapped { &["ndjson", "mcap", "ros2-mcap"] } else { &["csv", "mcap", "ros2-mcap", "export"] };
@@ -79,7 +86,7 @@ fn known(text: &str, options: &VendorOptions, rule: Rule, raised: &mut Option<Py
         SourceSpec::Ros2Mcap(bag) => {
             let mut survey = BagSurvey::read(&bag.path, |_| {})?;
             survey.topics.retain(|topic| bag.topics.is_empty() || bag.topics.contains(&topic.name));
-            return Ok(bag_as_json(&survey));
+            return Ok((bag_as_json(&survey), None));
         }
         SourceSpec::Vendor(path) => {
             let mut source = VendorSource::open(path, options)?;
@@ -96,11 +103,17 @@ fn known(text: &str, options: &VendorOptions, rule: Rule, raised: &mut Option<Py
             (of_frames("CSV", path, &mut CsvSource::open(path, options.rate_hz)?, None, raised)?, None)
         }
     };
-    Ok(known.map_or(Value::Null, |known| {
+    let json = known.map_or(Value::Null, |known| {
         let mut json = known.as_json();
-        json["fields"] = contacts.map_or(Value::Null, |contacts| contacts.as_json().into());
+        json["fields"] = contacts.as_ref().map_or(Value::Null, |contacts| contacts.as_json().into());
         json
-    }))
+    });
+    let table = |contacts: FoundContacts| {
+        let mut table = ContactTable::new()?;
+        table.add(text, &contacts)?;
+        String::from_utf8(table.into_bytes()?).map_err(|e| Error::failed(e.to_string()))
+    };
+    Ok((json, contacts.map(table).transpose()?))
 }
 
 #[pyfunction]
@@ -118,14 +131,32 @@ pub(crate) fn info(
     map: Option<&str>,
     threshold: Option<&str>,
     shortest_s: Option<f64>,
-) -> PyResult<String> {
+    contacts: bool,
+    table: Option<PathBuf>,
+    force: bool,
+) -> PyResult<(String, Option<String>)> {
+    let read = source.split_once(':').map_or(source, |(_, path)| path);
+    let reads = [Some(source.into()), Some(read.into()), layout.clone()];
+    let mut outputs = OutputPaths::new(force, reads.into_iter().flatten().collect::<Vec<PathBuf>>());
+    let output = table.map(|table| outputs.add(&table)).transpose().or_raise(py)?;
     let keys = Keys { rate_hz, format, grid, pitch, unit, layout, map, ..Keys::default() };
     let options = keys.options().or_raise(py)?;
     let threshold = threshold.map(str::parse::<Threshold>).transpose().or_raise(py)?;
     let rule = Rule { threshold, shortest_s: shortest_s.unwrap_or(Rule::default().shortest_s) };
     let mut raised = None;
-    let known = free(py, || known(source, &options, rule, &mut raised)).or_raise_of(py, Path::new(source))?;
-    if raised.is_some() { Err(interrupted(raised)) } else { Ok(known.to_string()) }
+    let (known, rows) = free(py, || known(source, &options, rule, &mut raised)).or_raise_of(py, Path::new(source))?;
+    if raised.is_some() {
+        return Err(interrupted(raised));
+    }
+    if contacts && rows.is_none() {
+        let what = "it has no body, which contacts need; convert it with one: convert(source, \"OUT.mcap\", body=BODY)";
+        return Err(usage(py, format!("{source}: {what}")));
+    }
+    if let (Some(output), Some(rows)) = (output, &rows) {
+        let path = output.name().to_owned();
+        output.write(rows.as_bytes()).or_raise_of(py, &path)?;
+    }
+    Ok((known.to_string(), rows.filter(|_| contacts)))
 }
 
 #[pyfunction]

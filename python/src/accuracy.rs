@@ -10,6 +10,7 @@ use somatic::internal::gains::GainsSurvey;
 use somatic::internal::run::{Arrival, Feed, ReadMode};
 use somatic::internal::setup::bodies::in_body;
 use somatic::internal::signal::UnitOfP;
+use somatic::internal::source::ArrayMap;
 use somatic::internal::survey::gains::{layer_under, with_gains};
 use somatic::internal::survey::known::{KnownForces, PressedOn};
 use somatic::internal::survey::{Findings, Survey, Wishes};
@@ -143,6 +144,7 @@ pub(crate) struct Asked {
     live_rate_hz: Option<f64>,
     board_rate_hz: Option<f64>,
     text: [Option<String>; 4],
+    map: Option<String>,
 }
 
 impl Asked {
@@ -150,7 +152,8 @@ impl Asked {
         let [columns, ids, frame_end, time] = self.text.clone();
         let mut keys = TextKeys::default();
         (keys.columns, keys.ids, keys.frame_end, keys.time) = (columns, ids, frame_end, time);
-        Ok(VendorOptions { rate_hz: self.rate_hz, text: keys.options()?, ..VendorOptions::default() })
+        let map = self.map.as_deref().map(ArrayMap::named).transpose().map_err(|e| e.at("map"))?;
+        Ok(VendorOptions { rate_hz: self.rate_hz, text: keys.options()?, map, ..VendorOptions::default() })
     }
 
     fn lines(&self) -> LineKeys {
@@ -330,10 +333,12 @@ pub(crate) fn gains(
     calibration: &PyCalibration,
     stamp_m: Option<f64>,
     rate_hz: Option<f64>,
+    map: Option<&str>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, String)> {
     let ids = body.ids();
-    let options = VendorOptions { rate_hz, ..VendorOptions::default() };
+    let map = map.map(ArrayMap::named).transpose().map_err(|e| e.at("map")).or_raise(py)?;
+    let options = VendorOptions { rate_hz, map, ..VendorOptions::default() };
     let OpenSource { mut source, is_live, .. } = OpenSource::new(py, source, &ids, &LineKeys::default(), &options)?;
     if is_live {
         return Err(usage(py, "gains are found from a recording; record what is live first"));

@@ -13,11 +13,23 @@ use somatic::internal::error::suggestion;
 use crate::arrays::{doubles, shown, vectors};
 use crate::error::{unknown_name, usage};
 
-/// The link of all taxels, or of each.
+/// A name for all taxels, or for each.
 #[derive(FromPyObject)]
-pub(crate) enum LinkNames {
+pub(crate) enum Names {
     One(String),
     Each(Vec<String>),
+}
+
+/// What a body is made of, by taxel, with its surfaces.
+pub(crate) struct Arrays<'a, 'py> {
+    pub(crate) positions: &'a Bound<'py, PyAny>,
+    pub(crate) normals: &'a Bound<'py, PyAny>,
+    pub(crate) link: Option<Names>,
+    pub(crate) ids: Option<Vec<u32>>,
+    pub(crate) areas: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) modality: Option<Names>,
+    pub(crate) tangents: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) surface: Option<&'a Bound<'py, PyAny>>,
 }
 
 /// Taxels and surfaces by link.
@@ -26,63 +38,106 @@ pub(crate) struct ArrayBody {
     meshes: BTreeMap<String, MeshData>,
 }
 
-impl ArrayBody {
-    pub(crate) fn new(
-        py: Python<'_>,
-        [positions, normals]: [&Bound<'_, PyAny>; 2],
-        link: Option<LinkNames>,
-        ids: Option<Vec<u32>>,
-        areas: Option<&Bound<'_, PyAny>>,
-        surface: Option<&Bound<'_, PyAny>>,
-        name: &str,
-    ) -> PyResult<Self> {
-        let (positions, normals) = (vectors(positions, "positions")?, vectors(normals, "normals")?);
+impl Arrays<'_, '_> {
+    /// The body called `name`.
+    pub(crate) fn body(self, py: Python<'_>, name: &str) -> PyResult<ArrayBody> {
+        let (positions, normals) = (vectors(self.positions, "positions")?, vectors(self.normals, "normals")?);
         let count = positions.len();
-        let as_many = |what: &str, given: usize| match given == count {
-            true => Ok(()),
-            false => Err(usage(py, format!("{what} should be one a taxel, {count}; there are {given}"))),
-        };
         if count == 0 {
             return Err(usage(py, "positions has no rows; a body has a taxel at least"));
         }
-        as_many("normals", normals.len())?;
+        as_many(py, "normals", normals.len(), count)?;
         check_rows(py, &positions, &normals)?;
-        let ids = ids.unwrap_or_else(|| (0..count as u32).collect());
-        as_many("ids", ids.len())?;
+        let ids = self.ids.unwrap_or_else(|| (0..count as u32).collect());
+        as_many(py, "ids", ids.len(), count)?;
         let mut seen = BTreeSet::new();
         if let Some(id) = ids.iter().find(|id| !seen.insert(**id) || **id > MAX_TAXEL_ID) {
             let what = if *id > MAX_TAXEL_ID { format!("is over {MAX_TAXEL_ID}") } else { "is there twice".to_owned() };
             return Err(usage(py, format!("ids: {id} {what}")));
         }
-        let areas = areas_of(py, areas, count)?;
-        let names = match link {
-            None => vec![name.to_owned(); count],
-            Some(LinkNames::One(link)) => vec![link; count],
-            Some(LinkNames::Each(links)) => {
-                as_many("link", links.len())?;
-                links
-            }
-        };
+        let areas = areas_of(py, self.areas, count)?;
+        let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize).collect();
+        let modalities = modalities_of(py, self.modality, count)?;
+        let tangents = tangents_of(py, self.tangents, &modalities, &normals)?;
+        let names = names_of(py, "link", self.link, name, count)?;
         let mut links: Vec<(String, Vec<Taxel>)> = Vec::new();
         for (row, link) in names.into_iter().enumerate() {
             let taxel = Taxel {
                 id: ids[row],
                 link: 0,
                 position_in_link: positions[row],
-                normal_in_link: normals[row].normalize(),
+                normal_in_link: normals[row],
                 area: areas[row],
-                modality: Modality::Pressure,
-                tangent_in_link: None,
+                modality: modalities[row],
+                tangent_in_link: tangents[row],
             };
             match links.iter_mut().find(|(known, _)| *known == link) {
                 Some((_, taxels)) => taxels.push(taxel),
                 None => links.push((link, vec![taxel])),
             }
         }
-        let meshes = surface.map_or(Ok(BTreeMap::new()), |surface| meshes_of(surface, &links))?;
-        Ok(Self { links, meshes })
+        let meshes = self.surface.map_or(Ok(BTreeMap::new()), |surface| meshes_of(surface, &links))?;
+        Ok(ArrayBody { links, meshes })
     }
+}
 
+/// Refuses as many of `what` as `given`, if taxels are not so many.
+fn as_many(py: Python<'_>, what: &str, given: usize, taxels: usize) -> PyResult<()> {
+    match given == taxels {
+        true => Ok(()),
+        false => Err(usage(py, format!("{what} should be one a taxel, {taxels}; there are {given}"))),
+    }
+}
+
+/// The names in `given`, called `what`, by taxel.
+fn names_of(py: Python<'_>, what: &str, given: Option<Names>, usual: &str, count: usize) -> PyResult<Vec<String>> {
+    match given {
+        None => Ok(vec![usual.to_owned(); count]),
+        Some(Names::One(name)) => Ok(vec![name; count]),
+        Some(Names::Each(names)) => as_many(py, what, names.len(), count).map(|()| names),
+    }
+}
+
+/// What each taxel measures.
+fn modalities_of(py: Python<'_>, given: Option<Names>, count: usize) -> PyResult<Vec<Modality>> {
+    let names = names_of(py, "modality", given, &Modality::Pressure.name(), count)?;
+    let modality = |name: String| {
+        let code = Modality::names().position(|known| known == name);
+        code.map(|code| Modality::from_code(code as u32)).ok_or_else(|| {
+            let near = suggestion(&name, Modality::names());
+            unknown_name(py, format!("modality: there is no `{name}`; {near}"))
+        })
+    };
+    names.into_iter().map(modality).collect()
+}
+
+/// The tangents of taxels that measure `modalities`, those that are given.
+fn tangents_of(
+    py: Python<'_>,
+    given: Option<&Bound<'_, PyAny>>,
+    modalities: &[Modality],
+    normals: &[DVec3],
+) -> PyResult<Vec<Option<DVec3>>> {
+    let Some(given) = given else { return Ok(vec![None; normals.len()]) };
+    let given = vectors(given, "tangents")?;
+    as_many(py, "tangents", given.len(), normals.len())?;
+    let tangent = |(row, tangent): (usize, DVec3)| {
+        if tangent.is_nan() {
+            return Ok(None);
+        }
+        if modalities[row] != Modality::Force3 {
+            let what = format!("row {row} has a tangent and is of {}; give NaN there", modalities[row].name());
+            return Err(usage(py, format!("tangents: {what}")));
+        }
+        let across = tangent.try_normalize().map(|tangent| tangent.reject_from(normals[row]));
+        across.filter(|across| across.length() > 1e-3).and_then(DVec3::try_normalize).map(Some).ok_or_else(|| {
+            usage(py, format!("the tangent of row {row} has no direction across its normal; give another, or NaN"))
+        })
+    };
+    given.into_iter().enumerate().map(tangent).collect()
+}
+
+impl ArrayBody {
     /// It as a file called `name`, with the fields that authoring makes.
     pub(crate) fn to_glb(&self, name: &str) -> somatic::Result<Vec<u8>> {
         let mut glb = Glb::new();

@@ -1,49 +1,28 @@
 //! Arrays in and out: what Python gives, as slices, and what the library has, as NumPy's arrays.
 
-use std::collections::HashMap;
-
 use glam::{DQuat, DVec3};
 use numpy::ndarray::{ArrayD, IxDyn};
-use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyDictMethods, PyList, PyTuple};
-use somatic::RawValue;
+use pyo3::types::{PyDict, PyDictMethods, PyList};
 use somatic::signal::Pose;
 
-use crate::error::{unknown_name, usage};
+use crate::error::usage;
 use crate::stream::in_python;
 
 static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 
 /// NumPy's view of anything.
-fn as_array<'py>(any: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn as_array<'py>(any: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     ASARRAY.import(any.py(), "numpy", "asarray")?.call1((any,))
 }
 
 /// In C order, aligned, in the machine's byte order.
-fn contiguous<'py>(any: &Bound<'py, PyAny>, dtype: &str) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn contiguous<'py>(any: &Bound<'py, PyAny>, dtype: &str) -> PyResult<Bound<'py, PyAny>> {
     REQUIRE.import(any.py(), "numpy", "require")?.call1((any, dtype, ["C", "A"]))
-}
-
-/// The raw values of some frames.
-pub(crate) enum Values<'py> {
-    /// Where Python has them.
-    Borrowed(PyReadonlyArrayDyn<'py, f32>),
-    /// Made of an array of another type or order, or with missing values.
-    Owned(Vec<RawValue>),
-}
-
-impl Values<'_> {
-    pub(crate) fn slice(&self) -> &[RawValue] {
-        match self {
-            // An array that was checked when it was borrowed.
-            Self::Borrowed(array) => bytemuck::cast_slice(array.as_slice().unwrap_or_default()),
-            Self::Owned(values) => values,
-        }
-    }
 }
 
 /// As Python writes a shape.
@@ -52,119 +31,7 @@ pub(crate) fn shown(shape: &[usize]) -> String {
     format!("[{}]", parts.join(", "))
 }
 
-/// The frames in `any` if they are dicts of the taxels that have a value: one, or as many as `shape` says.
-fn by_id<'py>(any: &Bound<'py, PyAny>, shape: &[usize]) -> Option<Vec<Bound<'py, PyDict>>> {
-    if shape.len() == 1 {
-        return any.cast::<PyDict>().ok().map(|frame| vec![frame.clone()]);
-    }
-    let frames: Vec<Bound<'py, PyDict>> = if let Ok(list) = any.cast::<PyList>() {
-        list.iter().map(|frame| frame.cast_into().ok()).collect::<Option<_>>()?
-    } else {
-        any.cast::<PyTuple>().ok()?.iter().map(|frame| frame.cast_into().ok()).collect::<Option<_>>()?
-    };
-    (frames.len() == shape[0] && !frames.is_empty()).then_some(frames)
-}
-
-/// The values of `frames`, which are by taxel; `ids` are the taxels of a frame. What a frame does not have, or None, is missing.
-fn of_dicts(py: Python<'_>, frames: &[Bound<'_, PyDict>], ids: &[u32]) -> PyResult<Vec<RawValue>> {
-    let index_of: HashMap<u32, usize> = ids.iter().enumerate().map(|(index, id)| (*id, index)).collect();
-    let mut values = vec![RawValue::MISSING; frames.len() * ids.len()];
-    for (number, frame) in frames.iter().enumerate() {
-        for (id, value) in frame.iter() {
-            let place = id.extract::<u32>().ok().and_then(|id| index_of.get(&id));
-            let Some(place) = place else {
-                let some: Vec<String> = ids.iter().take(5).map(ToString::to_string).collect();
-                let (some, more) = (some.join(", "), if ids.len() > 5 { ", …" } else { "" });
-                let what = format!("frame {number} has a value of taxel {}; the engine's are {some}{more}", id.repr()?);
-                return Err(unknown_name(py, what));
-            };
-            if !value.is_none() {
-                let value: f64 = value.extract().map_err(|_| {
-                    usage(
-                        py,
-                        format!(
-                            "frame {number}: taxel {id} should have a number, or None if it is missing; this is {}",
-                            shown_type(&value)
-                        ),
-                    )
-                })?;
-                values[number * ids.len() + place] = RawValue::new(value);
-            }
-        }
-    }
-    Ok(values)
-}
-
-/// The values in `any`, which should have `shape`, called `names`, of the taxels `ids`; `mask` says which are missing.
-pub(crate) fn values<'py>(
-    any: &Bound<'py, PyAny>,
-    mask: Option<&Bound<'py, PyAny>>,
-    shape: &[usize],
-    names: &str,
-    ids: &[u32],
-) -> PyResult<Values<'py>> {
-    let py = any.py();
-    if mask.is_none()
-        && let Ok(array) = any.cast::<PyArrayDyn<f32>>()
-        && array.shape() == shape
-        && array.is_c_contiguous()
-        && array.is_aligned()
-    {
-        return Ok(Values::Borrowed(array.try_readonly()?));
-    }
-    if let Some(frames) = by_id(any, shape) {
-        if mask.is_some() {
-            return Err(usage(py, "frames that are dicts leave out what is missing; give no mask"));
-        }
-        return of_dicts(py, &frames, ids).map(Values::Owned);
-    }
-    let expected = || format!("values should be float32 of shape {names} = {}", shown(shape));
-    let array =
-        as_array(any).map_err(|why| usage(py, format!("{}; this is not an array: {}", expected(), one_line(&why))))?;
-    let got: Vec<usize> = array.getattr("shape")?.extract()?;
-    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
-    if got != shape {
-        return Err(usage(py, format!("{}; this has shape {}", expected(), shown(&got))));
-    }
-    if !["f", "i", "u"].contains(&kind.as_str()) {
-        let dtype = array.getattr("dtype")?.str()?;
-        return Err(usage(py, format!("{}; this is of type {dtype}, which is not a number", expected())));
-    }
-    let size: usize = array.getattr("dtype")?.getattr("itemsize")?.extract()?;
-    let mut values: Vec<RawValue> = if kind == "f" && size <= 4 {
-        let array = contiguous(&array, "float32")?;
-        let array = array.cast::<PyArrayDyn<f32>>().map_err(|_| usage(py, expected()))?.try_readonly()?;
-        bytemuck::cast_slice(array.as_slice()?).to_vec()
-    } else {
-        let array = contiguous(&array, "float64")?;
-        let array = array.cast::<PyArrayDyn<f64>>().map_err(|_| usage(py, expected()))?.try_readonly()?;
-        array.as_slice()?.iter().map(|&value| RawValue::new(value)).collect()
-    };
-    if let Some(mask) = mask {
-        let mask = as_array(mask)?;
-        let got: Vec<usize> = mask.getattr("shape")?.extract()?;
-        let kind: String = mask.getattr("dtype")?.getattr("kind")?.extract()?;
-        if kind != "b" || (got != shape && Some(&got[..]) != shape.get(shape.len() - 1..)) {
-            let what = format!(
-                "mask should be bool of shape {names} = {}, True where a value is missing; this is {} of shape {}",
-                shown(shape),
-                mask.getattr("dtype")?.str()?,
-                shown(&got)
-            );
-            return Err(usage(py, what));
-        }
-        let mask = contiguous(&mask, "bool")?;
-        let mask = mask.cast::<PyArrayDyn<bool>>().map_err(|_| usage(py, "mask should be bool"))?.try_readonly()?;
-        for (value, &missing) in values.iter_mut().zip(mask.as_slice()?.iter().cycle()) {
-            if missing {
-                *value = RawValue::MISSING;
-            }
-        }
-    }
-    Ok(Values::Owned(values))
-}
-
-fn one_line(error: &PyErr) -> String {
+pub(crate) fn one_line(error: &PyErr) -> String {
     error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -194,7 +61,7 @@ pub(crate) fn time_s(any: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     })
 }
 
-fn shown_type(any: &Bound<'_, PyAny>) -> String {
+pub(crate) fn shown_type(any: &Bound<'_, PyAny>) -> String {
     any.get_type().name().map_or_else(|_| "something else".to_owned(), |name| format!("of type {name}"))
 }
 

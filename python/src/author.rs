@@ -5,14 +5,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use somatic::author::mesh::{Geometry, MeshOptions, author_mjcf_skin, author_urdf_skin};
 use somatic::author::{Authored, Recipe, author_csv_skin, author_icub};
 use somatic::body::{Original, Up};
-use somatic::internal::author::mesh;
+use somatic::internal::author::{Zones, author_zones, mesh};
+use somatic::internal::limits::{self, MAX_TABLE_BYTES};
 use somatic::{Body, Error, Result, bundled};
 
 use crate::body::PyBody;
-use crate::error::{OrRaise, interrupted};
+use crate::error::{OrRaise, interrupted, usage};
+use crate::opening::text_of;
 use crate::progress::Progress;
 use crate::threads::free;
 
@@ -91,10 +94,13 @@ impl Placed {
     }
 }
 
-/// The body of `file`, called as it is, with the ending of bodies.
-fn named(file: &Path, authored: Authored) -> Result<PyBody> {
-    let name =
-        file.with_extension("glb").file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+/// The name of the file at `path`, with the ending of bodies.
+fn with_ending(path: &Path) -> String {
+    path.with_extension("glb").file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// The body that was authored, called `name`.
+fn named(name: String, authored: Authored) -> Result<PyBody> {
     let bytes = Arc::new(authored.file.to_glb()?);
     Ok(PyBody { inner: Arc::new(Body { name, ..authored.body }), bytes })
 }
@@ -103,8 +109,8 @@ fn named(file: &Path, authored: Authored) -> Result<PyBody> {
 ///
 /// Parameters
 /// ----------
-/// shape : str or path, optional
-///     A file (.glb, .gltf, .stl, .obj, .dae, .ply, or a robot as .urdf) or a bundled body.
+/// shape : Body, str or path, optional
+///     A body, a file (.glb, .gltf, .stl, .obj, .dae, .ply, or a robot as .urdf) or a bundled body.
 /// recipe : str or path, optional
 ///     A file that docs/reference/recipe.md describes. Without it, `taxels` says how many and `spacing`, such as '8 mm', how far apart, on the
 ///     nodes, meshes or links whose names match one of the globs `regions`.
@@ -115,6 +121,10 @@ fn named(file: &Path, authored: Authored) -> Result<PyBody> {
 /// up, package, geometry
 ///     Of meshes and robots of other formats: the axis that points up, 'y' or 'z'; a dict of a package's name to its folder; and 'visual', 'collision' or
 ///     'none', the geometry of a .urdf.
+/// zones : str, path, or dict of int to str, optional
+///     Named zones of each topmost field of a body that has a skin, which stays as it is: names from the bottom of the page up, or from the
+///     left to the right, with shares of the length, such as 'heel=30%,midfoot,toes', where those without one share the rest equally; or
+///     by taxel its zone, a dict or a .csv with the columns taxel and zone.
 /// urdf_skin, mjcf_skin, csv_skin, icub
 ///     In the place of `shape`, a skin that has its places: a .urdf with tactile sensors, an .xml of MuJoCo with such, a table of taxels,
 ///     or a list of the iCub's position files.
@@ -132,12 +142,14 @@ fn named(file: &Path, authored: Authored) -> Result<PyBody> {
 /// >>> body = st.author("hand", taxels=60, seed=1)
 /// >>> len(body.taxels)
 /// 60
+/// >>> list(st.author(st.Body.grid(20, 8, 0.01, name="insole"), zones="heel=30%,midfoot,toes").fields)
+/// ['insole', 'insole/heel', 'insole/midfoot', 'insole/toes']
 #[pyfunction]
-#[pyo3(signature = (shape = None, recipe = None, *, taxels = None, spacing = None, regions = Vec::new(), seed = None, unit = None, even = None, hidden = None, clear = None, mirror = None, up = None, package = None, geometry = None, urdf_skin = None, mjcf_skin = None, csv_skin = None, icub = None, progress = None))]
+#[pyo3(signature = (shape = None, recipe = None, *, taxels = None, spacing = None, regions = Vec::new(), seed = None, unit = None, even = None, hidden = None, clear = None, mirror = None, zones = None, up = None, package = None, geometry = None, urdf_skin = None, mjcf_skin = None, csv_skin = None, icub = None, progress = None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn author(
     py: Python<'_>,
-    shape: Option<PathBuf>,
+    shape: Option<&Bound<'_, PyAny>>,
     recipe: Option<PathBuf>,
     taxels: Option<u64>,
     spacing: Option<&str>,
@@ -148,6 +160,7 @@ pub(crate) fn author(
     hidden: Option<&str>,
     clear: Option<&str>,
     mirror: Option<&str>,
+    zones: Option<&Bound<'_, PyAny>>,
     up: Option<&str>,
     package: Option<BTreeMap<String, PathBuf>>,
     geometry: Option<&str>,
@@ -162,17 +175,80 @@ pub(crate) fn author(
     let skins =
         [urdf_skin.map(Placed::Urdf), mjcf_skin.map(Placed::Mjcf), csv_skin.map(Placed::Csv), icub.map(Placed::Icub)];
     let mut skins: Vec<Placed> = skins.into_iter().flatten().collect();
-    match (shape, skins.pop()) {
-        (None, Some(skin)) if skins.is_empty() => {
-            if let Some(name) = wish.given() {
+    match (shape.map(Shape::new).transpose()?, zones, skins.pop()) {
+        (None, _, Some(skin)) if skins.is_empty() => {
+            if let Some(name) = wish.given().or(zones.is_some().then_some("zones")) {
                 let what = format!("{name}: this skin has its places; leave it out");
                 return Err(Error::usage(what)).or_raise(py);
             }
-            free(py, || named(skin.file(), skin.author(&reading)?)).or_raise_of(py, skin.file())
+            free(py, || named(with_ending(skin.file()), skin.author(&reading)?)).or_raise_of(py, skin.file())
         }
-        (Some(shape), None) => on_shape(py, &shape, wish.recipe().or_raise(py)?, &reading, progress),
+        (Some(shape), Some(zones), None) => {
+            if let Some(name) = wish.given() {
+                let what = format!("{name}: zones are parts of a skin that is there; leave it out");
+                return Err(Error::usage(what)).or_raise(py);
+            }
+            let zones = zones_of(zones)?;
+            let zoned = || named(shape.name(), author_zones(open(&shape, &mut Recipe::none(), &reading)?, &zones)?);
+            free(py, zoned).or_raise_of(py, shape.place())
+        }
+        (Some(shape), None, None) => on_shape(py, &shape, wish.recipe().or_raise(py)?, &reading, progress),
         _ => Err(Error::usage("give one shape, or one of urdf_skin=, mjcf_skin=, csv_skin= and icub=")).or_raise(py),
     }
+}
+
+/// What a skin is put on.
+enum Shape {
+    Body(PyBody),
+    File(PathBuf),
+}
+
+impl Shape {
+    fn new(any: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match any.cast::<PyBody>() {
+            Ok(body) => Ok(Self::Body(body.get().clone())),
+            Err(_) => any.extract().map(Self::File),
+        }
+    }
+
+    /// What messages are about.
+    fn place(&self) -> &Path {
+        match self {
+            Self::Body(body) => Path::new(&body.inner.name),
+            Self::File(path) => path,
+        }
+    }
+
+    /// What the body with a skin is called.
+    fn name(&self) -> String {
+        match self {
+            Self::Body(body) => body.inner.name.clone(),
+            Self::File(path) => with_ending(path),
+        }
+    }
+
+    /// Whether it is in another format than glTF.
+    fn is_mesh(&self) -> bool {
+        matches!(self, Self::File(path) if mesh::is_mesh(path))
+    }
+}
+
+/// Zones of `given`: shares of the length, a table, or by taxel.
+fn zones_of(given: &Bound<'_, PyAny>) -> PyResult<Zones> {
+    let py = given.py();
+    if given.is_instance_of::<PyDict>() {
+        let wrong = || usage(py, "zones should have by taxel its zone, such as {17: 'heel'}");
+        let table: BTreeMap<u32, String> = given.extract().map_err(|_| wrong())?;
+        let is_whole = !table.is_empty() && table.values().all(|zone| !zone.trim().is_empty());
+        return if is_whole { Ok(Zones::Table(table)) } else { Err(wrong()) };
+    }
+    let text = text_of(given)?;
+    let path = Path::new(&text);
+    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) {
+        return Zones::of_shares(&text).map_err(|e| e.at("zones")).or_raise(py);
+    }
+    let table = limits::read_to_string(path, MAX_TABLE_BYTES).map_err(|e| Error::io(path, &e));
+    table.and_then(|table| Zones::of_table(&text, &table)).or_raise_of(py, path)
 }
 
 /// What is to be placed.
@@ -253,7 +329,7 @@ impl Wish<'_> {
 /// Puts the skin of `recipe` on `shape`.
 fn on_shape(
     py: Python<'_>,
-    shape: &Path,
+    shape: &Shape,
     mut recipe: Recipe,
     reading: &Reading,
     progress: Option<Py<PyAny>>,
@@ -262,11 +338,10 @@ fn on_shape(
     let mut raised = None;
     let done = free(py, || {
         let file = open(shape, &mut recipe, reading)?;
-        if recipe.is_empty() && mesh::is_mesh(shape) {
+        if recipe.is_empty() && shape.is_mesh() {
             let (body, _) = file.read()?;
-            let name =
-                shape.with_extension("glb").file_name().map_or_else(String::new, |it| it.to_string_lossy().into());
-            return Ok(PyBody { inner: Arc::new(Body { name, ..body }), bytes: Arc::new(file.to_glb()?) });
+            let inner = Arc::new(Body { name: shape.name(), ..body });
+            return Ok(PyBody { inner, bytes: Arc::new(file.to_glb()?) });
         }
         let shown = |share: f64| {
             let heard = Python::attach(|py| {
@@ -276,19 +351,28 @@ fn on_shape(
             raised = heard.err();
             raised.is_none()
         };
-        named(shape, somatic::internal::author::author_while(file, &recipe, shown)?)
+        named(shape.name(), somatic::internal::author::author_while(file, &recipe, shown)?)
     });
     match raised {
         Some(error) => Err(interrupted(Some(error))),
         None => {
-            let made = done.or_raise_of(py, shape)?;
+            let made = done.or_raise_of(py, shape.place())?;
             progress.as_ref().map_or(Ok(()), |progress| progress.fill(py, (1.0,)))?;
             Ok(made)
         }
     }
 }
 
-fn open(shape: &Path, recipe: &mut Recipe, reading: &Reading) -> Result<Original> {
+fn open(shape: &Shape, recipe: &mut Recipe, reading: &Reading) -> Result<Original> {
+    let shape = match shape {
+        Shape::File(path) => path,
+        Shape::Body(body) => {
+            if let Some(name) = reading.given() {
+                return Err(Error::usage(format!("{name}: a body has been read; leave it out")));
+            }
+            return Original::from_bytes(&body.inner.name, &body.bytes, None);
+        }
+    };
     let is_bundled = !shape.exists() && shape.to_str().is_some_and(|name| bundled::body(name).is_some());
     if let Some(name) = reading.given().filter(|_| is_bundled || !mesh::is_mesh(shape)) {
         return Err(Error::usage(format!("{name}: it is for .stl, .obj, .dae, .ply and .urdf; leave it out here")));

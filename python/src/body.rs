@@ -1,23 +1,24 @@
 //! `Body` and its fields.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use somatic::field::FieldSet;
-use somatic::internal::body::{LinkMotion, Original, WORLD_FROM_BODY};
+use somatic::internal::body::Original;
 use somatic::internal::error::suggestion;
 use somatic::internal::signal::Channel;
 use somatic::signal::Pose;
 use somatic::{Body, OutputPath, bundled};
 
-use crate::array_body::{ArrayBody, LinkNames};
-use crate::arrays::{array, pose_frames, poses, structured};
+use crate::array_body::{Arrays, Names};
+use crate::arrays::{array, pose_frames, poses};
+use crate::body_tables;
+use crate::channels::names_of;
 use crate::error::{OrRaise, unknown_name, usage};
 use crate::field::{PitchOfGrid, PyField, pitch_of};
-use crate::kinematics::{Positions, joints};
+use crate::kinematics::Positions;
 use crate::same::{hash_of, same};
 use crate::sheet::Sheet;
 use crate::stream::in_python;
@@ -86,7 +87,7 @@ impl PyBody {
         free(py, || Self::of_file(&path)).or_raise_of(py, &path)
     }
 
-    /// One of the bodies that come with the package: 'hand', 'mat' or 'humanoid'.
+    /// One of the bodies that come with the package: 'hand', 'sensing-hand', 'mat' or 'humanoid'.
     ///
     /// >>> import somatic_touch as st
     /// >>> [len(st.Body.bundled(name).taxels) for name in ("hand", "mat", "humanoid")]
@@ -159,35 +160,31 @@ impl PyBody {
     }
 
     /// Its sensors, an array of structures [taxels] by ascending id: `id`; `link`, an index into `links`; `position` and `normal`
-    /// [3] in the link's frame, in metres; `place`, the position in the world with the body at rest; `area`, in m², 0 where unknown; `modality`.
+    /// [3] in the link's frame, in metres; `place`, the position in the world with the body at rest; `area`, in m², 0 where unknown;
+    /// `modality`, what it measures: 'pressure', 'force3' (three axes), 'temperature' or 'proximity'; and, if any has three axes,
+    /// `tangent` [3], the direction t of its second value in the link's frame (the third is along n × t), of others NaN.
     ///
     /// It is a table as it is: `pandas.DataFrame(body.taxels)` and `polars.DataFrame(body.taxels)` have vectors as columns
     /// `position_x`, `position_y`, `position_z`, and so on.
     ///
     /// >>> import somatic_touch as st
     /// >>> taxels = st.Body.bundled("hand").taxels
-    /// >>> taxels["id"][:3].tolist(), taxels["area"].dtype
-    /// ([0, 1, 2], dtype('float64'))
+    /// >>> taxels["id"][:3].tolist(), taxels["area"].dtype, str(taxels["modality"][0])
+    /// ([0, 1, 2], dtype('float64'), 'pressure')
     #[getter]
     fn taxels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let taxels = &self.inner.taxels;
-        let count = taxels.len();
-        let place = |taxel: &somatic::body::Taxel| {
-            self.inner.links[taxel.link].world_from_link().transform_point3(taxel.position_in_link).to_array()
-        };
-        let vectors = |of: &dyn Fn(&somatic::body::Taxel) -> [f64; 3]| {
-            array(py, taxels.iter().flat_map(of).collect::<Vec<f64>>(), &[count, 3])
-        };
-        let fields = [
-            ("id", "u4", 1, array(py, self.ids(), &[count])?),
-            ("link", "i8", 1, array(py, taxels.iter().map(|taxel| taxel.link as i64).collect(), &[count])?),
-            ("position", "f8", 3, vectors(&|taxel| taxel.position_in_link.to_array())?),
-            ("normal", "f8", 3, vectors(&|taxel| taxel.normal_in_link.to_array())?),
-            ("place", "f8", 3, vectors(&place)?),
-            ("area", "f8", 1, array(py, taxels.iter().map(|taxel| taxel.area).collect(), &[count])?),
-            ("modality", "u4", 1, array(py, taxels.iter().map(|taxel| taxel.modality.code()).collect(), &[count])?),
-        ];
-        structured(py, count, &fields)
+        body_tables::taxels(py, &self.inner)
+    }
+
+    /// The names of a frame's values, in the order in which `Engine.process` takes them: of each taxel its id, by ascending id, then of those
+    /// with three axes `4.u`, their forces along t, and `4.v`, along n × t.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> st.Body.grid(1, 3, 0.01).channels
+    /// ['0', '1', '2']
+    #[getter(channels)]
+    fn channel_names(&self) -> Vec<String> {
+        names_of(&self.channels())
     }
 
     /// Its fields by name.
@@ -223,19 +220,7 @@ impl PyBody {
     /// (3, 3, True)
     #[getter]
     fn surface(&self, py: Python<'_>) -> PyResult<(Py<PyAny>, Py<PyAny>)> {
-        let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-        let mut index_of = HashMap::new();
-        for (_, corners) in self.inner.triangles_at_rest() {
-            faces.extend(corners.map(|corner| {
-                let corner = WORLD_FROM_BODY.transform_point3(corner).to_array();
-                *index_of.entry(corner.map(f64::to_bits)).or_insert_with(|| {
-                    vertices.extend(corner);
-                    (vertices.len() / 3 - 1) as u32
-                })
-            }));
-        }
-        let shapes = [[vertices.len() / 3, 3], [faces.len() / 3, 3]];
-        Ok((array(py, vertices, &shapes[0])?, array(py, faces, &shapes[1])?))
+        body_tables::surface(py, &self.inner)
     }
 
     /// A body of arrays, in metres, in the world's axes: z up, x forward, y left.
@@ -250,6 +235,11 @@ impl PyBody {
     ///     By default 0, 1, 2, …
     /// areas : float or array_like, [taxels], optional
     ///     In m²; unknown by default, and with that what needs one, such as `force` of pressures.
+    /// modality : str or sequence of str
+    ///     What all taxels measure, or each: 'pressure', 'force3' (force along three axes), 'temperature' or 'proximity'.
+    /// tangents : array_like, [taxels, 3], optional
+    ///     Of taxels with three axes the direction t of their second value, in the frame of their link; the third is along n × t. As much
+    ///     of it as is at right angles to the normal counts. NaN, and by default all: the link's x, as far as it is tangential.
     /// surface : (vertices, faces) or dict of link to (vertices, faces), optional
     ///     Triangles, float [vertices, 3] and int [faces, 3], counter-clockwise seen from outside; without a link that of the first one.
     /// name : str
@@ -263,7 +253,8 @@ impl PyBody {
     /// Raises
     /// ------
     /// UsageError
-    ///     Where shapes do not fit, a number is not finite, a normal is zero, an id is there twice, or a face has no vertex.
+    ///     Where shapes do not fit, a number is not finite, a normal is zero, a tangent is along it, an id is there twice, or a face has no
+    ///     vertex.
     ///
     /// Examples
     /// --------
@@ -273,20 +264,24 @@ impl PyBody {
     /// >>> positions = np.stack([x.ravel(), y.ravel(), np.zeros(12)], axis=1)
     /// >>> st.Body.from_arrays(positions, np.tile([0, 0, 1], (12, 1)), areas=1e-4, name="pad")
     /// <Body pad: 12 taxels in 1 field on 1 link>
+    /// >>> st.Body.from_arrays(positions[:2], [[0, 0, 1]] * 2, modality="force3", tangents=[[0, 1, 0]] * 2).taxels["tangent"].tolist()
+    /// [[0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
     #[staticmethod]
-    #[pyo3(signature = (positions, normals, *, link = None, ids = None, areas = None, surface = None, name = "skin"))]
+    #[pyo3(signature = (positions, normals, *, link = None, ids = None, areas = None, modality = None, tangents = None, surface = None, name = "skin"))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords")]
     fn from_arrays(
         py: Python<'_>,
         positions: &Bound<'_, PyAny>,
         normals: &Bound<'_, PyAny>,
-        link: Option<LinkNames>,
+        link: Option<Names>,
         ids: Option<Vec<u32>>,
         areas: Option<&Bound<'_, PyAny>>,
+        modality: Option<Names>,
+        tangents: Option<&Bound<'_, PyAny>>,
         surface: Option<&Bound<'_, PyAny>>,
         name: &str,
     ) -> PyResult<Self> {
-        let parts = ArrayBody::new(py, [positions, normals], link, ids, areas, surface, name)?;
+        let parts = Arrays { positions, normals, link, ids, areas, modality, tangents, surface }.body(py, name)?;
         free(py, || Self::of_bytes(name, parts.to_glb(name)?)).or_raise(py)
     }
 
@@ -298,23 +293,7 @@ impl PyBody {
     /// {}
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let made = PyDict::new(py);
-        for (name, link) in joints(&self.inner) {
-            let link = &self.inner.links[link];
-            let Some(joint) = &link.joint else { continue };
-            let (kind, unit) = match joint.motion {
-                LinkMotion::Revolute(_) => ("revolute", "rad"),
-                LinkMotion::Continuous(_) => ("continuous", "rad"),
-                LinkMotion::Prismatic(_) => ("prismatic", "m"),
-            };
-            let about = PyDict::new(py);
-            about.set_item("link", &link.name)?;
-            about.set_item("kind", kind)?;
-            about.set_item("unit", unit)?;
-            about.set_item("limits", joint.limits.map(|[low, high]| (low, high)))?;
-            made.set_item(name, about)?;
-        }
-        Ok(made)
+        body_tables::joints(py, &self.inner)
     }
 
     /// Where links are, from the positions of joints: what `Engine.process` takes as `pose`.
@@ -372,14 +351,18 @@ impl PyBody {
     ///
     /// Parameters
     /// ----------
-    /// values : array_like, [taxels], optional
-    ///     A number for each taxel by ascending id, which is its colour; hollow where it is NaN. Without it colours are of links.
+    /// values : array_like, [taxels] or [taxels, 3], optional
+    ///     A number for each taxel by ascending id, which is its colour; hollow where it is NaN. Without it colours are of links. Three numbers
+    ///     are forces along the normal, which is the colour, and along t and n × t, which are an arrow.
     /// ax : mpl_toolkits.mplot3d.Axes3D, optional
     ///     Where to draw; by default in a new figure.
     /// surface : bool
     ///     Whether to draw triangles: at most 20,000, of more every second or third, and so on.
     /// unit : str, optional
     ///     What the values are, beside the scale of colours.
+    /// letter : {'sustained', 'shear', 'temperature', 'proximity'}, optional
+    ///     Draws values of the taxels that this letter reads alone, others small and grey: temperatures from blue over white, which is their
+    ///     median, to red; distances dark where something is near. By default that of the body's taxels, if they are of one kind.
     ///
     /// Returns
     /// -------
@@ -392,15 +375,21 @@ impl PyBody {
     /// >>> import somatic_touch as st
     /// >>> st.Body.bundled("hand").plot().get_zlabel()
     /// 'z, up [m]'
-    #[pyo3(signature = (values = None, *, ax = None, surface = true, unit = None))]
+    #[pyo3(signature = (values = None, *, ax = None, surface = true, unit = None, letter = None))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
         values: Option<Bound<'py, PyAny>>,
         ax: Option<Bound<'py, PyAny>>,
         surface: bool,
         unit: Option<&str>,
+        letter: Option<&str>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        in_python(slf.py(), "_plots", "body", (slf, values, ax, surface, unit))
+        in_python(slf.py(), "_plots", "body", (slf, values, ax, surface, unit, letter))
+    }
+
+    /// Vectors in the frames of taxels' links, [taxels, 3], in the world with the body at rest. For pictures.
+    fn _at_rest(&self, py: Python<'_>, vectors: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        body_tables::at_rest(py, &self.inner, vectors)
     }
 
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

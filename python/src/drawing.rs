@@ -8,8 +8,10 @@ use somatic::picture::{self, Moment, Moments, Options, Picture, Times, TouchPict
 use somatic::scene::Coordinates;
 use somatic::{BackendKind, Engine, Error, Frame, Outputs, Scene};
 
-use crate::arrays::{array, values};
+use crate::arrays::array;
+use crate::channels::Channels;
 use crate::error::{OrRaise, interrupted};
+use crate::frame_values::values;
 use crate::picture::{PyPicture, Wish};
 use crate::recording::PyRecording;
 use crate::threads::{free, goes_on};
@@ -51,7 +53,7 @@ pub(crate) fn draw(py: Python<'_>, wish: Wish<'_>) -> PyResult<PyPicture> {
 /// A recording's frames, for code without Python's lock.
 struct Read {
     name: String,
-    taxels: Vec<u32>,
+    channels: Vec<u32>,
     t_s: Vec<f64>,
     values: Vec<somatic::RawValue>,
 }
@@ -59,15 +61,14 @@ struct Read {
 impl Read {
     fn from_recording(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
         let t_s = crate::arrays::times(recording.t.bind(py))?.as_slice()?.to_vec();
-        let shape = [t_s.len(), recording.taxels.len()];
-        let values =
-            values(recording.values.bind(py), None, &shape, "[frames, taxels]", &recording.taxels)?.slice().to_vec();
-        Ok(Self { name: recording.name.clone(), taxels: recording.taxels.clone(), t_s, values })
+        let channels = Channels::new(recording.channels.clone());
+        let values = values(recording.values.bind(py), None, Some(t_s.len()), &channels)?.slice().to_vec();
+        Ok(Self { name: recording.name.clone(), channels: recording.channels.clone(), t_s, values })
     }
 
     /// Its frames; an error ends it where Python raised something.
     fn frames<'a>(&'a self, raised: &'a mut Option<PyErr>) -> impl Iterator<Item = somatic::Result<Frame>> + 'a {
-        let width = self.taxels.len();
+        let width = self.channels.len();
         self.t_s.iter().enumerate().map(move |(index, &t_s)| {
             if index % FRAMES_BETWEEN == 0 && !goes_on(raised) {
                 return Err(Error::failed("interrupted"));
@@ -102,7 +103,7 @@ impl Wish<'_> {
                 None => options_of_engine,
             };
             let mut engine = Engine::new(body, options_of_engine)?;
-            engine.set_channels(&read.taxels)?;
+            engine.set_channels(&read.channels)?;
             let frames = read.frames(raised);
             let moments = Moments::compute(&mut engine, body, (Receptor::Sustained, times), &read.name, frames)?;
             return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));

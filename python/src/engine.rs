@@ -1,27 +1,28 @@
 //! `Engine`: frames in, percepts out, without Python's lock.
 
+mod columns;
 mod inner;
+mod input;
 mod wish;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use somatic::internal::signal::FrameBlock;
 use somatic::page::Listen;
-use somatic::signal::Pose;
 use somatic::{Agreement, Error, Frame, Percepts};
 
 use self::inner::Inner;
 use self::wish::Wish;
 use crate::agreement::agreement_dict;
-use crate::arrays::{Values, poses, time_s, times, values};
+use crate::arrays::{time_s, times};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
+use crate::channels::{Channels, GivenChannel, names_of, numbers_of};
 use crate::error::{OrRaise, interrupted, stays_here, usage, warn};
-use crate::kinematics::Positions;
+use crate::frame_values::{Values, values};
 use crate::percepts::PyPercepts;
 use crate::progress::Progress;
 use crate::scene::PyScene;
@@ -32,13 +33,12 @@ use crate::view::{Page, PyView};
 
 /// Values of a call from which on it is made in parts, between which Ctrl-C is heard.
 const LONG: usize = 1 << 20;
-/// Bytes of percepts from which on it is asked whether there is room for them.
-const LARGE: usize = 1 << 28;
 
 /// Turns touch frames into percepts.
 ///
 /// `scene` is a `Scene`, a dict of its keys, or the text of a scene file. `backend` is 'auto', 'cpu', 'gpu' or 'reference'.
-/// `taxels` are the ids of the values of a frame, in their order; without them it is all of the body's, by ascending id.
+/// `taxels` are the ids of the values of a frame, in their order; without them it is all of the body's, by ascending id. A taxel with three
+/// axes has three values, its force along its normal, its tangent t and n × t, which are called `4`, `4.u` and `4.v`: see `channels`.
 /// An engine goes on from call to call: motion, touches and filters know the frames before. Threads may share one, and take turns.
 /// `copy.copy` makes another in the same state. One that has processed no frame can be pickled; a state cannot.
 ///
@@ -55,10 +55,8 @@ const LARGE: usize = 1 << 28;
 pub(crate) struct PyEngine {
     inner: Mutex<Inner>,
     run: Arc<Run>,
-    /// The ids of a frame's values.
-    channels: Vec<u32>,
-    /// The values of a frame.
-    width: usize,
+    /// Whose the values of a frame are.
+    channels: Channels,
     wish: Wish,
 }
 
@@ -79,51 +77,6 @@ impl PyEngine {
         warn(py, notice)?;
         Ok(PyPercepts::new(percepts, Arc::clone(&self.run)))
     }
-
-    /// The values of `frames` frames, where Python has them if they can be read there.
-    fn held<'py>(
-        &self,
-        values: &Bound<'py, PyAny>,
-        mask: Option<&Bound<'py, PyAny>>,
-        frames: usize,
-    ) -> PyResult<Values<'py>> {
-        self::values(values, mask, &[frames, self.width], "[frames, taxels]", &self.channels)
-    }
-
-    /// Where links are in `frames` frames: by their poses, and by the positions of joints.
-    fn placed(
-        &self,
-        frames: usize,
-        pose: Option<&Bound<'_, PyAny>>,
-        joints: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Vec<(String, Vec<Pose>)>> {
-        let given = pose.map(|pose| poses(pose, frames)).transpose()?.unwrap_or_default();
-        let Some(joints) = joints else { return Ok(given) };
-        let body = &self.run.body;
-        let (positions, _) = Positions::new(joints, body, Some(frames))?;
-        let known = |(name, _): &&(String, Vec<Pose>)| body.link_index(name).is_none();
-        // What the body does not have the engine refuses by name.
-        let strange: Vec<_> = given.iter().filter(known).cloned().collect();
-        let mut placed = positions.poses(body, frames, &given);
-        positions.check(joints.py(), body, &placed)?;
-        placed.extend(strange);
-        Ok(placed)
-    }
-
-    /// Refuses a call whose percepts have no room, which would end the process.
-    fn check_room(&self, frames: usize) -> PyResult<()> {
-        let numbers: usize = self.run.outputs.columns().map(|column| 8 * column.components).sum();
-        let cells = frames.saturating_mul(self.run.names.len());
-        let bytes = cells.saturating_mul(numbers + 16);
-        let is_there =
-            bytes < LARGE || (bytes < isize::MAX as usize && Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
-        if is_there {
-            return Ok(());
-        }
-        let gibibytes = bytes as f64 / f64::from(1 << 30);
-        let what = format!("the percepts of {frames} frames take {gibibytes:.0} GiB; process fewer frames a call");
-        Err(PyMemoryError::new_err(what))
-    }
 }
 
 #[pymethods]
@@ -136,9 +89,10 @@ impl PyEngine {
         scene: Option<&Bound<'_, PyAny>>,
         calibration: Option<&PyCalibration>,
         backend: Option<&str>,
-        taxels: Option<Vec<u32>>,
+        taxels: Option<Vec<GivenChannel>>,
         batch: usize,
     ) -> PyResult<Self> {
+        let taxels = taxels.map(|taxels| numbers_of(py, taxels)).transpose()?;
         let scene = PyScene::of_any(scene, py)?.get().text.clone();
         let (body, calibration, backend) = (body.clone(), calibration.cloned(), backend.map(str::to_owned));
         Wish { body, scene, calibration, backend, taxels, batch }.make(py)
@@ -194,6 +148,10 @@ impl PyEngine {
     /// `t` may have dates too: NumPy's, pandas', or a list of `datetime`; they become seconds since 1970, and those without a time zone are
     /// in UTC. `values` may be a list of dicts, by taxel its value: what a dict does not have is missing. `joints` are positions of the body's
     /// joints by name, in rad or m, [] or [frames], which say where links are, as `Body.forward` does; poses of links come before them.
+    ///
+    /// If all taxels have three axes, `values` may be [frames, taxels, 3]: the forces along the normal, t and n × t, and a `mask` of the same
+    /// shape or of taxels. Of other bodies with such taxels it is [frames, channels], in the order of `channels`. A dict has
+    /// `{4: [n, u, v]}`, or `{4: n, "4.u": u}` with v missing.
     ///
     /// Python's lock is free while it computes. Ctrl-C ends a long call, and leaves the engine as it was before. `progress` is
     /// called with the number of frames done, about ten times a second; True shows a bar of tqdm.
@@ -258,7 +216,8 @@ impl PyEngine {
         }
     }
 
-    /// The same for one frame, as in a control loop: `t` in seconds, or a date; `values` [taxels], or a dict. Its percepts have one frame.
+    /// The same for one frame, as in a control loop: `t` in seconds, or a date; `values` [taxels], [taxels, 3], or a dict. Its percepts have
+    /// one frame.
     ///
     /// >>> import numpy as np
     /// >>> import somatic_touch as st
@@ -279,7 +238,7 @@ impl PyEngine {
         joints: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyPercepts> {
         let t = time_s(t, "t")?;
-        let held: Values<'_> = self::values(values, mask, &[self.width], "[taxels]", &self.channels)?;
+        let held: Values<'_> = self::values(values, mask, None, &self.channels)?;
         let moved = self.placed(1, pose, joints)?;
         let block = FrameBlock { t_s: &[t], values: held.slice(), poses: &moved };
         let done = self.without_python(py, |inner| {
@@ -343,7 +302,7 @@ impl PyEngine {
         let t_s = t.as_slice()?;
         let held = self.held(values, mask, t_s.len())?;
         let moved = self.placed(t_s.len(), pose, joints)?;
-        let mut sum = Agreement::default();
+        let (mut sum, width) = (Agreement::default(), self.channels.width());
         let before = self.without_python(py, |inner| inner.engine.state()).or_raise(py)?;
         for first in (0..t_s.len()).step_by(256) {
             if let Err(raised) = py.check_signals() {
@@ -352,7 +311,7 @@ impl PyEngine {
             }
             let frame = |index: usize| Frame {
                 t_s: t_s[index],
-                values: held.slice()[index * self.width..][..self.width].to_vec(),
+                values: held.slice()[index * width..][..width].to_vec(),
                 pose: moved.iter().map(|(link, poses)| (link.clone(), poses[index])).collect(),
                 ..Frame::default()
             };
@@ -382,7 +341,7 @@ impl PyEngine {
                 return Err(Error::usage("this engine is shown already; close its other view"));
             }
             inner.engine.keep_touch_taxels(true);
-            let page = Arc::new(Page::start(&listen, &inner.engine, &self.run.body, &self.channels)?);
+            let page = Arc::new(Page::start(&listen, &inner.engine, &self.run.body, self.channels.numbers())?);
             inner.page = Some(Arc::clone(&page));
             Ok(page)
         });
@@ -393,6 +352,27 @@ impl PyEngine {
     #[getter]
     fn fields(&self) -> Vec<&str> {
         self.run.labels.iter().map(String::as_str).collect()
+    }
+
+    /// The letter of each field, in the order of `fields`, such as 'sustained', 'shear', 'temperature' or 'proximity'.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> st.Engine(st.Body.grid(1, 2, 0.01), {"letters": ["sustained", "change"]}, backend="cpu").letters
+    /// ['sustained', 'change']
+    #[getter]
+    fn letters(&self) -> Vec<&str> {
+        self.run.letters.iter().map(String::as_str).collect()
+    }
+
+    /// The names of a frame's values, in their order: of a taxel its id, and of one with three axes `4.u` and `4.v` too, after all of these.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> pad = st.Body.from_arrays([[0, 0, 0], [0.01, 0, 0]], [[0, 0, 1]] * 2, modality="force3")
+    /// >>> st.Engine(pad, backend="cpu").channels
+    /// ['0', '1', '0.u', '1.u', '0.v', '1.v']
+    #[getter]
+    fn channels(&self) -> Vec<String> {
+        names_of(self.channels.numbers())
     }
 
     /// The names of the outputs.
@@ -418,6 +398,18 @@ impl PyEngine {
         py.import("json")?.call_method1("loads", (text,))
     }
 
+    /// The columns of the table `table` of its percepts: 'fields', 'touches' or 'self_contacts'; a `Table` of `name`, `unit`, `type`, `absent`,
+    /// whether a value may be, and `what` it is, as `somatic run --describe` tells them.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> engine = st.Engine(st.Body.bundled("hand"), {"outputs": ["centroid"]}, backend="cpu")
+    /// >>> [(row["name"], row["unit"]) for row in engine.columns() if row["name"].startswith("centroid")]
+    /// [('centroid_u', 'm'), ('centroid_v', 'm')]
+    #[pyo3(signature = (table = "fields"))]
+    fn columns<'py>(&self, py: Python<'py>, table: &str) -> PyResult<Bound<'py, PyAny>> {
+        columns::table(py, &self.run, table)
+    }
+
     fn __repr__(&self) -> String {
         let run = &self.run;
         format!(
@@ -425,7 +417,7 @@ impl PyEngine {
             run.backend[0],
             run.body.name,
             run.names.len(),
-            self.width
+            self.channels.width()
         )
     }
 }

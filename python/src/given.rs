@@ -3,6 +3,7 @@
 use std::vec::IntoIter;
 
 use pyo3::prelude::*;
+use somatic::internal::setup::open_mapped;
 use somatic::internal::tradeoff::TestFrames;
 use somatic::scene::file::LineKeys;
 use somatic::source::{Lines, SimulatedSource, Source, SourceSpec, TextSource, VendorOptions};
@@ -25,7 +26,7 @@ pub(crate) struct InMemory {
 impl InMemory {
     pub(crate) fn from_recording(py: Python<'_>, recording: &PyRecording) -> PyResult<Self> {
         let frames = recording.first_frames(py, usize::MAX)?.into_iter();
-        Ok(Self { taxels: recording.taxels.clone(), frames })
+        Ok(Self { taxels: recording.channels.clone(), frames })
     }
 }
 
@@ -107,8 +108,8 @@ impl Given {
             (None, Some(own)) => (own.clone_ref(py), recording.calibrated(py, calibration, own.get())?),
             (None, None) => return Err(usage(py, format!("{}: it has no body; give body=", recording.name))),
         };
-        let frames = recording.first_frames(py, most(recording.taxels.len()))?;
-        let (source, taxels) = (recording.name.clone(), recording.taxels.clone());
+        let frames = recording.first_frames(py, most(recording.channels.len()))?;
+        let (source, taxels) = (recording.name.clone(), recording.channels.clone());
         Ok(Self { body, calibration, played: Some(TestFrames { source, taxels, frames, truth: Vec::new() }) })
     }
 }
@@ -156,7 +157,13 @@ impl OpenSource {
                 return Ok(Self { source: Box::new(source), lines: None, is_live: true });
             }
             let is_live = spec.is_stdin();
-            Ok(Self { source: spec.with_content(options).open(ids, options)?, lines: None, is_live })
+            let spec = spec.with_content(options);
+            if options.map.is_some() {
+                let mut mapped = open_mapped(&spec, options)?;
+                notices.extend(mapped.take_notices());
+                return Ok(Self { source: Box::new(mapped.for_body(ids)?), lines: None, is_live });
+            }
+            Ok(Self { source: spec.open(ids, options)?, lines: None, is_live })
         });
         let opened = opened.or_raise(py)?;
         warn(py, notices)?;

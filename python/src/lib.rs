@@ -7,13 +7,16 @@ mod array_body;
 mod arrays;
 mod author;
 mod body;
+mod body_tables;
 mod calibration;
+mod channels;
 mod convert;
 #[cfg(feature = "gpu")]
 mod drawing;
 mod engine;
 mod error;
 mod field;
+mod frame_values;
 mod given;
 mod globs;
 mod kinematics;

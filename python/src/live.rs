@@ -7,21 +7,25 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use serde_json::Value;
 use somatic::internal::error::parse_toml;
 use somatic::internal::recording::{BODY, CALIBRATION};
 use somatic::internal::run::{Arrival, Feed, Opened, Pace, ReadMode};
 use somatic::internal::setup::{Input, Setup, attachments};
+use somatic::internal::source::BoardAccount;
 use somatic::run::Tell;
 use somatic::scene::file::SceneFile;
 use somatic::source::Lines;
 use somatic::{Engine, Error, Percepts};
 
 use crate::body::PyBody;
+use crate::channels::{count_of, names_of, taxels_of};
 use crate::error::{OrRaise, stays_here, usage, warn};
 use crate::opening::text_of;
 use crate::percepts::PyPercepts;
 use crate::scene::{PyScene, check_keys, table_of};
 use crate::session::Run;
+use crate::stream::in_python;
 use crate::threads::free;
 
 /// How long is waited for frames until Ctrl-C and `stop` are heard.
@@ -37,8 +41,9 @@ pub(crate) struct PyLive {
     is_stopped: AtomicBool,
     run: Arc<Run>,
     body: Py<PyBody>,
-    taxels: Vec<u32>,
+    channels: Vec<u32>,
     name: String,
+    lines: Option<Lines>,
     losses: Mutex<Vec<String>>,
 }
 
@@ -124,10 +129,31 @@ impl PyLive {
         self.body.clone_ref(py)
     }
 
-    /// The ids of the taxels of its frames.
+    /// The ids of the taxels of its frames; one with three axes is there three times.
     #[getter]
     fn taxels(&self) -> Vec<u32> {
-        self.taxels.clone()
+        taxels_of(&self.channels)
+    }
+
+    /// The names of its values, in their order, as `Recording.channels`.
+    #[getter]
+    fn channels(&self) -> Vec<String> {
+        names_of(&self.channels)
+    }
+
+    /// What became of the frames of boards and limbs so far, a `Table` with a row for each: `board` or `limb`, `port`, `state`, `sent`,
+    /// `delivered`, `lost`, `dropped`, `replaced`, `corrupt`, `restarts`, `unplugs`, `drift_ppm` of its clock and `rate_hz`, as
+    /// `somatic run --summary` writes it; empty if frames come from elsewhere.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> with st.live(body="hand", backend="cpu") as live:
+    /// ...     len(live.boards)
+    /// 0
+    #[getter]
+    fn boards<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let accounts = self.lines.as_ref().map_or_else(Vec::new, Lines::accounts);
+        let rows: Vec<Value> = accounts.iter().map(BoardAccount::as_json).collect();
+        in_python(py, "_columns", "of_json", (Value::from(rows).to_string(),))
     }
 
     /// The names of the fields, in the order of the percepts' second axis.
@@ -206,7 +232,8 @@ impl PyLive {
 
     fn __repr__(&self) -> String {
         let fields = self.run.names.len();
-        format!("<Live {} on {}: {fields} fields, {} taxels>", self.name, self.run.body.name, self.taxels.len())
+        let taxels = count_of(&self.channels);
+        format!("<Live {} on {}: {fields} fields, {taxels} taxels>", self.name, self.run.body.name)
     }
 }
 
@@ -283,12 +310,13 @@ pub(crate) fn open_live(
     let calibration = files.iter().find(|(name, ..)| name == CALIBRATION);
     let calibration = calibration.map(|(.., bytes)| String::from_utf8_lossy(bytes).into_owned());
     let run = Arc::new(Run::new(&engine, &body.inner, &body.bytes, &text, calibration.as_deref()));
-    let taxels = source.taxels().to_vec();
+    let channels = source.taxels().to_vec();
     let feed = match &lines {
         None => Feed::start(source, ReadMode { most: pace.batch, gather: pace.gather, speed: pace.speed }),
         Some(lines) => Feed::start_woken(source, pace.batch, lines),
     };
-    let running = Running { engine, feed, heeds_stale: lines.is_some(), lines, last: None };
+    let running = Running { engine, feed, heeds_stale: lines.is_some(), lines: lines.clone(), last: None };
     let (running, losses) = (Mutex::new(Some(running)), Mutex::default());
-    Ok(PyLive { running, is_stopped: AtomicBool::new(false), run, body: Py::new(py, body)?, taxels, name, losses })
+    let (is_stopped, body) = (AtomicBool::new(false), Py::new(py, body)?);
+    Ok(PyLive { running, is_stopped, run, body, channels, name, lines, losses })
 }

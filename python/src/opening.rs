@@ -192,14 +192,19 @@ impl Opening {
             let spec = text.parse::<SourceSpec>()?.with_content(&options);
             Ok((options, spec))
         };
-        if text == "hand" && body.is_none() {
-            let touch = || -> somatic::Result<Box<dyn Source + Send>> {
-                Ok(Box::new(CsvSource::from_reader("bundled touch", bundled::TOUCH, None, None)?))
+        let bundled_touch = match &text[..] {
+            "hand" => Some(bundled::TOUCH),
+            "sensing-hand" => Some(bundled::MEETING),
+            _ => None,
+        };
+        if let Some(bytes) = bundled_touch.filter(|_| body.is_none()) {
+            let touch = move || -> somatic::Result<Box<dyn Source + Send>> {
+                Ok(Box::new(CsvSource::from_reader("bundled touch", bytes, None, None)?))
             };
             let source =
                 if cut == Cut::WHOLE { touch() } else { Replay::new(touch, cut).map(|cut| Box::new(cut) as _) };
             let source = source.or_raise(py)?;
-            let body = Some(Py::new(py, PyBody::bundled_or_file("hand").or_raise(py)?)?);
+            let body = Some(Py::new(py, PyBody::bundled_or_file(&text).or_raise(py)?)?);
             let (name, file) = ("bundled touch".to_owned(), PathBuf::new());
             return Ok(Self { name, file, source, body, calibration: None });
         }

@@ -8,6 +8,7 @@ use somatic::Frame;
 
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
+use crate::channels::{count_of, names_of, taxels_of};
 use crate::error::{OrRaise, stays_here, usage};
 use crate::opening::{Keys, Opening};
 use crate::progress::Progress;
@@ -95,10 +96,16 @@ impl PyParts {
 
 #[pymethods]
 impl PyParts {
-    /// The ids of its taxels, in the order of the values.
+    /// The ids of its taxels, in the order of the values; one with three axes is there three times.
     #[getter]
     fn taxels(&self) -> Vec<u32> {
-        self.about.get().taxels.clone()
+        taxels_of(&self.about.get().channels)
+    }
+
+    /// The names of its values, in their order, as `Recording.channels`.
+    #[getter]
+    fn channels(&self) -> Vec<String> {
+        names_of(&self.about.get().channels)
     }
 
     /// The body that was given, or that comes with it.
@@ -173,8 +180,8 @@ impl PyParts {
     }
 
     fn __repr__(&self) -> String {
-        let PyRecording { name, taxels, .. } = self.about.get();
-        format!("<Parts of {name}: {} taxels, {} s each>", taxels.len(), self.seconds)
+        let PyRecording { name, channels, .. } = self.about.get();
+        format!("<Parts of {name}: {} taxels, {} s each>", count_of(channels), self.seconds)
     }
 }
 

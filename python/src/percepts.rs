@@ -1,5 +1,6 @@
 //! `Percepts`: columns of a batch by name.
 
+mod chosen;
 mod columns;
 mod table;
 
@@ -15,6 +16,7 @@ use somatic::internal::renamed::new_name;
 use somatic::sink::TableKind;
 use somatic::{Flags, Outputs, Percepts};
 
+use crate::array_body::Names;
 use crate::arrays::{array, time_s};
 use crate::error::{stays_here, unknown_name, usage};
 use crate::globs::{Globs, by_name};
@@ -27,7 +29,8 @@ use crate::touches::PyTouches;
 ///
 /// `p["centroid"]` is an array [frames, fields, components], without the last axis where there is one component. It is float32
 /// with backends `cpu` and `gpu` (float64 for what is computed in double precision everywhere), float64 with `reference`; `active` is
-/// uint32. What is absent is NaN (0 in `active`), and `p.present(name)` says it. Arrays are made when first asked for, read-only,
+/// uint32. What is absent is NaN (0 in `active`), and `p.present(name)` says it. A field of taxels of several kinds is there once for each
+/// letter that they have, as `p.letters` says: `p["shear"]` is NaN in fields of another letter. Arrays are made when first asked for, read-only,
 /// and own their memory: they outlive the percepts and the engine.
 ///
 /// >>> import numpy as np
@@ -170,8 +173,10 @@ impl PyPercepts {
     ///
     /// Parameters
     /// ----------
-    /// fields : str or iterable of str
-    ///     Such as `"hand/palm*"`, `"left_*"` or `["hand/back", "hand/palm"]`.
+    /// fields : str or iterable of str, optional
+    ///     Such as `"hand/palm*"`, `"left_*"` or `["hand/back", "hand/palm"]`; all by default.
+    /// letters : str or iterable of str, optional
+    ///     Such as `"shear"`; all by default.
     ///
     /// Returns
     /// -------
@@ -181,7 +186,7 @@ impl PyPercepts {
     /// Raises
     /// ------
     /// UnknownNameError
-    ///     Where a glob matches nothing.
+    ///     Where a glob matches nothing, or no field is of a letter.
     ///
     /// Examples
     /// --------
@@ -189,12 +194,11 @@ impl PyPercepts {
     /// >>> p = st.Engine(st.Body.bundled("hand"), {"outputs": ["total"]}, backend="cpu").step(0.0, [0] * 40)
     /// >>> p.select("hand/b*").fields, p.select("hand/b*")["total"].shape
     /// (['hand/back'], (1, 1))
-    fn select(slf: &Bound<'_, Self>, fields: Globs) -> PyResult<Self> {
+    #[pyo3(signature = (fields = None, *, letters = None))]
+    fn select(slf: &Bound<'_, Self>, fields: Option<Globs>, letters: Option<Names>) -> PyResult<Self> {
         let (py, of) = (slf.py(), slf.get());
-        let indices = of.indices();
-        let names = |&field: &usize| [of.run.labels[field].as_str(), of.run.names[field].field.as_str()];
-        let chosen = fields.chosen(py, &indices.iter().map(names).collect::<Vec<_>>())?;
-        Ok(Self::part(slf, of.frames.clone(), Some(chosen.into_iter().map(|at| indices[at]).collect())))
+        let indices = of.chosen(py, fields, letters)?;
+        Ok(Self::part(slf, of.frames.clone(), Some(indices.into())))
     }
 
     /// Draws a column over time, a line a field, and gives matplotlib's axes.
@@ -285,13 +289,7 @@ impl PyPercepts {
 
     /// The unit of the column called `name`, such as 'm' or 'Pa'; '1' where it has none.
     fn unit(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        use somatic::percept::Unit;
-        let column = self.column(py, name)?;
-        let p = self.run.unit();
-        Ok(match column.unit {
-            Unit::P if !p.is_empty() => p.to_owned(),
-            unit => unit.symbol().to_owned(),
-        })
+        Ok(self.run.symbol_of(self.column(py, name)?.unit))
     }
 
     /// Why quantities are absent or in doubt, uint32 [frames, fields]; the bits are those of `Flags`.
@@ -305,7 +303,8 @@ impl PyPercepts {
         self.once(py, "flags", || array(py, self.inner.all_flags().iter().map(Flags::bits).collect(), &self.shape()))
     }
 
-    /// Whether each field is touched, bool [frames, fields].
+    /// Whether each field is touched, bool [frames, fields]; of letter `proximity` whether something is in range, of `temperature` whether
+    /// there is a reading.
     #[getter]
     fn contact(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.once(py, "contact", || {
@@ -330,6 +329,18 @@ impl PyPercepts {
     #[getter]
     fn fields(&self) -> Vec<&str> {
         self.labels()
+    }
+
+    /// The letter of each field, in the order of the second axis: 'sustained', 'change', 'shear', 'temperature' or 'proximity'.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> engine = st.Engine(st.Body.grid(1, 2, 0.01), {"letters": ["sustained", "change"]}, backend="cpu")
+    /// >>> p = engine.step(0.0, [0, 0])
+    /// >>> p.letters, p.select(letters="change").fields == p.fields[1:]
+    /// (['sustained', 'change'], True)
+    #[getter]
+    fn letters(&self) -> Vec<&str> {
+        self.indices().iter().map(|&field| self.run.letters[field].as_str()).collect()
     }
 
     /// Where the field called `name` is on the second axis.

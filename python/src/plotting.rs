@@ -73,6 +73,7 @@ pub(crate) fn plot(
     to: PathBuf,
     outputs: Vec<String>,
     fields: Vec<String>,
+    calibration: Option<Bound<'_, PyCalibration>>,
     force: bool,
 ) -> PyResult<()> {
     if recordings.len() > MAX_RECORDINGS {
@@ -100,7 +101,9 @@ pub(crate) fn plot(
         plotted.push(Plotted {
             name: known.name.clone(),
             body: body.get().clone(),
-            calibration: known.calibration.as_ref().map(|calibration| calibration.get().clone()),
+            calibration: known
+                .calibrated(py, calibration.as_ref(), body.get())?
+                .map(|calibration| calibration.get().clone()),
             source: InMemory::from_recording(py, known)?,
         });
     }

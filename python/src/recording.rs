@@ -9,10 +9,12 @@ use somatic::signal::Pose;
 use somatic::source::Source;
 use somatic::{Frame, RawValue};
 
-use crate::arrays::{array, poses, times, values};
+use crate::arrays::{array, poses, times};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
+use crate::channels::{Channels, GivenChannel, count_of, names_of, numbers_of, taxels_of};
 use crate::error::{OrRaise, usage, warn};
+use crate::frame_values::values;
 use crate::opening::{Keys, Opening, body_of, text_of};
 use crate::stream::in_python;
 use crate::threads::free;
@@ -35,7 +37,8 @@ const FRAMES_BETWEEN: usize = 1 << 10;
 pub(crate) struct PyRecording {
     pub(crate) name: String,
     pub(crate) frames: usize,
-    pub(crate) taxels: Vec<u32>,
+    /// Whose the values of a frame are.
+    pub(crate) channels: Vec<u32>,
     pub(crate) t: Py<PyAny>,
     pub(crate) values: Py<PyAny>,
     mask: Py<PyAny>,
@@ -56,7 +59,7 @@ impl PyRecording {
         self.t.clone_ref(py)
     }
 
-    /// Raw values, float32 [frames, taxels]: NaN where faulty, and a NaN that `Engine.process` knows where missing.
+    /// Raw values, float32 [frames, taxels], of taxels with three axes three each, as `channels` names them: NaN where faulty, and a NaN that `Engine.process` knows where missing.
     #[getter]
     fn values(&self, py: Python<'_>) -> Py<PyAny> {
         self.values.clone_ref(py)
@@ -68,10 +71,20 @@ impl PyRecording {
         self.mask.clone_ref(py)
     }
 
-    /// The ids of its taxels, in the order of the values.
+    /// The ids of its taxels, in the order of the values; one with three axes is there three times.
     #[getter]
     fn taxels(&self) -> Vec<u32> {
-        self.taxels.clone()
+        taxels_of(&self.channels)
+    }
+
+    /// The names of its values, in their order: a taxel's id, and of one with three axes `4.u` and `4.v` too.
+    ///
+    /// >>> import somatic_touch as st
+    /// >>> st.read("hand").channels[:3]
+    /// ['0', '1', '2']
+    #[getter]
+    fn channels(&self) -> Vec<String> {
+        names_of(&self.channels)
     }
 
     /// By link its poses in the world (z up, x forward, y left), float64 [frames, 7]: x, y, z in metres, and a quaternion qx, qy, qz, qw.
@@ -114,7 +127,7 @@ impl PyRecording {
         };
         let calibration = self.calibrated(py, calibration.as_ref().map(|given| given.bind(py)), body.bind(py).get())?;
         let keys = PyDict::new(py);
-        keys.set_item("taxels", self.taxels.clone())?;
+        keys.set_item("taxels", &self.channels)?;
         keys.set_item("batch", batch)?;
         let class = py.get_type::<crate::engine::PyEngine>();
         class.call((body, scene, calibration, backend), Some(&keys))
@@ -142,9 +155,9 @@ impl PyRecording {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (py, of) = (slf.py(), slf.get());
-        let (name, taxels, losses) = (of.name.clone(), of.taxels.clone(), of.losses.clone());
+        let (name, channels, losses) = (of.name.clone(), of.channels.clone(), of.losses.clone());
         let (body, calibration) = (of.body(py), of.calibration(py));
-        let parts = (name, taxels, of.t(py), of.values(py), of.pose(py), body, calibration, of.is_simulated, losses);
+        let parts = (name, channels, of.t(py), of.values(py), of.pose(py), body, calibration, of.is_simulated, losses);
         Ok((slf.get_type().getattr("_of_parts")?, parts.into_pyobject(py)?))
     }
 
@@ -154,7 +167,7 @@ impl PyRecording {
     fn unpickled(
         py: Python<'_>,
         name: String,
-        taxels: Vec<u32>,
+        taxels: Vec<GivenChannel>,
         t: Bound<'_, PyAny>,
         values: Bound<'_, PyAny>,
         pose: Bound<'_, PyDict>,
@@ -164,12 +177,13 @@ impl PyRecording {
         losses: Vec<String>,
     ) -> PyResult<Self> {
         let t_s = times(&t)?.as_slice()?.to_vec();
-        let shape = [t_s.len(), taxels.len()];
-        let values = self::values(&values, None, &shape, "[frames, taxels]", &taxels)?;
+        let channels = Channels::new(numbers_of(py, taxels)?);
+        let values = self::values(&values, None, Some(t_s.len()), &channels)?;
         for poses in pose.values() {
             poses.call_method1("setflags", (false,))?;
         }
-        let about = About { name, taxels, body, calibration, is_simulated, losses };
+        let channels = channels.numbers().to_vec();
+        let about = About { name, channels, body, calibration, is_simulated, losses };
         Self::new(py, t_s, values.slice(), pose.unbind(), about)
     }
 
@@ -182,7 +196,7 @@ impl PyRecording {
             "<Recording {}: {} frames of {} taxels in {:.2} s>",
             self.name,
             self.frames,
-            self.taxels.len(),
+            count_of(&self.channels),
             self.length_s
         )
     }
@@ -190,8 +204,8 @@ impl PyRecording {
 
 impl PyRecording {
     fn new(py: Python<'_>, t_s: Vec<f64>, values: &[RawValue], pose: Py<PyDict>, about: About) -> PyResult<Self> {
-        let About { name, taxels, body, calibration, is_simulated, losses } = about;
-        let shape = [t_s.len(), taxels.len()];
+        let About { name, channels, body, calibration, is_simulated, losses } = about;
+        let shape = [t_s.len(), channels.len()];
         let mask = values.iter().map(|value| value.is_missing()).collect();
         let length_s = t_s.last().zip(t_s.first()).map_or(0.0, |(last, first)| last - first);
         Ok(Self {
@@ -200,7 +214,7 @@ impl PyRecording {
             t: array(py, t_s, &shape[..1])?,
             values: array(py, bytemuck::cast_slice::<_, f32>(values).to_vec(), &shape)?,
             mask: array(py, mask, &shape)?,
-            taxels,
+            channels,
             pose,
             body,
             calibration,
@@ -221,12 +235,12 @@ impl PyRecording {
     /// Its first frames, up to `most`.
     pub(crate) fn first_frames(&self, py: Python<'_>, most: usize) -> PyResult<Vec<Frame>> {
         let t_s = times(self.t.bind(py))?.as_slice()?.to_vec();
-        let shape = [t_s.len(), self.taxels.len()];
-        let held = values(self.values.bind(py), None, &shape, "[frames, taxels]", &self.taxels)?;
+        let (channels, width) = (Channels::new(self.channels.clone()), self.channels.len());
+        let held = values(self.values.bind(py), None, Some(t_s.len()), &channels)?;
         let placed = poses(self.pose.bind(py), t_s.len())?;
         let frame = |(index, &t_s): (usize, &f64)| Frame {
             t_s,
-            values: held.slice()[index * shape[1]..(index + 1) * shape[1]].to_vec(),
+            values: held.slice()[index * width..][..width].to_vec(),
             pose: placed.iter().map(|(link, poses)| (link.clone(), poses[index])).collect(),
             ..Frame::default()
         };
@@ -288,8 +302,8 @@ impl Frames {
             poses.resize(7 * frames, f64::NAN);
             pose.set_item(link, array(py, poses, &[frames, 7])?)?;
         }
-        let (taxels, losses) = (source.taxels().to_vec(), source.losses());
-        let about = About { name, taxels, body, calibration, is_simulated, losses };
+        let (channels, losses) = (source.taxels().to_vec(), source.losses());
+        let about = About { name, channels, body, calibration, is_simulated, losses };
         PyRecording::new(py, self.t_s, &self.values, pose.unbind(), about)
     }
 
@@ -301,7 +315,7 @@ impl Frames {
 /// What a recording has beside its frames.
 struct About {
     name: String,
-    taxels: Vec<u32>,
+    channels: Vec<u32>,
     body: Option<Py<PyBody>>,
     calibration: Option<Py<PyCalibration>>,
     is_simulated: bool,
@@ -331,7 +345,7 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 
 /// Reads a recording from a file: CSV, MCAP, or a pressure system's export, as `somatic run --source` does.
 ///
-/// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' is the bundled touch. `body` is the robot, for
+/// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' and 'sensing-hand' are the bundled touches. `body` is the robot, for
 /// recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
 /// after its start. Of an HDF5 file `dataset` is the path of the values, such as 'tactile/left', and `time` that of their times; h5py
 /// reads it. With `skip_bad` bad rows of a CSV, an export or a bag are skipped and counted in `losses`; else the first is an error.

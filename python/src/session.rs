@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use somatic::internal::recording::CALIBRATION;
 use somatic::internal::sink::{RecordPart, TableWish};
+use somatic::percept::Unit;
 use somatic::signal::Quantity;
 use somatic::sink::{FieldNames, Session};
 use somatic::{Body, Engine, Outputs, Plan, Precision};
@@ -15,6 +16,8 @@ pub(crate) struct Run {
     pub(crate) plan: Plan,
     pub(crate) names: Vec<FieldNames>,
     pub(crate) labels: Vec<String>,
+    /// By field, its letter.
+    pub(crate) letters: Vec<String>,
     pub(crate) outputs: Outputs,
     pub(crate) precision: Precision,
     pub(crate) backend: [String; 3],
@@ -38,10 +41,13 @@ impl Run {
     ) -> Self {
         let plan = engine.plan().clone();
         let chosen = engine.backend();
-        let labels = (0..plan.fields().len()).map(|field| plan.label(field)).collect();
+        let (fields, percepts) = (0..plan.fields().len(), engine.percepts());
+        let labels = fields.clone().map(|field| plan.label(field)).collect();
+        let letters = fields.map(|field| plan.letters()[percepts.letter(field)].receptor.to_string()).collect();
         Self {
             names: FieldNames::all_of(&plan),
             labels,
+            letters,
             outputs: engine.percepts().outputs(),
             precision: engine.percepts().precision(),
             backend: [chosen.name.to_owned(), chosen.device, chosen.reason.to_owned()],
@@ -57,6 +63,16 @@ impl Run {
     /// What pressures are measured in; empty where fields differ.
     pub(crate) fn unit(&self) -> &'static str {
         self.plan.common_quantity().map_or("", Quantity::symbol)
+    }
+
+    /// The symbol of `unit` as quantities of this run have it.
+    pub(crate) fn symbol_of(&self, unit: Unit) -> String {
+        let p = self.unit();
+        match unit {
+            Unit::P if !p.is_empty() => p.to_owned(),
+            Unit::PMetre if !p.is_empty() => format!("{p} m"),
+            unit => unit.symbol().to_owned(),
+        }
     }
 
     /// What sinks and tables know of the run; `source` is the input's name for people.

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
 use somatic::internal::error::{nearest, suggestion};
 use somatic::internal::renamed::new_name;
-use somatic::percept::{TouchOutputs, Unit};
+use somatic::percept::TouchOutputs;
 use somatic::sink::TableKind;
 use somatic::{Percepts, TOUCH_COLUMNS, Touch, TouchColumn};
 
@@ -261,8 +261,7 @@ impl PyTouches {
         let column = TOUCH_COLUMNS.iter().find(|column| column.name == name);
         Ok(match (name, column) {
             ("t" | "age", _) => "s".to_owned(),
-            (_, Some(column)) if column.unit == Unit::P && !self.run.unit().is_empty() => self.run.unit().to_owned(),
-            (_, column) => column.map_or("1", |column| column.unit.symbol()).to_owned(),
+            (_, column) => column.map_or_else(|| "1".to_owned(), |column| self.run.symbol_of(column.unit)),
         })
     }
 

@@ -1,6 +1,7 @@
 //! `somatic calibrate`: from a rest and a press to a calibration file.
 
 mod gains;
+mod opened;
 mod scale;
 
 use std::path::{Path, PathBuf};
@@ -11,14 +12,15 @@ use clap::Args;
 use serde_json::json;
 use somatic::internal::scene_file::{hertz, length, seconds};
 use somatic::internal::setup::FilesRead;
-use somatic::internal::setup::bodies::{in_body, load_body};
-use somatic::internal::signal::UnitOfP;
+use somatic::internal::setup::bodies::in_body;
 use somatic::internal::survey::known::{KnownForces, PressedOn};
 use somatic::internal::survey::{Findings, Found, Survey, Wishes};
+use somatic::scene::file::SceneFile;
 use somatic::signal::RawValue;
-use somatic::source::{Lines, Source, SourceSpec, TextSource, VendorOptions, VendorSource};
+use somatic::source::{Lines, Source};
 use somatic::{Body, Calibration, Error, Result};
 
+use self::opened::Opened;
 use super::interrupt::stop_on_signal;
 use super::plot_file::PlotFile;
 use super::ports::LineFlags;
@@ -36,6 +38,7 @@ Examples:
   somatic calibrate --body robot.glb --source serial:/dev/ttyUSB0 --wiring hand.toml -o robot.toml
   somatic run --body robot.glb --source session.csv --calibration robot.toml
   somatic calibrate --body robot.glb --gains-from touches.csv --calibration robot.toml -o skin.toml
+  somatic calibrate --map dex3 --source ros2-mcap:hand --missing 30000 -o dex3.toml
   somatic calibrate --body mat.glb --source presses.csv --known 500g --on field --calibration robot.toml -o newton.toml
 
 First nothing touches the robot for the time --rest. Then press every sensor firmly, one after the
@@ -57,9 +60,9 @@ The file is TOML; its keys may be edited:
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    /// The robot: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the source's own, if it has one].
     #[arg(long, value_name = "BODY")]
-    body: String,
+    body: Option<String>,
 
     /// Where frames come from: as for `somatic run`; serial lines may be several.
     #[arg(long = "source", value_name = "SOURCE", required_unless_present = "gains_from")]
@@ -89,6 +92,12 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     text: TextFlags,
+
+    /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
+    ///
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. dex3 and inspire are untested.
+    #[arg(long, value_name = "FILE")]
+    map: Option<String>,
 
     /// The calibration to write, TOML.
     #[arg(short, long, value_name = "FILE.toml")]
@@ -157,28 +166,22 @@ pub(super) struct Arguments {
 pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let output = &arguments.output;
     let sources: Vec<String> = arguments.sources.iter().chain(&arguments.gains_from).cloned().collect();
-    let read = FilesRead::default().bodies([&arguments.body]).named(&sources).files(&arguments.lines.wiring);
-    let read = read.files(&arguments.calibration);
+    let read = FilesRead::default().bodies(&arguments.body).named(&sources).files(&arguments.lines.wiring);
+    let read = read.files(&arguments.calibration).files(&arguments.map);
     let mut outputs = read.outputs(arguments.force);
     let to = outputs.add(output)?;
     check(arguments)?;
     // What was found is printed there.
     outputs.add_standard_output()?;
     let plot = arguments.plot.as_deref().map(|path| PlotFile::at(path, "--plot", &mut outputs)).transpose()?;
-    let body = load_body(&arguments.body)?;
-    if let Some(recording) = &arguments.gains_from {
-        let touches =
-            gains::Touches { recording, calibration: arguments.calibration.as_deref(), rate_hz: arguments.rate };
-        return gains::calibrate(&touches, &body, arguments.stamp, to, arguments.json);
-    }
-    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let ports = arguments.lines.lines(&arguments.sources)?;
-    let (source, lines) = open_all(arguments, &ports, &ids)?;
+    let name = sources.first().map_or("", String::as_str);
+    let Opened { body, source, lines, is_live, unit } = Opened::new(scene_of(arguments, &sources)?)?;
     let channels = in_body(&body, &*source)?;
-    let first = first_of(&arguments.sources);
-    let is_live = lines.is_some() || first.is_ok_and(|spec| spec.is_stdin() || matches!(spec, SourceSpec::Text(_)));
+    if arguments.gains_from.is_some() {
+        let touches = gains::Touches { name, source, calibration: arguments.calibration.as_deref() };
+        return gains::calibrate(touches, &body, &channels, arguments.stamp, to, arguments.json);
+    }
     if let (Some(path), Some(forces)) = (&arguments.calibration, &arguments.known) {
-        let name = arguments.sources.first().map_or("", String::as_str);
         let presses = scale::Presses { name, source, lines: lines.as_ref(), is_live, for_s: arguments.press };
         let done = scale::calibrate(presses, &channels, (&body, path.as_path()), forces, to, arguments.json);
         lines.iter().for_each(Lines::close);
@@ -193,7 +196,6 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let Gathered { losses: lost, frames, last_s, is_whole } = gathered?;
     // Of what is live, Ctrl-C ends the presses; of a recording it leaves out the rest.
     if !is_live && !is_whole {
-        let name = arguments.sources.first().map_or("", String::as_str);
         let absent: Vec<String> = [Some(output), arguments.plot.as_ref()]
             .into_iter()
             .flatten()
@@ -208,14 +210,14 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     })?;
 
     findings.missing.clone_from(&arguments.missing);
-    findings.unit = if ports.is_empty() { unit_of(&arguments.sources, arguments.rate)? } else { UnitOfP::COUNT };
+    findings.unit = unit;
     if let (Some(forces), Some(on)) = (&arguments.known, arguments.on) {
         findings.know(forces, on)?;
     }
     let text = findings.calibration(&name_of(&body));
     // What is written must be what `run` takes; if it were not, nothing is written.
-    let known: Vec<u32> =
-        ids.iter().copied().filter(|id| findings.sensors.iter().any(|found| found.id == *id)).collect();
+    let ids = body.taxels.iter().map(|taxel| taxel.id);
+    let known: Vec<u32> = ids.filter(|id| findings.sensors.iter().any(|found| found.id == *id)).collect();
     Calibration::parse(&text, &known).map_err(|e| e.at("the calibration that follows from this survey"))?;
     to.write(text.as_bytes())?;
     if let Some(plot) = plot {
@@ -225,6 +227,19 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     let code = tell_losses(&lost);
     say(&format!("wrote {}", output.display()));
     Ok(code)
+}
+
+/// What a scene would say of the `sources` that `arguments` name.
+fn scene_of(arguments: &Arguments, sources: &[String]) -> Result<SceneFile> {
+    let mut scene = SceneFile::default();
+    scene.sources = sources.iter().map(|text| text.parse()).collect::<Result<_>>()?;
+    scene.body.clone_from(&arguments.body);
+    scene.map.clone_from(&arguments.map);
+    scene.text = arguments.text.keys();
+    scene.rate_hz = arguments.rate;
+    let lines = arguments.lines.keys();
+    (scene.wiring, scene.live_rate_hz, scene.board_rate_hz) = (lines.wiring, lines.live_rate_hz, lines.board_rate_hz);
+    Ok(scene)
 }
 
 /// Refuses flags that do not go together.
@@ -256,55 +271,11 @@ fn check(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// Opens the sources, which may be `ports`, for a body whose taxels have `ids`.
-fn open_all(
-    arguments: &Arguments,
-    ports: &[(String, Option<u32>)],
-    ids: &[u32],
-) -> Result<(Box<dyn Source + Send>, Option<Lines>)> {
-    if ports.is_empty() {
-        return Ok((open(&first_of(&arguments.sources)?, ids, arguments)?, None));
-    }
-    if arguments.rate.is_some() {
-        return Err(Error::usage("--rate is for CSV recordings; --board-rate is for boards on serial lines"));
-    }
-    let source = arguments.lines.keys().open(ports, ids, None)?;
-    let lines = source.lines();
-    Ok((Box::new(source), Some(lines)))
-}
-
 /// Makes those of `values` missing that are one of `codes`, as a calibration with these does.
 fn without(codes: &[f64], values: &mut [RawValue]) {
     for value in values.iter_mut().filter(|value| codes.iter().any(|&code| **value == RawValue::new(code))) {
         *value = RawValue::MISSING;
     }
-}
-
-/// What an export's values are in, as it says itself.
-fn unit_of(sources: &[String], rate_hz: Option<f64>) -> Result<UnitOfP> {
-    match first_of(sources)? {
-        SourceSpec::Vendor(path) => {
-            Ok(VendorSource::open(path, &VendorOptions { rate_hz, ..VendorOptions::default() })?.layout().unit)
-        }
-        _ => Ok(UnitOfP::COUNT),
-    }
-}
-
-/// Opens `spec` for a body whose taxels have `ids`, and says what its lines of text are taken for.
-fn open(spec: &SourceSpec, ids: &[u32], arguments: &Arguments) -> Result<Box<dyn Source + Send>> {
-    let options =
-        VendorOptions { rate_hz: arguments.rate, text: arguments.text.options()?, ..VendorOptions::default() };
-    match spec {
-        SourceSpec::Text(place) => {
-            spec.check_options(&options)?;
-            Ok(Box::new(TextSource::open(place, &options, &mut |what| say(what))?.for_body(ids)?))
-        }
-        spec => spec.open(ids, &options),
-    }
-}
-
-fn first_of(sources: &[String]) -> Result<SourceSpec> {
-    sources.first().ok_or_else(|| Error::usage("give a --source"))?.parse()
 }
 
 /// Says what is to be said of serial lines.

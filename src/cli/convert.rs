@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     /// The recording, or the body.
     ///
     /// A recording is csv:FILE, mcap:FILE, sim:FILE.toml, or just a .csv, a .mcap or a pressure system's export. A
-    /// body is a .glb or .gltf file, or the bundled hand, mat or humanoid.
+    /// body is a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid.
     #[arg(value_name = "IN")]
     from: String,
 

@@ -22,7 +22,8 @@ struct ValueHistory {
 pub(super) struct Doubts {
     source: String,
     body: String,
-    taxels: usize,
+    /// The ids of the body's taxels.
+    ids: Vec<u32>,
     /// Per value of a frame, the index of its taxel in the body.
     taxel_of_value: Vec<usize>,
     /// Whether frames have a slot for every taxel of the body, as on standard input.
@@ -34,24 +35,47 @@ pub(super) struct Doubts {
     seen: Vec<ValueHistory>,
     /// Whether any frame said where links are, or that this is not known for now.
     has_poses: bool,
+    /// Whether what is doubtful in the frames has been told.
+    is_told: bool,
+    /// What is still to be told of recordings that have ended.
+    held: Vec<String>,
 }
 
 impl Doubts {
     /// For frames of the taxels `ids` of `body` from the source named `source`.
     pub(super) fn new(source: &str, body: &Body, ids: &[u32], holds_any: bool, is_raw: bool) -> Self {
-        let index_of = |id: &u32| body.taxels.binary_search_by_key(id, |taxel| taxel.id).ok();
+        let of_body: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         Self {
             source: source.to_owned(),
             body: body.name.clone(),
-            taxels: body.taxels.len(),
-            taxel_of_value: ids.iter().filter_map(index_of).collect(),
+            taxel_of_value: indices(ids, &of_body),
+            ids: of_body,
             holds_any,
             is_raw,
             begin_s: None,
             is_over: false,
             seen: vec![ValueHistory::default(); ids.len()],
             has_poses: false,
+            is_told: false,
+            held: Vec::new(),
         }
+    }
+
+    /// Begins anew, for frames of the taxels `ids` of another recording, named `source`, whose fields are those of `plan`, too. Returns
+    /// what is to be told of the one before, and of these taxels.
+    pub(super) fn restart(&mut self, source: &str, ids: &[u32], plan: &Plan) -> Vec<String> {
+        let mut told = self.told(plan);
+        source.clone_into(&mut self.source);
+        self.taxel_of_value = indices(ids, &self.ids);
+        self.seen = vec![ValueHistory::default(); ids.len()];
+        (self.begin_s, self.is_over, self.has_poses, self.is_told) = (None, false, false, false);
+        told.extend(self.of_taxels(plan));
+        told
+    }
+
+    /// Keeps lines until [`Doubts::told`].
+    pub(super) fn hold(&mut self, lines: Vec<String>) {
+        self.held.extend(lines);
     }
 
     /// Before the first frame: a warning if the source lacks taxels of the fields of `plan`.
@@ -81,7 +105,16 @@ impl Doubts {
         self.is_over
     }
 
-    pub(super) fn of_frames(&self, plan: &Plan) -> Vec<String> {
+    /// What is doubtful in the frames so far, once.
+    pub(super) fn told(&mut self, plan: &Plan) -> Vec<String> {
+        let mut told = std::mem::take(&mut self.held);
+        if !std::mem::replace(&mut self.is_told, true) {
+            told.extend(self.of_frames(plan));
+        }
+        told
+    }
+
+    fn of_frames(&self, plan: &Plan) -> Vec<String> {
         // Single frames on standard input may have few taxels.
         let of_body = (self.holds_any && self.is_over).then(|| self.of_body(plan, |seen| seen.came)).flatten();
         let rests = self.is_raw.then(|| self.of_rest(plan)).flatten();
@@ -124,7 +157,7 @@ impl Doubts {
             self.source,
             if are_several { "have" } else { "has" },
             there.iter().filter(|there| **there).count(),
-            self.taxels,
+            self.ids.len(),
             self.body,
             lacking.len(),
             count(fields as u64, "field"),
@@ -152,7 +185,7 @@ impl Doubts {
 
     /// Per taxel of the body, whether it has a value that satisfies `is`.
     fn where_in_body(&self, is: impl Fn(&ValueHistory) -> bool) -> Vec<bool> {
-        let mut there = vec![false; self.taxels];
+        let mut there = vec![false; self.ids.len()];
         for (&taxel, seen) in self.taxel_of_value.iter().zip(&self.seen) {
             there[taxel] = is(seen);
         }
@@ -163,4 +196,9 @@ impl Doubts {
     fn among(&self, plan: &Plan, field: usize, among: &[bool]) -> (usize, usize) {
         plan.taxels_of(field).fold((0, 0), |(here, all), taxel| (here + usize::from(among[taxel]), all + 1))
     }
+}
+
+/// Per taxel of `ids`, its place among those of the body.
+fn indices(ids: &[u32], of_body: &[u32]) -> Vec<usize> {
+    ids.iter().filter_map(|id| of_body.binary_search(id).ok()).collect()
 }

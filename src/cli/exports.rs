@@ -21,7 +21,7 @@ pub(super) struct ExportFlags {
 
     /// Read the file as the export of a pressure system [default: as its content says].
     ///
-    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
+    /// One of xsensor, tekscan, emed, pliance, pedar, loadsol, footscan, stappone, or matrix for plain numbers.
     #[arg(long, value_name = "FORMAT", value_parser = one_of::<VendorFormat>(VendorFormat::WORDS))]
     pub(super) format: Option<VendorFormat>,
 

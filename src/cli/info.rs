@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
-use somatic::internal::contents::{COLUMNS, Contacts, Contents, FoundContacts, Rule, Threshold, bag_as_json};
+use somatic::internal::contents::{ContactTable, Contacts, Contents, FoundContacts, Rule, Threshold, bag_as_json};
 use somatic::internal::recording::BagSurvey;
 use somatic::internal::scene_file::seconds;
 use somatic::internal::setup::FilesRead;
@@ -97,7 +97,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
         // What is known is printed there.
         outputs.add_standard_output()?;
     }
-    let mut rows = String::from(COLUMNS);
+    let mut all_contacts = ContactTable::new()?;
     let (mut jsons, mut losses) = (Vec::new(), Vec::new());
     for (index, name) in arguments.recordings.iter().enumerate() {
         let known = known_of(name, arguments)?;
@@ -122,7 +122,7 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
                 let what = "it has no body, which --contacts needs; convert it with one: somatic convert IN OUT.mcap --body BODY";
                 return Err(Error::failed(what).at(name));
             };
-            rows += &contacts.rows(name);
+            all_contacts.add(name, contacts)?;
         }
         losses.extend(match known {
             Known::Bag(survey) => survey.losses,
@@ -135,8 +135,9 @@ pub(super) fn info(arguments: &Arguments) -> Result<u8> {
     }
     if let Some(table) = table {
         let name = table.name().display().to_string();
-        table.write(rows.as_bytes())?;
-        say(&format!("{} in {name}", count(rows.lines().count() as u64 - 1, "contact")));
+        let contacts = count(all_contacts.rows(), "contact");
+        table.write(&all_contacts.into_bytes()?)?;
+        say(&format!("{contacts} in {name}"));
     }
     Ok(ended(&losses))
 }

@@ -37,7 +37,7 @@ Examples:
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, sensing-hand, mat and humanoid.
     body: String,
 
     /// Print JSON: positions in metres in the frame of each taxel's link, charts in the frame of each field's anchor.

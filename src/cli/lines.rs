@@ -169,7 +169,7 @@ impl LineReport {
             }
         }
         if let Some(summary) = self.summary.take() {
-            let boards: Vec<Value> = accounts.iter().map(as_json).collect();
+            let boards: Vec<Value> = accounts.iter().map(BoardAccount::as_json).collect();
             let text = format!("{:#}\n", json!({"boards": boards, "latency": self.latency.json()}));
             summary.write(text.as_bytes())?;
         }
@@ -238,25 +238,6 @@ fn together(accounts: &[BoardAccount]) -> String {
         }
     }
     text
-}
-
-fn as_json(account: &BoardAccount) -> Value {
-    let name = account.limb.as_ref().map_or_else(|| ("board", json!(account.board)), |key| ("limb", json!(key)));
-    json!({
-        (name.0): name.1,
-        "port": account.port,
-        "state": account.state.word(),
-        "sent": account.delivered + account.lost,
-        "delivered": account.delivered,
-        "lost": account.lost,
-        "dropped": account.dropped,
-        "replaced": account.replaced,
-        "corrupt": account.corrupt,
-        "restarts": account.restarts,
-        "unplugs": account.unplugs,
-        "drift_ppm": account.drift.map(|drift| drift * 1e6),
-        "rate_hz": account.rate_hz,
-    })
 }
 
 #[cfg(test)]

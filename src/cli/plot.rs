@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     #[arg(value_name = "SOURCE")]
     sources: Vec<String>,
 
-    /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the recording's own, or hand].
+    /// The robot's body: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the recording's own, or hand].
     #[arg(long, value_name = "BODY")]
     body: Option<String>,
 

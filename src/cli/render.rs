@@ -40,7 +40,7 @@ fields are named; of more, those side by side differ in colour.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own].
+    /// The robot: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the source's own].
     ///
     /// A recording that has its body may be here, too: .mcap, sim:FILE.toml, or a pressure system's export.
     #[arg(value_name = "BODY", required_unless_present = "source")]

@@ -1,12 +1,14 @@
 //! `somatic run`: from a source through an engine to sinks.
 
 mod console;
+mod order;
 mod prepared;
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use somatic::internal::run::Several;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::Setup;
 use somatic::internal::sink::TableName;
@@ -16,13 +18,14 @@ use somatic::sink::{SinkSpec, SinkTarget};
 use somatic::{Error, Result};
 
 use self::console::Console;
+use self::order::OrderOf;
 use self::prepared::Prepared;
 use super::describe::describe;
 use super::interrupt::stop_on_signal;
 #[cfg(unix)]
 use super::keys::Keys;
 use super::live::View;
-use super::scene::{LIVE, RunFlags, grouped, in_flags, input};
+use super::scene::{LIVE, RunFlags, grouped, in_flags, input, one_of};
 use super::stdio::{DONE, FAILED, print, say, say_lines, tell_losses};
 
 const FIRST_EXAMPLES: &str = "\
@@ -47,6 +50,7 @@ Examples:
   robot-driver | somatic run --body robot.glb --source - | controller
   robot-driver | somatic run --body robot.glb --source - --sink mcap:touch.mcap
   somatic run --body robot.glb --source touch.csv.gz
+  somatic run --source a.csv --source b.csv --sink both.csv   one table with a column `recording`
   somatic run --source mcap:touch.mcap --from 60s --to 90s   its second minute's first half
   somatic run --source serial:/dev/ttyUSB0 --source serial:/dev/ttyUSB1 --wiring hand.toml
   somatic run --body mat --source night.csv --backend gpu --verify
@@ -91,6 +95,14 @@ pub(super) struct Arguments {
     #[arg(long = "for", value_name = "TIME", help_heading = LIVE)]
     lasts: Option<String>,
 
+    /// Print which field answers while you press one after the other, and at the end those that never did.
+    ///
+    /// With =taxels, or where there is one field, it is the taxel that answers. Without a calibration, nothing may be pressed
+    /// in the first second.
+    #[arg(long, value_name = "WHAT", help_heading = LIVE, num_args = 0..=1, require_equals = true,
+        default_missing_value = "fields", value_parser = one_of::<OrderOf>(OrderOf::WORDS))]
+    check_order: Option<OrderOf>,
+
     /// Write a summary at the end to this file, as JSON.
     ///
     /// It has how many frames each board sent and lost, and how long percepts took.
@@ -116,8 +128,18 @@ impl Arguments {
         if self.wide && !matches!(self.table, None | Some(TableName::Fields)) {
             return Err(Error::usage("--wide is for the table of fields; leave --table out"));
         }
+        if sinks.is_empty() && !self.describe && asked.each().len() > 1 {
+            return Err(Error::usage(
+                "several recordings go into a table; add `sink = \"csv:FILE\"` or `sink = \"parquet:FILE\"`",
+            ));
+        }
         if self.wide && !sinks.iter().any(|sink| matches!(sink, SinkSpec::Csv(_))) && !self.describe {
             return Err(Error::usage("--wide is for a table in CSV; add --sink csv:FILE"));
+        }
+        if self.check_order.is_some() && sinks.iter().any(SinkSpec::is_on_stdout) {
+            return Err(Error::usage(
+                "--check-order prints on standard output; leave out the --sink that does so, too",
+            ));
         }
         let mut outputs: OutputPaths = FilesRead::from_scene(asked, self.scene.as_deref()).outputs(asked.overwrite);
         // A description makes no file.
@@ -140,15 +162,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<u8> {
 }
 
 fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
-    let input = input(asked)?;
+    let several = Several::new(asked)?;
+    let first = several.first().clone();
+    let input = input(&first)?;
     let Reserved { targets, summary } = arguments.reserve(asked)?;
-    let view = View::choose(asked.quiet, asked.sinks.iter().any(SinkSpec::is_on_stdout), input.is_recording());
-    let prepared = Prepared::open(asked, &input, view.is_table(), summary, arguments.lasts.as_deref())?;
+    let is_printed = asked.sinks.iter().any(SinkSpec::is_on_stdout) || arguments.check_order.is_some();
+    let view = View::choose(asked.quiet, is_printed, input.is_recording());
+    let prepared = Prepared::open(&first, &input, view.is_table(), summary, arguments.lasts.as_deref())?;
+    several.check(&prepared.opened.body)?;
 
     // From here on there is something to bring to a clean end.
     let stop = stop_on_signal()?;
-    let targets = if asked.sinks.is_empty() && !view.is_table() { vec![SinkTarget::Stdout] } else { targets };
-    let session = prepared.opened.session(asked, &input, &targets, arguments.scene.as_deref())?;
+    let is_for_stdout = asked.sinks.is_empty() && !view.is_table() && arguments.check_order.is_none();
+    let targets = if is_for_stdout { vec![SinkTarget::Stdout] } else { targets };
+    let session = several.session(prepared.opened.session(&first, &input, &targets, arguments.scene.as_deref())?);
     if arguments.describe {
         print(&describe(&asked.sinks, &session, arguments.wide)?)?;
         return Ok(DONE);
@@ -157,7 +184,7 @@ fn run_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     if !asked.quiet {
         sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| say(&remark));
     }
-    let (run, console) = prepared.start(asked, &input, view, sinks)?;
+    let (run, console) = prepared.start(several, &input, view, sinks, arguments.check_order)?;
     // Where standard input is the source, what is typed there are frames.
     #[cfg(unix)]
     let keys = if view.is_table() && !input.is_stdin() { Keys::listen() } else { None };
@@ -178,10 +205,10 @@ fn finish(mut run: Run, mut console: Console, is_ended: impl Fn() -> bool) -> Re
         }
     };
     // Where nobody was heard, no file is left.
-    let doubts = console.close(&mut ending)?;
+    let mut doubts = console.close(&mut ending)?;
     let outcome = run.finish(ending)?;
     outcome.remarks.iter().for_each(|remark| say(remark));
-    doubts.iter().flat_map(|doubts| doubts.of_frames(outcome.engine.plan())).for_each(|doubt| say(&doubt));
+    doubts.iter_mut().flat_map(|doubts| doubts.told(outcome.engine.plan())).for_each(|doubt| say(&doubt));
     outcome.notices.iter().for_each(|notice| say(notice));
     let code = tell_losses(&outcome.losses);
     if let Some(agreement) = outcome.agreement {

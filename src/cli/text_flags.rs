@@ -1,9 +1,7 @@
 //! The form of lines of text, instead of finding it out.
 
 use clap::Args;
-use somatic::Result;
 use somatic::scene::file::TextKeys;
-use somatic::source::TextOptions;
 
 /// The form of the lines of sources text:. What is left out is found out from the first second of them.
 #[derive(Args, Clone, Debug, Default)]
@@ -43,9 +41,5 @@ impl TextFlags {
         let mut keys = TextKeys::default();
         (keys.columns, keys.ids, keys.frame_end, keys.time) = (columns, ids, frame_end, time);
         keys
-    }
-
-    pub(super) fn options(&self) -> Result<TextOptions> {
-        self.keys().options()
     }
 }

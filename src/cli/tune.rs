@@ -38,7 +38,7 @@ starts. Ctrl-C puts all wipers back.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Arguments {
-    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, mat and humanoid.
+    /// The robot: a .glb or .gltf file, or one of the bundled bodies hand, sensing-hand, mat and humanoid.
     #[arg(long, value_name = "BODY", default_value = "hand")]
     body: String,
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::episodes::{Episode, Rule, Sample, episodes, summary};
+use super::episodes::{Episode, Rule, Sample, Summary, episodes, summary};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::{Engine, Options};
@@ -57,10 +57,6 @@ pub struct FieldContacts {
     /// The contacts.
     pub contacts: Vec<Episode>,
 }
-
-/// The columns of a table of contacts.
-pub const COLUMNS: &str = "recording,field,contact,onset [s],offset [s],whole,force_peak [N],impulse [N s],total_peak,\
-    total_time,pressure_peak,pressure_time,unit,area [m²],path [m]\n";
 
 impl Contacts {
     /// For frames of `source` on `body`.
@@ -197,57 +193,28 @@ impl FoundContacts {
         &self.fields
     }
 
+    /// The times of the recording's frames, s.
+    pub(super) fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
     /// How long a contact lasts at least, s.
     pub fn shortest_s(&self) -> f64 {
         self.rule.shortest_s
     }
-
-    /// The rows of a table of contacts of `recording`.
-    pub fn rows(&self, recording: &str) -> String {
-        let mut text = String::new();
-        for field in &self.fields {
-            let unit = field.quantity.symbol();
-            for (index, contact) in field.contacts.iter().enumerate() {
-                let found = summary(&field.samples[contact.from..contact.to], &self.times_s);
-                let [force, peak] = [found.force, found.peak]
-                    .map(|pair| pair.map_or([String::new(), String::new()], |pair| pair.map(digits)));
-                let or_empty = |value: Option<f64>| value.map_or(String::new(), digits);
-                let row = [
-                    quoted(recording),
-                    quoted(&field.name),
-                    (index + 1).to_string(),
-                    contact.onset_s.to_string(),
-                    contact.offset_s.to_string(),
-                    contact.is_whole.to_string(),
-                    force[0].clone(),
-                    force[1].clone(),
-                    digits(found.total[0]),
-                    digits(found.total[1]),
-                    peak[0].clone(),
-                    peak[1].clone(),
-                    unit.to_owned(),
-                    or_empty(found.area_m2),
-                    or_empty(found.path_m),
-                ];
-                text += &row.join(",");
-                text += "\n";
-            }
-        }
-        text
-    }
-}
-
-/// With seven digits, as many as single precision has.
-fn digits(value: f64) -> String {
-    format!("{value:.6e}").parse::<f64>().map_or_else(|_| value.to_string(), |value| value.to_string())
-}
-
-/// `text` as a cell of a table.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 impl FieldContacts {
+    /// What each contact comes to, in their order; the frames of the recording are at `times_s`.
+    pub(super) fn summaries(&self, times_s: &[f64]) -> impl Iterator<Item = (&Episode, Summary)> {
+        self.contacts.iter().map(|contact| (contact, summary(&self.samples[contact.from..contact.to], times_s)))
+    }
+
+    /// Of P.
+    pub(super) fn quantity(&self) -> Quantity {
+        self.quantity
+    }
+
     /// Contacts that began and ended in the recording.
     fn whole(&self) -> impl Iterator<Item = &Episode> {
         self.contacts.iter().filter(|contact| contact.is_whole)

@@ -1,13 +1,15 @@
 //! What is in a recording, and which quantities a run can give: for `somatic info` and `somatic outputs`, and for Python.
 
 mod bag;
+mod contact_table;
 mod contacts;
 mod episodes;
 mod quantities;
 mod recording;
 
 pub use self::bag::{bag_as_json, read_as, seconds_of};
-pub use self::contacts::{COLUMNS, Contacts, FieldContacts, FoundContacts};
+pub use self::contact_table::ContactTable;
+pub use self::contacts::{Contacts, FieldContacts, FoundContacts};
 pub use self::episodes::{Episode, Rule, Threshold};
 pub use self::quantities::{Quantity, of_fields, of_touches};
 pub use self::recording::Contents;

@@ -7,10 +7,14 @@
 pub(crate) mod feed;
 mod observer;
 #[cfg(feature = "scenes")]
+mod of_scene;
+#[cfg(feature = "scenes")]
 pub(crate) mod opened;
 pub(crate) mod repeats;
 pub(crate) mod running;
 mod serve;
+#[cfg(feature = "scenes")]
+pub(crate) mod several;
 mod unfit;
 
 pub use self::feed::{Ending, FrameInfo};

@@ -32,6 +32,9 @@ pub trait Observer {
     /// `frames` went through the engine.
     fn computed(&mut self, _engine: &Engine, _frames: &[Frame], _info: &FrameInfo) {}
 
+    /// Another recording begins, called `name`: frames of `taxels`, which go through `engine`.
+    fn began(&mut self, _name: &str, _engine: &Engine, _taxels: &[u32]) {}
+
     /// All sinks have what was read at these times.
     fn written(&mut self, _read_at: &[Instant]) {}
 

@@ -6,10 +6,9 @@ use super::feed::{Feed, ReadMode};
 use super::running::{Run, RunOptions};
 use crate::body::Body;
 use crate::engine::{Engine, Options};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::percept::Precision;
-use crate::scene_file::SceneFile;
-use crate::setup::{FilesRead, Input, RECORDED_BATCH, Setup, Tell, attachments};
+use crate::setup::{Input, RECORDED_BATCH, Setup, attachments};
 use crate::signal::{Channel, Quantity, Wiring};
 use crate::sink::{FieldNames, Session, Sink, SinkSpec, SinkTarget};
 use crate::source::{Lines, Source};
@@ -124,6 +123,7 @@ impl Opened {
             parts: setup.record.clone(),
             plan: Some(plan),
             source: &input.name,
+            recordings: &[],
             backend: [name, device, why],
             is_recorded: self.pace.ends,
             wiring: self.wiring.as_ref(),
@@ -135,70 +135,24 @@ impl Opened {
     /// Starts to read, for `sinks`. Of boards or limbs, somebody else reads the lines.
     #[must_use]
     pub fn start(self, sinks: Vec<Box<dyn Sink + Send>>, input: &Input, options: &RunOptions) -> Run {
+        let options = RunOptions {
+            is_live: !self.pace.gather,
+            tracks_stale: self.lines.is_some(),
+            recording: self.pace.ends.then(|| input.name.clone()),
+            ..options.clone()
+        };
+        let (engine, feed) = self.read();
+        Run::new(engine, feed, sinks, options)
+    }
+
+    /// Starts to read.
+    #[must_use]
+    pub(super) fn read(self) -> (Engine, Feed) {
         let Self { engine, source, lines, pace, .. } = self;
         let feed = match &lines {
             None => Feed::start(source, ReadMode { most: pace.batch, gather: pace.gather, speed: pace.speed }),
             Some(lines) => Feed::start_woken(source, pace.batch, lines),
         };
-        let options = RunOptions {
-            is_live: !pace.gather,
-            tracks_stale: lines.is_some(),
-            recording: pace.ends.then(|| input.name.clone()),
-            ..options.clone()
-        };
-        Run::new(engine, feed, sinks, options)
-    }
-}
-
-impl Run {
-    /// A run of all that `scene` asks for: what it reads is open, and so are its sinks. `tell` gets lines about what was found out.
-    ///
-    /// A recording is played as fast as possible unless the scene says otherwise, and nothing is written where it names no sink.
-    ///
-    /// ```
-    /// use somatic::run::{Run, Tell};
-    /// use somatic::scene::file::SceneFile;
-    ///
-    /// # let folder = tempfile::tempdir().unwrap();
-    /// # let file = folder.path().join("palm.toml");
-    /// # std::fs::write(&file, "fields = \"hand/palm\"\nsink = \"ndjson:palm.ndjson\"").unwrap();
-    /// let mut run = Run::of(SceneFile::load(&file)?, &Tell::new(|line| eprintln!("{line}")))?;
-    /// // `()` watches nothing; an `Observer` of your own sees every call, and may end the run.
-    /// let ending = run.run(&mut (), || false)?;
-    /// let outcome = run.finish(ending)?;
-    /// println!("{} frames, lost: {:?}", outcome.frames, outcome.losses);
-    /// # assert!(outcome.frames > 0 && outcome.losses.is_empty() && folder.path().join("palm.ndjson").exists());
-    /// # Ok::<(), somatic::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Something that the scene names is invalid or not there, an output exists and `overwrite` is not set, or it asks for a
-    /// tolerance or a budget, for which the command measures.
-    pub fn of(scene: SceneFile, tell: &Tell) -> Result<Self> {
-        if !scene.accuracy.target().is_empty() {
-            let what = "tolerances and a budget are met by measuring; `somatic tradeoff --write` measures, and writes into a scene what to \
-                        give in their place";
-            return Err(Error::usage(what).at("[accuracy]"));
-        }
-        let setup = Setup::new(scene, tell.clone());
-        let input = Input::named(&setup)?;
-        let mut outputs = FilesRead::from_scene(&setup, None).outputs(setup.overwrite);
-        let table = setup.table_wish(false)?;
-        let target = |sink: &SinkSpec| sink.target(&mut outputs, &setup.allow_hosts, table);
-        let targets = setup.sinks.iter().map(target).collect::<Result<Vec<SinkTarget>>>()?;
-        let pace = Pace::for_input(&setup, &input, false);
-        let options = |body: &Body| {
-            let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-            Ok((setup.options(body, &ids, pace.batch)?, None))
-        };
-        let opened = Opened::new(&setup, &input, input.body(&setup)?, pace, options)?;
-        let session = opened.session(&setup, &input, &targets, None)?;
-        let sinks = targets.into_iter().map(|target| target.open(&session)).collect::<Result<Vec<_>>>()?;
-        sinks.iter().flat_map(|sink| sink.remarks()).for_each(|remark| tell.say(&remark));
-        let verify = setup.verify;
-        let lines = opened.lines.clone();
-        let mut run = opened.start(sinks, &input, &RunOptions { verify, ..RunOptions::default() });
-        run.lines = lines;
-        Ok(run)
+        (engine, feed)
     }
 }

@@ -1,5 +1,6 @@
 //! A run: the loop from a feed through an engine to sinks.
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use somatic_engine::Agreement;
@@ -33,6 +34,28 @@ pub struct RunOptions {
     pub until: Option<Instant>,
 }
 
+/// A recording that is run after another one, into the same sinks.
+pub struct Following {
+    /// What people call it.
+    pub name: String,
+    /// Makes its engine, whose fields are those of the first recording's, and starts to read it.
+    pub begin: Box<dyn FnOnce() -> Result<Begun> + Send>,
+}
+
+somatic_skin::debug_by_name!(Following);
+
+/// A recording that is read.
+pub struct Begun {
+    /// Knows its taxels.
+    pub engine: Engine,
+    /// Its frames.
+    pub feed: Feed,
+    /// The ids of a frame's values, in their order.
+    pub taxels: Vec<u32>,
+}
+
+somatic_skin::debug_by_name!(Begun);
+
 /// A run: takes frames from a feed through an engine to whoever is to have the percepts.
 pub struct Run {
     engine: Engine,
@@ -46,6 +69,10 @@ pub struct Run {
     progress: Option<f64>,
     /// Frames that were processed.
     frames: u64,
+    /// Recordings that follow.
+    following: VecDeque<Following>,
+    /// Those that have ended.
+    ended: Ended,
     /// Boards or limbs whose messages nobody else reads.
     #[cfg(any(feature = "serial", feature = "zenoh"))]
     pub(super) lines: Option<Lines>,
@@ -53,11 +80,20 @@ pub struct Run {
 
 somatic_skin::debug_by_name!(Run);
 
+/// Recordings of a run that have ended.
+#[derive(Default)]
+struct Ended {
+    recordings: usize,
+    frames: u64,
+    losses: Vec<String>,
+    notices: Vec<String>,
+}
+
 /// What became of a run.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Outcome {
-    /// The engine, after its last frame.
+    /// The engine, after its last frame; of several recordings the last one's.
     pub engine: Engine,
     /// How many frames were processed.
     pub frames: u64,
@@ -87,10 +123,19 @@ impl Run {
             heeds_stale: options.tracks_stale,
             progress: None,
             frames: 0,
+            following: VecDeque::new(),
+            ended: Ended::default(),
             #[cfg(any(feature = "serial", feature = "zenoh"))]
             lines: None,
             options,
         }
+    }
+
+    /// The same, and then other recordings, each from a state of its own.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn followed_by(self, following: Vec<Following>) -> Self {
+        Self { following: following.into(), ..self }
     }
 
     /// Runs until the source ends, the last reader has gone, or `is_ended`; gives what the source says at its end.
@@ -105,6 +150,8 @@ impl Run {
                 Some(Arrival::Frames(frames, mut info)) => {
                     (ending.losses, ending.notices) =
                         (std::mem::take(&mut info.losses), std::mem::take(&mut info.closing));
+                    self.progress = info.progress;
+                    info.progress = self.progress_of_all();
                     self.pass_on(&frames, &info, observer)?;
                     if self.sinks.open.is_empty() && !is_watched {
                         break;
@@ -113,7 +160,16 @@ impl Run {
                     self.feed.give_back(frames);
                     self.report_unfit(observer)?;
                 }
-                Some(Arrival::End(ending)) => return Ok(ending),
+                Some(Arrival::End(end)) => match self.following.pop_front() {
+                    Some(next) => {
+                        self.begin(next, end, observer)?;
+                        ending = Ending::default();
+                        if self.sinks.open.is_empty() && !is_watched {
+                            break;
+                        }
+                    }
+                    None => return Ok(end),
+                },
                 Some(Arrival::Failed(error)) => return Err(error),
                 // Nothing comes, but something may be held back.
                 None if self.options.is_live => self.sinks.each(observer, |sink| sink.flush())?,
@@ -137,6 +193,31 @@ impl Run {
         Ok(ending)
     }
 
+    /// The share of all recordings that has been read, if known; each counts alike.
+    fn progress_of_all(&self) -> Option<f64> {
+        let all = self.ended.recordings + 1 + self.following.len();
+        self.progress.map(|progress| (self.ended.recordings as f64 + progress) / all as f64)
+    }
+
+    /// Begins the recording `next` after one whose end is `end`.
+    fn begin(&mut self, next: Following, end: Ending, observer: &mut dyn Observer) -> Result<()> {
+        let name = self.options.recording.replace(next.name).unwrap_or_default();
+        let of_it = |text: String| of_recording(&name, &text);
+        self.ended.losses.extend(end.losses.into_iter().map(of_it));
+        self.ended.notices.extend(end.notices.into_iter().map(of_it));
+        let unfit = std::mem::take(&mut self.unfit);
+        self.ended.notices.extend(unfit.repeats().map(of_it));
+        self.ended.frames = self.frames;
+        self.ended.recordings += 1;
+        let Begun { engine, feed, taxels } = (next.begin)()?;
+        (self.engine, self.feed) = (engine, feed);
+        (self.heeds_stale, self.progress) = (self.options.tracks_stale, None);
+        let index = self.ended.recordings;
+        self.sinks.each(observer, |sink| sink.begin_recording(index))?;
+        observer.began(self.options.recording.as_deref().unwrap_or_default(), &self.engine, &taxels);
+        Ok(())
+    }
+
     /// Takes `frames` through the engine, and gives every sink what that made of them.
     fn pass_on(&mut self, frames: &[Frame], info: &FrameInfo, observer: &mut dyn Observer) -> Result<()> {
         info.notices.iter().for_each(|notice| observer.remark(Remark::Note, notice));
@@ -158,7 +239,6 @@ impl Run {
         }
         let call = begin.elapsed();
         observer.computed(&self.engine, frames, info);
-        self.progress = info.progress;
         self.frames += frames.len() as u64;
         self.unfit.at_s = frames.last().map_or(self.unfit.at_s, |frame| frame.t_s);
         let engine = &self.engine;
@@ -192,7 +272,7 @@ impl Run {
     /// # Errors
     /// An output cannot be completed.
     pub fn finish(mut self, ending: Ending) -> Result<Outcome> {
-        let Ending { mut losses, notices, is_early } = ending;
+        let Ending { mut losses, mut notices, is_early } = ending;
         #[cfg(any(feature = "serial", feature = "zenoh"))]
         if let Some(lines) = &self.lines {
             lines.close();
@@ -207,8 +287,14 @@ impl Run {
         }
         if is_early {
             let recording = self.options.recording.as_deref().unwrap_or_default();
-            losses.push(left_out(recording, self.frames, self.unfit.at_s, self.progress, &absent));
+            losses.push(left_out(recording, self.frames - self.ended.frames, self.unfit.at_s, self.progress, &absent));
         }
+        losses.splice(..0, self.ended.losses);
+        if self.ended.recordings > 0 {
+            let name = self.options.recording.as_deref().unwrap_or_default();
+            notices.iter_mut().for_each(|notice| *notice = of_recording(name, notice));
+        }
+        notices.splice(..0, self.ended.notices);
         let mut remarks = self.unfit.changes(&self.engine);
         remarks.extend(self.unfit.repeats());
         Ok(Outcome {
@@ -221,6 +307,11 @@ impl Run {
             has_failed: self.sinks.has_failed,
         })
     }
+}
+
+/// The message `text` about `recording`, with its name.
+fn of_recording(recording: &str, text: &str) -> String {
+    if text.contains(recording) { text.to_owned() } else { format!("{recording}: {text}") }
 }
 
 /// The message about a recording that was left before its end, after `frames` frames, the last one at `t_s`; and of the files that

@@ -20,22 +20,23 @@ impl SceneFile {
             ));
         }
         let has_messages = |source: &SourceSpec| {
-            use SourceSpec::{Mcap, Ndjson, Ros2Mcap, Stdin, Text};
-            matches!(source, Mcap(_) | Ndjson(_) | Ros2Mcap(_) | Stdin | Text(_))
+            use SourceSpec::{Mcap, Modbus, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
+            matches!(source, Mcap(_) | Modbus(_) | Ndjson(_) | Ros2 { .. } | Ros2Mcap(_) | Stdin | Text(_))
         };
-        if self.map.is_some() && !(self.sources.len() == 1 && self.sources.iter().all(has_messages)) {
+        if self.map.is_some() && !(!self.sources.is_empty() && self.sources.iter().all(has_messages)) {
             return Err(Error::usage(
-                "`map` is for one ROS 2 bag, NDJSON, or lines of JSON; add `source = \"ros2-mcap:BAG\"`, or leave it out",
+                "`map` is for ROS 2 bags and topics, NDJSON, lines of JSON, or Modbus; add `source = \"ros2-mcap:BAG\"`, or leave it out",
             ));
         }
         let has_no_bad = |source: &SourceSpec| {
             use SourceSpec::{LeRobot, Mcap, Ros2, Serial, Sim, Zenoh};
-            let is_own = matches!(source, Mcap(_)) && self.map.is_none();
-            is_own || matches!(source, LeRobot(_) | Sim(_) | Serial { .. } | Ros2 { .. } | Zenoh(_))
+            let is_own = matches!(source, Mcap(_) | Ros2 { .. }) && self.map.is_none();
+            is_own || matches!(source, LeRobot(_) | Sim(_) | Serial { .. } | Zenoh(_))
         };
         if self.skip_bad && self.joint_states.is_none() && self.sources.iter().any(has_no_bad) {
             return Err(Error::usage("`skip_bad` is for CSV, NDJSON, exports and ROS 2 bags; leave it out here"));
         }
+        self.check_several()?;
         self.check_joints()?;
         self.check_sinks()?;
         self.check_numbers()?;
@@ -49,6 +50,32 @@ impl SceneFile {
             return Err(Error::usage("`contact_tolerance_m` is for self_contacts; add them to `outputs`"));
         }
         self.filter().map(drop)
+    }
+
+    /// Whether what it asks for is for several recordings, if it names several.
+    fn check_several(&self) -> Result<()> {
+        if self.sources.len() < 2 || !self.sources.iter().all(SourceSpec::is_recording) {
+            return Ok(());
+        }
+        let of_one = [
+            ("joint_states", self.joint_states.is_some()),
+            ("poses", self.poses.is_some()),
+            ("loop", self.repeat.is_some()),
+        ];
+        if let Some((key, _)) = of_one.iter().find(|(_, given)| *given) {
+            return Err(Error::usage(format!("`{key}` is for one recording; leave it out, or run once for each")));
+        }
+        if let Some(sink) = self.sinks.iter().find(|sink| !sink.is_table()) {
+            return Err(Error::usage(format!(
+                "several recordings go into tables, which say of which one a row is, and not into `{sink}`; use `sink = \"csv:FILE\"` or \
+                 `sink = \"parquet:FILE\"`"
+            )));
+        }
+        let is_twice = |(index, source): &(usize, &SourceSpec)| self.sources[..*index].contains(source);
+        match self.sources.iter().enumerate().find(is_twice) {
+            Some((_, source)) => Err(Error::usage(format!("`{source}` is there twice; name each recording once"))),
+            None => Ok(()),
+        }
     }
 
     /// Whether accuracy, backend and outputs go together; if not, by which key.

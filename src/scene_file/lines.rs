@@ -44,9 +44,10 @@ impl LineKeys {
                 _ => {}
             }
         }
-        if sources.len() > 1 && lines.len() < sources.len() && limbs < sources.len() {
+        let recordings = sources.iter().filter(|source| source.is_recording()).count();
+        if sources.len() > 1 && ![lines.len(), limbs, recordings].contains(&sources.len()) {
             return Err(Error::usage(
-                "only serial lines, or only limbs, are read several at a time; merge the others, or run once for each",
+                "only serial lines, only limbs, or only recordings are read together; run once for each of the others",
             ));
         }
         let of_lines = [

@@ -52,7 +52,7 @@ use crate::source::{SourceSpec, VendorFormat};
 )]
 #[non_exhaustive]
 pub struct SceneFile {
-    /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
+    /// The robot's body: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the source's own, or
     /// hand].
     pub body: Option<String>,
 
@@ -63,7 +63,8 @@ pub struct SceneFile {
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
-    /// text:-. Standard input: - for NDJSON, csv:- for CSV.
+    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with `map`. Standard input: - for NDJSON, csv:- for CSV. Several
+    /// recordings go into one table with a column `recording`, each from its own beginning.
     #[serde(rename = "source", deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub sources: Vec<SourceSpec>,
@@ -114,8 +115,8 @@ pub struct SceneFile {
     /// Replace output files that exist; a file that is read is never replaced.
     pub overwrite: bool,
 
-    /// Compute the fields from pressures (sustained), from their change per second (change), or once from each
-    /// [default: sustained].
+    /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
+    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and those of other taxels].
     #[serde(deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub letters: Vec<Receptor>,
@@ -187,7 +188,7 @@ pub struct SceneFile {
 
     /// Read the source as the export of a pressure system [default: as its content says].
     ///
-    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
+    /// One of xsensor, tekscan, emed, pliance, pedar, loadsol, footscan, stappone, or matrix for plain numbers.
     #[serde(deserialize_with = "word")]
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>", extend("enum" = VendorFormat::WORDS)))]
     pub format: Option<VendorFormat>,
@@ -250,7 +251,7 @@ pub struct SceneFile {
 
     /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
     ///
-    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. dex3 and inspire are untested.
     pub map: Option<String>,
 
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].

@@ -39,24 +39,27 @@ pub struct OpenedLines {
 impl Input {
     /// The input for `setup`, if any: a plan needs none.
     pub fn named_or_none(setup: &Setup) -> Result<Option<Self>> {
-        let nothing = setup.sources.is_empty() && !matches!(setup.body.as_deref(), None | Some("hand"));
+        let nothing = setup.sources.is_empty() && bundled_touch(setup).is_none();
         if nothing { Ok(None) } else { Self::named(setup).map(Some) }
     }
 
     pub fn named(setup: &Setup) -> Result<Self> {
         let Some(named) = setup.sources.first() else {
             return match setup.body.as_deref() {
-                None | Some("hand") => {
-                    Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new(), limbs: Vec::new() })
-                }
-                Some(body) => {
+                Some(body) if bundled_touch(setup).is_none() => {
                     check_body_name(body)?;
                     Err(Error::usage(format!(
-                        "body `{body}` needs a `source`, such as csv:FILE or -; the bundled touch is for the bundled hand"
+                        "body `{body}` needs a `source`, such as csv:FILE or -; the bundled touches are for the bundled hands"
                     )))
                 }
+                _ => Ok(Self { name: "bundled touch".to_owned(), spec: None, lines: Vec::new(), limbs: Vec::new() }),
             };
         };
+        if setup.sources.len() > 1 && named.is_recording() {
+            return Err(Error::usage(
+                "several recordings are run one after the other by `somatic run` alone, into a table; name one of them here",
+            ));
+        }
         let Some(spec) = setup.first_source()? else { unreachable!("a source is named") };
         let name = match &spec {
             SourceSpec::Ros2Mcap(bag) => bag.to_string(),
@@ -133,8 +136,7 @@ impl Input {
     }
 
     pub fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Ros2, Serial, Stdin, Text, Zenoh};
-        !matches!(self.spec, Some(Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Zenoh(_)))
+        self.spec.as_ref().is_none_or(SourceSpec::is_recording)
     }
 
     /// Whether several boards or limbs are merged.
@@ -192,7 +194,7 @@ impl Input {
     /// Opens it, or the requested part, for a body whose taxels have `ids`.
     pub fn open(&self, ids: &[u32], setup: &Setup) -> Result<Box<dyn Source + Send>> {
         #[cfg(feature = "ros2")]
-        if let Some(SourceSpec::Ros2 { topic, kind }) = &self.spec {
+        if let (Some(SourceSpec::Ros2 { topic, kind }), None) = (&self.spec, &setup.map) {
             return Ok(Box::new(crate::robot::Ros2Source::open(topic, kind.as_deref(), &self.body(setup)?)?));
         }
         if let Some(source) = setup.take_text(ids)? {
@@ -204,6 +206,7 @@ impl Input {
             times: setup.repeat.unwrap_or(Cut::WHOLE.times),
         };
         let (spec, name, ids, rate_hz) = (self.spec.clone(), self.name.clone(), ids.to_vec(), setup.rate_hz);
+        let touch = bundled_touch(setup).unwrap_or(bundled::TOUCH);
         let options = setup.export_options()?;
         let strict = setup.strict;
         let is_plain = options.map.is_none();
@@ -244,11 +247,20 @@ impl Input {
                         // Its columns are known.
                         SourceSpec::Stdin.check_options(&options)?;
                     }
-                    let length = Some(bundled::TOUCH.len() as u64);
-                    Ok(Box::new(CsvSource::from_reader(&name, bundled::TOUCH, length, rate_hz)?))
+                    let length = Some(touch.len() as u64);
+                    Ok(Box::new(CsvSource::from_reader(&name, touch, length, rate_hz)?))
                 }
             }
         };
         if cut == Cut::WHOLE { open() } else { Ok(Box::new(Replay::new(open, cut)?)) }
+    }
+}
+
+/// The touch that comes with the bundled body that `setup` names, or with the hand if it names none.
+fn bundled_touch(setup: &Setup) -> Option<&'static [u8]> {
+    match setup.body.as_deref() {
+        None | Some("hand") => Some(bundled::TOUCH),
+        Some("sensing-hand") => Some(bundled::MEETING),
+        Some(_) => None,
     }
 }

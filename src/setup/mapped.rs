@@ -14,6 +14,15 @@ pub fn open_mapped(spec: &SourceSpec, options: &VendorOptions) -> Result<MappedS
     if let SourceSpec::Ros2Mcap(bag) = spec {
         return mapped_bag(bag, map, options.skip_bad);
     }
+    #[cfg(feature = "ros2")]
+    if let SourceSpec::Ros2 { topic, kind } = spec {
+        return crate::robot::mapped_topic(topic, kind.as_deref(), map, options.skip_bad);
+    }
+    #[cfg(not(feature = "ros2"))]
+    if let SourceSpec::Ros2 { topic, .. } = spec {
+        let what = "built without the feature `ros2`: cargo install --path . --features ros2";
+        return Err(Error::failed(what).at(format!("source `ros2:{topic}`")));
+    }
     let lines = spec.open_json(map, options.skip_bad)?;
     lines.ok_or_else(|| Error::usage("lines that come live are read by `somatic run`").at(spec))
 }

@@ -54,6 +54,28 @@ impl Setup {
         Self { scene, first: FirstSource::default(), tell }
     }
 
+    /// What is asked of each recording, if it names several; else of all that it names together.
+    #[must_use]
+    pub fn each(&self) -> Vec<Self> {
+        let are_several = self.sources.len() > 1 && self.sources.iter().all(SourceSpec::is_recording);
+        if !are_several {
+            return vec![self.clone()];
+        }
+        let of_one = |(index, source): (usize, &SourceSpec)| Self {
+            scene: SceneFile { sources: vec![source.clone()], ..self.scene.clone() },
+            // What is known of the first one is known here.
+            first: if index == 0 { self.first.clone() } else { FirstSource::default() },
+            tell: self.tell.clone(),
+        };
+        self.sources.iter().enumerate().map(of_one).collect()
+    }
+
+    /// The same, of which nobody hears what is found out.
+    #[must_use]
+    pub fn unheard(&self) -> Self {
+        Self::new(self.scene.clone(), Tell::default())
+    }
+
     /// The recording whose body and calibration are used, which is so where no body is named.
     #[must_use]
     pub fn recording(&self) -> Option<&PathBuf> {

@@ -16,6 +16,7 @@ mod file;
 pub mod gains;
 pub mod known;
 mod known_curve;
+pub mod press_order;
 mod presses;
 pub mod scale;
 pub mod tuning;

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::field::{FieldSet, Recharted};
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Charts, Knobs, OrientationBy, Scene};
-use crate::signal::{Frame, Receptor};
+use crate::signal::{Frame, Letter, Receptor};
 
 /// Settings of a measurement.
 #[derive(Clone, Debug)]
@@ -97,6 +97,7 @@ pub fn measure(
     measure_options: &MeasureOptions,
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Report> {
+    let options = &of_pressure(options);
     // Once, as geodesic charts may take seconds.
     let charted = all_charts(body, options)?;
     let geometries = geometries(body, options, &charted)?;
@@ -202,9 +203,22 @@ fn take_turns(
     Ok(())
 }
 
+/// The same for the letters of pressure alone: the others are made alike whatever is traded.
+fn of_pressure(options: &Options) -> Options {
+    let scene = options.scene.clone();
+    let mut letters = scene.letters.clone();
+    letters.retain(|letter| letter.receptor.is_of_pressure());
+    if letters.is_empty() {
+        letters.push(Letter::default());
+    }
+    let outputs = scene.outputs - Outputs::OF_OTHER_LETTERS;
+    options.clone().scene(scene.letters(letters).outputs(outputs))
+}
+
 /// Whether contacts can be fitted to touches.
 fn can_fit(options: &Options) -> bool {
-    let has_touches = options.scene.letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
+    let letters = &options.scene.letters;
+    let has_touches = letters.is_empty() || letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
     has_touches && options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some())
 }
 

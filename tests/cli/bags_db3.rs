@@ -3,6 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
+use somatic::Frame;
+use somatic::internal::robot::BagSource;
+use somatic::internal::source::BagName;
+use somatic::source::Source as _;
 
 use super::bags::{ROBOT, refused};
 use super::{done, output, stderr, text_of};
@@ -152,4 +156,78 @@ fn a_bag_in_sqlite_that_is_not_whole_says_so() {
     let run = output(&arguments);
     assert_eq!(run.status.code(), Some(3), "{}", stderr(&run));
     assert!(stderr(&run).contains("drive.db3: damaged in one place after t = "), "{}", stderr(&run));
+}
+
+/// Reading takes at most half as long again as reading the same messages from MCAP; `tests/long/bags` with optimisation.
+#[test]
+#[ignore = "a measurement of SOMATIC_LONG_MESSAGES messages, 200,000 unless set"]
+fn reading_takes_little_longer_than_from_mcap() {
+    const ROUNDS: usize = 7;
+    let count: usize = std::env::var("SOMATIC_LONG_MESSAGES").map_or(200_000, |text| text.parse().unwrap());
+    let (folder, body, bag) = drive();
+    let few = messages(&bag);
+    let span_ns = few.last().unwrap().2 - few[0].2 + 20_000_000;
+    let many: Vec<(String, String, i64, Vec<u8>)> = (0..)
+        .flat_map(|round| few.iter().map(move |message| (round, message)))
+        .take(count)
+        .map(|(round, (topic, kind, log_ns, data))| {
+            (topic.clone(), kind.clone(), log_ns + round * span_ns, data.clone())
+        })
+        .collect();
+    let paths = ["long.mcap", "long.db3"].map(|name| folder.path().join(name));
+    write_mcap(&paths[0], &bag, &many);
+    write_db3(&paths[1], &many);
+    let body = somatic::Body::load(&body).unwrap();
+    let read = |path: &Path| {
+        let start = std::time::Instant::now();
+        let mut source = BagSource::open(&BagName::new(path), &body).unwrap();
+        let mut frame = Frame::missing(0.0, source.taxels().len());
+        let mut frames = 0_usize;
+        while source.next_frame(&mut frame).unwrap() {
+            frames += 1;
+        }
+        assert!(source.losses().is_empty(), "{:?}", source.losses());
+        (start.elapsed(), frames)
+    };
+    let mut best = [std::time::Duration::MAX; 2];
+    let mut frames = [0; 2];
+    for _ in 0..ROUNDS {
+        for (index, path) in paths.iter().enumerate() {
+            let (took, seen) = read(path);
+            (best[index], frames[index]) = (best[index].min(took), seen);
+        }
+    }
+    let ratio = best[1].as_secs_f64() / best[0].as_secs_f64();
+    println!("{count} messages, {} frames: MCAP {:?}, SQLite {:?}, {ratio:.2} times", frames[0], best[0], best[1]);
+    assert!(frames[0] == frames[1] && frames[0] > count / 20, "{frames:?}");
+    assert!(ratio <= 1.5, "{ratio}");
+}
+
+/// Writes `messages` as MCAP, on the channels of the bag in the folder `of`.
+fn write_mcap(path: &Path, of: &Path, messages: &[(String, String, i64, Vec<u8>)]) {
+    let mut files = std::fs::read_dir(of).unwrap().map(|entry| entry.unwrap().path());
+    let file = files.find(|path| path.extension().is_some_and(|ending| ending == "mcap")).unwrap();
+    let bytes = std::fs::read(file).unwrap();
+    let to = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
+    let mut writer = mcap::WriteOptions::new().compression(None).profile("ros2").create(to).unwrap();
+    let channels: std::collections::BTreeMap<String, u16> = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(|message| message.unwrap().channel)
+        .map(|channel| (channel.topic.clone(), channel))
+        .collect::<std::collections::BTreeMap<_, _>>()
+        .into_iter()
+        .map(|(topic, channel)| {
+            let schema = channel.schema.as_ref().unwrap();
+            let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data).unwrap();
+            let id = writer.add_channel(schema, &topic, &channel.message_encoding, &channel.metadata).unwrap();
+            (topic, id)
+        })
+        .collect();
+    for (sequence, (topic, _, log_ns, data)) in (0_u32..).zip(messages) {
+        let time = *log_ns as u64;
+        let header =
+            mcap::records::MessageHeader { channel_id: channels[topic], sequence, log_time: time, publish_time: time };
+        writer.write_to_known_channel(&header, data).unwrap();
+    }
+    writer.finish().unwrap();
 }

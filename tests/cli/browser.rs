@@ -60,6 +60,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
         "pair.test.js",
         "situations.test.js",
         "tools.test.js",
+        "speed.test.js",
     ])
     .current_dir(folder);
     node.env("SOMATIC", env!("CARGO_BIN_EXE_somatic")).env("CHROMIUM", browser);

@@ -13,6 +13,7 @@ mod blocked_networks;
 mod board;
 mod browser;
 mod calibrate;
+mod check_order;
 mod devices;
 mod doubts;
 mod escape;
@@ -56,6 +57,8 @@ mod ros2;
 #[cfg(all(unix, feature = "ros2"))]
 mod ros2_live;
 #[cfg(all(unix, feature = "ros2"))]
+mod ros2_mapped;
+#[cfg(all(unix, feature = "ros2"))]
 mod ros2_peer;
 mod run;
 mod self_contacts;
@@ -63,6 +66,7 @@ mod self_contacts;
 mod senses;
 #[cfg(unix)]
 mod serial;
+mod several;
 #[cfg(unix)]
 mod signals;
 mod simulate;

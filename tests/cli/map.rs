@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{BufWriter, Read as _, Write as _};
+use std::net::TcpListener;
 use std::path::Path;
 
 use serde_json::Value;
@@ -219,7 +220,7 @@ fn what_a_map_does_not_fit_is_refused_in_a_line() {
     let why = refused(2, &["run", "--source", &source, "--map", "dex4", "--sink", "-"]);
     assert!(why.contains("did you mean `dex3`?"), "{why}");
     let why = refused(2, &["run", "--source", "csv:a.csv", "--map", "dex3", "--sink", "-"]);
-    assert!(why.contains("--map is for one ROS 2 bag, NDJSON, or lines of JSON"), "{why}");
+    assert!(why.contains("--map is for one ROS 2 bag or topic, NDJSON, lines of JSON, or Modbus"), "{why}");
     // A message that is cut short is left out and counted.
     let mut cut = messages();
     cut[1].3.truncate(200);
@@ -227,4 +228,197 @@ fn what_a_map_does_not_fit_is_refused_in_a_line() {
     let run = output(&["run", "--source", &source, "--map", "dex3", "--sink", "-"]);
     assert_eq!(run.status.code(), Some(3), "{}", stderr(&run));
     assert!(stderr(&run).contains("damaged in one place"), "{}", stderr(&run));
+}
+
+/// Values of four sensors in frame `frame`, 50 a second: 2 s of rest at 100, then each is pressed for a fifth of a second.
+fn pressed(frame: usize) -> [i64; 4] {
+    let noise = [0, 1, -1][frame % 3];
+    [0, 1, 2, 3].map(|sensor| 100 + noise + if frame >= 100 && frame / 10 == 11 + 2 * sensor { 300 } else { 0 })
+}
+
+#[test]
+fn what_a_map_reads_is_calibrated_as_a_table_is() {
+    const FRAMES: usize = 190;
+    let folder = tempfile::tempdir().unwrap();
+    let [lines, table, map, body, by_map, by_table] =
+        ["s.ndjson", "s.csv", "map.toml", "row.glb", "by-map.toml", "by-table.toml"]
+            .map(|name| folder.path().join(name));
+    fs::write(&map, "values = 'pads[*].force'\nmissing = [-1]\n").unwrap();
+    let line = |frame: usize| {
+        let [a, b, c, d] = pressed(frame);
+        let t_s = frame as f64 / 50.0;
+        // A code that is no reading, where the table has a blank.
+        let code = |value: i64| if frame == 7 { -1 } else { value };
+        format!("{{\"t\":{t_s},\"pads\":[{{\"force\":[{a},{}]}},{{\"force\":[{c},{d}]}}]}}\n", code(b))
+    };
+    fs::write(&lines, (0..FRAMES).map(line).collect::<String>()).unwrap();
+    let row = |frame: usize| {
+        let [a, b, c, d] = pressed(frame);
+        let b = if frame == 7 { String::new() } else { b.to_string() };
+        format!("{},{a},{b},{c},{d}\n", frame as f64 / 50.0)
+    };
+    fs::write(&table, "t,0,1,2,3\n".to_owned() + &(0..FRAMES).map(row).collect::<String>()).unwrap();
+    done(&["author", "--grid", "1x4", "--pitch", "10mm", "-o", text_of(&body)]);
+    let of_table = ["calibrate", "--body", text_of(&body), "--source", text_of(&table), "--rest", "2", "--json"];
+    let of_table = done(&[&of_table[..], &["-o", text_of(&by_table)]].concat());
+    // The body is the map's where none is named.
+    let of_map = ["calibrate", "--map", text_of(&map), "--rest", "2", "--json", "-o", text_of(&by_map), "--force"];
+    let source = ["--source", text_of(&lines)];
+    assert_eq!(done(&[&of_map[..], &source].concat()), of_table);
+    let (own, other) = (fs::read_to_string(&by_map).unwrap(), fs::read_to_string(&by_table).unwrap());
+    assert!(own.contains("body = \"map\"") && other.contains("body = \"row\""), "{own}{other}");
+    assert_eq!(own.replace("body = \"map\"", "body = \"row\""), other);
+    // Live, and with a body.
+    let live = [&of_map[..], &["--source", "-", "--body", text_of(&body)]].concat();
+    let calibrated = super::somatic(&live).stdin(File::open(&lines).unwrap()).output().unwrap();
+    assert_eq!(calibrated.status.code(), Some(0), "{}", stderr(&calibrated));
+    assert_eq!(String::from_utf8(calibrated.stdout).unwrap(), of_table);
+    // Under it rest is nothing, and a press is felt.
+    done(&[&of_map[..], &source].concat());
+    let run = ["run", "--map", text_of(&map), "--calibration", text_of(&by_map), "--backend", "reference"];
+    let all = totals(&done(&[&run[..], &["--outputs", "total", "--all-fields"], &source].concat()));
+    assert!((0..100).all(|frame| all[frame]["row"] == 0.0) && (295.0..305.0).contains(&all[115]["row"]), "{all:?}");
+    // A source that says nothing of its robot is not taken for the hand.
+    let why = refused(2, &["calibrate", "--source", text_of(&table), "-o", text_of(&by_map), "--force"]);
+    assert!(why.contains("name the robot as --body"), "{why}");
+    let why =
+        refused(2, &["calibrate", "--source", text_of(&table), "--map", "dex3", "-o", text_of(&by_map), "--force"]);
+    assert!(why.contains("--map is for one ROS 2 bag"), "{why}");
+    let why =
+        refused(2, &["calibrate", "--map", text_of(&map), "--source", text_of(&lines), "-o", text_of(&map), "--force"]);
+    assert!(why.contains("this is the input"), "{why}");
+}
+
+#[test]
+fn a_hand_is_calibrated_from_its_bag() {
+    let folder = tempfile::tempdir().unwrap();
+    let [bag, to] = ["hand.mcap", "hand.toml"].map(|name| folder.path().join(name));
+    let raw = |frame: usize| {
+        move |pad: usize, at: usize| match (pad, at) {
+            // A sensor that is not there.
+            (8, 11) => 30_000.0,
+            _ if frame >= 210 && frame / 10 == 21 + 2 * pad => 150_000.0,
+            _ => 100_000.0 + [0.0, 10.0, -10.0][(frame + at) % 3],
+        }
+    };
+    let message = |frame: usize| (TOPIC.to_owned(), STATE.to_owned(), 10_000_000 * frame as i64, state(raw(frame)));
+    write_mcap(&bag, &(0..400).map(message).collect::<Vec<_>>());
+    let found =
+        done(&["calibrate", "--map", "dex3", "--source", text_of(&bag), "--rest", "2", "--json", "-o", text_of(&to)]);
+    let found: Value = serde_json::from_str(&found).unwrap();
+    let sensors = found["sensors"].as_array().unwrap();
+    assert_eq!((sensors.len(), &found["invert"]), (108, &false.into()));
+    let travels =
+        sensors.iter().filter(|sensor| (49_000.0..51_000.0).contains(&sensor["travel"].as_f64().unwrap_or(0.0)));
+    assert_eq!(travels.count(), 107, "{found}");
+    assert!(sensors[107]["baseline"].is_null(), "{found}");
+    done(&["run", "--map", "dex3", "--source", text_of(&bag), "--calibration", text_of(&to), "--sink", "-"]);
+}
+
+const TACTILE: &str = "tactile_msgs/msg/TactileState";
+
+/// A message with these sensors, each with its values.
+fn tactile(sec: u32, sensors: &[(&str, &[f32])]) -> Vec<u8> {
+    let mut bytes = Bytes(Vec::new());
+    let text = |bytes: &mut Bytes, text: &str| {
+        bytes.words(&[text.len() as u32 + 1]);
+        bytes.0.extend_from_slice(text.as_bytes());
+        bytes.0.push(0);
+    };
+    bytes.words(&[sec, 0]);
+    text(&mut bytes, "hand");
+    bytes.words(&[sensors.len() as u32]);
+    for (name, values) in sensors {
+        text(&mut bytes, name);
+        bytes.words(&[values.len() as u32]);
+        bytes.floats(values.iter().copied());
+    }
+    [&[0, 1, 0, 0][..], &bytes.0].concat()
+}
+
+#[test]
+fn sensors_that_have_names_are_fields() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("touch.db3");
+    let message = |sec: u32, sensors: &[(&str, &[f32])]| {
+        ("/tactile".to_owned(), TACTILE.to_owned(), i64::from(sec) * 1_000_000_000, tactile(sec, sensors))
+    };
+    let thumb =
+        |tip: f32| message(tip as u32, &[("thumb_tip", &[tip, 1.0, 2.0]), ("palm", &[4.0]), ("palm", &[5.0, 6.0])]);
+    write_db3(&bag, &[thumb(1.0), thumb(2.0)]);
+    let run =
+        |more: &[&str]| output(&[&["run", "--map", "tactile-state"], &ASKED[..], &[text_of(&bag)], more].concat());
+    let reported = run(&[]);
+    let said = stderr(&reported);
+    assert_eq!(reported.status.code(), Some(0), "{said}");
+    assert!(said.contains("6 values a message of 3 sensors, thumb_tip to palm"), "{said}");
+    assert!(
+        said.contains("a body is made: 3 pads (thumb_tip to palm_2) of 6 sensors; where they lie is a guess"),
+        "{said}"
+    );
+    let all = totals(&String::from_utf8(reported.stdout).unwrap());
+    let fields = |tip: f64| {
+        [("palm", 4.0), ("palm_2", 11.0), ("thumb_tip", tip + 3.0)].map(|(name, sum)| (name.to_owned(), sum))
+    };
+    assert_eq!(all, [BTreeMap::from(fields(1.0)), BTreeMap::from(fields(2.0))]);
+    // A message whose sensors stand in another order is not taken for the first ones.
+    let turned = message(3, &[("palm", &[4.0]), ("thumb_tip", &[1.0, 1.0, 2.0]), ("palm", &[5.0, 6.0])]);
+    fs::remove_file(&bag).unwrap();
+    write_db3(&bag, &[thumb(1.0), turned, thumb(2.0)]);
+    assert!(stderr(&run(&[])).contains("its sensors have other names than those of the first message"));
+    let skipped = run(&["--skip-bad"]);
+    assert_eq!(skipped.status.code(), Some(3), "{}", stderr(&skipped));
+    assert_eq!(frames(&String::from_utf8(skipped.stdout).unwrap()).len(), 2);
+    // The same as lines of JSON, as rosbridge sends them.
+    let line = r#"{"header":{"stamp":{"sec":1,"nanosec":0}},"sensors":[{"name":"thumb_tip","values":[1,1,2]},{"name":"palm","values":[4]},{"name":"palm","values":[5,6]}]}"#;
+    let path = folder.path().join("touch.ndjson");
+    fs::write(&path, line).unwrap();
+    let of_lines = done(&[&["run", "--map", "tactile-state"], &ASKED[..], &[text_of(&path)]].concat());
+    assert_eq!(totals(&of_lines), all[..1]);
+}
+
+/// A hand that answers reads of registers over Modbus TCP: the thumb's tip is pressed from the twentieth round of its pads on.
+fn hand() -> String {
+    const THUMB_TIP: u16 = 4480;
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let (mut request, mut rounds) = ([0; 12], 0);
+        while stream.read_exact(&mut request).is_ok() {
+            let number = |at: usize| u16::from_be_bytes([request[at], request[at + 1]]);
+            let (first, count) = (number(8), number(10));
+            rounds += usize::from(first == THUMB_TIP);
+            let value: u16 = if first == THUMB_TIP && rounds > 20 { 500 } else { 40 };
+            let length = (3 + 2 * count).to_be_bytes();
+            let head = [&request[..4], &length, &[request[6], 3, 2 * count as u8]].concat();
+            let registers: Vec<u8> = (0..count).flat_map(|_| value.to_be_bytes()).collect();
+            if stream.write_all(&[head, registers].concat()).is_err() {
+                break;
+            }
+        }
+    });
+    address
+}
+
+#[test]
+fn registers_of_a_hand_are_frames() {
+    let source = format!("modbus://{}", hand());
+    let run = output(&[&["run", "--map", "inspire", "--for", "2s", "--sink", "-"], &ASKED[..], &[&source]].concat());
+    let said = stderr(&run);
+    assert_eq!(run.status.code(), Some(0), "{said}");
+    for says in
+        ["registers of fingerone_tip_touch to palm_touch; time is when they come: 1062 values", "untested", "17 pads"]
+    {
+        assert!(said.contains(says), "{says}: {said}");
+    }
+    let all = totals(&String::from_utf8(run.stdout).unwrap());
+    assert!(all.len() > 25, "{} frames", all.len());
+    assert_eq!((all[0]["thumb_tip"], all[0]["palm"], all[24]["thumb_tip"]), (360.0, 4480.0, 4500.0));
+    let why = refused(2, &["run", "--source", "modbus://127.0.0.1:1", "--body", "hand", "--sink", "-"]);
+    assert!(why.contains("a map names the registers that are sensors; add --map FILE, or --map inspire"), "{why}");
+    let why = refused(2, &["run", "--source", &source, "--map", "dex3", "--sink", "-"]);
+    assert!(why.contains("dex3: registers: name them, as registers = { palm = [4900, 112] }"), "{why}");
+    let why = refused(2, &["run", "--source", "modbus://hand:x", "--map", "inspire", "--sink", "-"]);
+    assert!(why.contains("`hand:x` is not a device; write modbus://HOST:PORT"), "{why}");
 }

@@ -203,7 +203,7 @@ fn what_makes_no_sense_is_wrong_usage() {
     for arguments in [&["run", "--body", "hnad"][..], &["run", "--body", "hnad", "--source", "a.csv"]] {
         assert!(fails(1, arguments).contains("hnad: no such file; did you mean the bundled body `hand`?"));
     }
-    assert!(fails(2, &["run", "--source", "a.csv", "--source", "b.csv"]).contains("only serial lines"));
+    assert!(fails(2, &["run", "--source", "a.csv", "--source", "text:a"]).contains("only serial lines"));
     assert!(fails(2, &["run", "--source", "-", "--speed", "2"]).contains("--speed"));
     assert!(fails(2, &["run", "--speed", "0"]).contains("--speed 0"));
     assert!(fails(2, &["run", "--max-age", "nan"]).contains("--max-age"));

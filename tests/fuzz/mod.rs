@@ -1,9 +1,10 @@
 //! Damaged input for every parser: no panic, no hang, no huge allocation, nothing lost in silence.
 //!
 //! A target has sound inputs and a check. Case `n` of a target is made from `SOMATIC_FUZZ_SEED` (default 1) and `n` alone, so that
-//! every run repeats; `SOMATIC_FUZZ_SECONDS` is the time per target (by default all of them take a minute together).
+//! every run repeats; `SOMATIC_FUZZ_SECONDS` is the time per target (by default all of them take a minute together), or
+//! `SOMATIC_FUZZ_INPUTS` their number.
 //! A failing input stays in the folder that the message names; `SOMATIC_FUZZ_FILE` gives a target that one input. The run of an hour:
-//! `tests/long/fuzz`.
+//! `tests/long/fuzz`; that of a million inputs for each format of text: `tests/long/lines`.
 
 mod mutate;
 mod program;
@@ -72,7 +73,11 @@ pub(crate) fn fuzz(make: impl FnOnce() -> Target) {
     let target = make();
     let name = target.name;
     let seed: u64 = number("SOMATIC_FUZZ_SEED", 1);
-    let seconds: f64 = number("SOMATIC_FUZZ_SECONDS", TOGETHER_S / NAMES.len() as f64);
+    let inputs: u64 = number("SOMATIC_FUZZ_INPUTS", u64::MAX);
+    // Where their number is given, time is no end.
+    let together_s = if inputs < u64::MAX { f64::from(u32::MAX) } else { TOGETHER_S };
+    let seconds: f64 = number("SOMATIC_FUZZ_SECONDS", together_s / NAMES.len() as f64);
+    let length = Length { time: Duration::from_secs_f64(seconds), inputs };
     let folder = std::env::temp_dir().join(format!("somatic-fuzz-{}", std::process::id())).join(name);
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join(target.file);
@@ -84,7 +89,7 @@ pub(crate) fn fuzz(make: impl FnOnce() -> Target) {
     let stack = if cfg!(debug_assertions) { 64 << 20 } else { 8 << 20 };
     let thread = std::thread::Builder::new().stack_size(stack).spawn(move || {
         let _ = sender.send(Note::Thread(std::fs::read_link("/proc/thread-self").ok()));
-        let result = run(&target, seed, Duration::from_secs_f64(seconds), &file, only, &shown);
+        let result = run(&target, seed, &length, &file, only, &shown);
         shown.has_ended.store(true, Ordering::Relaxed);
         let _ = sender.send(Note::Ended(result));
     });
@@ -116,6 +121,12 @@ pub(crate) fn fuzz(make: impl FnOnce() -> Target) {
     let _ = std::fs::remove_dir_all(&folder);
 }
 
+/// How long a target is tried.
+struct Length {
+    time: Duration,
+    inputs: u64,
+}
+
 enum Note {
     Thread(Option<PathBuf>),
     Ended(Result<(), String>),
@@ -133,7 +144,7 @@ fn cpu_time_s(thread: Option<&Path>) -> Option<f64> {
 fn run(
     target: &Target,
     seed: u64,
-    time: Duration,
+    length: &Length,
     path: &Path,
     only: Option<Vec<u8>>,
     progress: &Progress,
@@ -169,7 +180,7 @@ fn run(
     }
     let started = Instant::now();
     let mut case = 0_u64;
-    while started.elapsed() < time {
+    while started.elapsed() < length.time && case < length.inputs {
         let mut mutator = Mutator::new(seed ^ name_hash.wrapping_add(case.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
         let sound = &target.seeds[mutator.below(target.seeds.len())];
         let bytes = mutator.damaged(sound, &target.seeds);
@@ -197,7 +208,7 @@ macro_rules! targets {
 }
 
 targets! {
-    csv csv_skin ndjson text xsensor tekscan emed pedar pliance matrix insoles mcap bag_metadata bag bag_db3 point_cloud joint_state transforms
+    csv csv_skin ndjson text xsensor xsensor_groups tekscan emed pedar pliance loadsol footscan stappone matrix insoles mcap bag_metadata bag bag_db3 point_cloud joint_state transforms
     number_array urdf urdf_joints mjcf collada stl obj ply glb gltf body_extras icub recipe scene calibration wiring simulation
     map mapped_lines board_line http web_socket source_names sink_names grid regions joint_states
 }
@@ -214,7 +225,8 @@ fn a_fault_is_found() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("case");
         let progress = Progress::default();
-        run(&target(check), 1, Duration::from_secs(1), &path, None, &progress).map(|()| progress.cases.into_inner())
+        let length = Length { time: Duration::from_secs(1), inputs: u64::MAX };
+        run(&target(check), 1, &length, &path, None, &progress).map(|()| progress.cases.into_inner())
     };
     assert!(found(|_| Ok(true)).unwrap() > 100, "so few cases");
     let panics = |case: &Case<'_>| {

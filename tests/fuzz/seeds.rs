@@ -270,6 +270,12 @@ pub(super) const MAP: &str = "message = '/hand'\ntype = 'maker/msg/Hand'\nvalues
     grid = '4x4'\npitch = '4mm,5mm'\nmissing = [30000, -1]\nscale = 1e-4\ntime = 'clock:ms'\ndecoder = 'i16le'\n\
     [[pads]]\nname = 'tip'\ngrid = '4x4'\npitch = '2mm'\nat_mm = [-3, 4.5]\n";
 
+pub(super) const MAP_OF_SENSORS: &str = "values = 'sensors[*].values'\nnames = 'sensors[*].name'\nmissing = [0]\ndefinition = 'Hand.msg'\n\
+    registers = { tip = [3000, 9], palm = [4900, 112] }\n";
+
+pub(super) const NAMED_LINES: &str = "{\"t\":0,\"pads\":[{\"n\":\"tip\",\"p\":[1,2]},{\"n\":\"palm\",\"p\":[3]}],\"digits\":\"00\"}\n\
+    {\"t\":0.1,\"pads\":[{\"n\":\"tip\",\"p\":[1,2]},{\"n\":\"palm\",\"p\":[4]}],\"digits\":\"01\"}\n";
+
 pub(super) const MAPPED_LINES: &str = "{\"t\":0,\"pads\":[{\"p\":[1,2]},{\"p\":[3,4]}],\"digits\":\"00ff\"}\n\
     {\"t\":0.1,\"pads\":[{\"p\":[9,0]},{\"p\":[3,4]}],\"digits\":\"0a0b\"}\n";
 

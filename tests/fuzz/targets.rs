@@ -150,6 +150,34 @@ pub(super) fn xsensor() -> Target {
     vendor("xsensor", "a.csv", vec![text.into_bytes()], VendorOptions::default())
 }
 
+/// The layout of newer programs; and groups.
+pub(super) fn xsensor_groups() -> Target {
+    let seeds = vec![make::xsensor_groups(&[1, 2, 3]).into_bytes(), make::xsensor_newer(&[1, 2]).into_bytes()];
+    vendor("xsensor_groups", "a.csv", seeds, VendorOptions::default())
+}
+
+pub(super) fn loadsol() -> Target {
+    vendor(
+        "loadsol",
+        "a.txt",
+        vec![make::loadsol(&["A12-L", "A12-R"], &[1, 2, 3]).into_bytes()],
+        VendorOptions::default(),
+    )
+}
+
+pub(super) fn footscan() -> Target {
+    vendor(
+        "footscan",
+        "a.txt",
+        vec![make::footscan(&["Left", "Right"], [4, 3], &[1, 2, 3]).into_bytes()],
+        VendorOptions::default(),
+    )
+}
+
+pub(super) fn stappone() -> Target {
+    vendor("stappone", "a.csv", vec![make::stappone(&[1, 2], &[1, 2, 3]).into_bytes()], VendorOptions::default())
+}
+
 pub(super) fn tekscan() -> Target {
     vendor("tekscan", "a.asf", vec![make::tekscan(&KPA, [6, 10], &[1, 2, 3]).into_bytes()], VendorOptions::default())
 }
@@ -255,14 +283,19 @@ pub(super) fn bag_db3() -> Target {
 }
 
 pub(super) fn map() -> Target {
-    target("map", "a.toml", [seeds::MAP], |case| verdict(ArrayMap::parse(&case.text())))
+    target("map", "a.toml", [seeds::MAP, seeds::MAP_OF_SENSORS], |case| verdict(ArrayMap::parse(&case.text())))
 }
 
 pub(super) fn mapped_lines() -> Target {
-    target("mapped_lines", "a.ndjson", [seeds::MAPPED_LINES], |case| {
-        let map = ArrayMap::parse("values = ['pads[*].p', 'digits']\ndecoder = 'u8'").unwrap();
-        let source = JsonLines::open(case.path, &map).and_then(|lines| MappedSource::new(Box::new(lines), &map, true));
-        verdict(source.and_then(|mut source| frames(&mut source)))
+    let maps = ["values = ['pads[*].p', 'digits']\ndecoder = 'u8'", "values = 'pads[*].p'\nnames = 'pads[*].n'"];
+    let maps = maps.map(|map| ArrayMap::parse(map).unwrap());
+    target("mapped_lines", "a.ndjson", [seeds::MAPPED_LINES, seeds::NAMED_LINES], move |case| {
+        let read = |map: &ArrayMap| {
+            let lines = JsonLines::open(case.path, map)?;
+            let mut source = MappedSource::new(Box::new(lines), map, true)?;
+            frames(&mut source)
+        };
+        Ok(verdict(read(&maps[0]))? | verdict(read(&maps[1]))?)
     })
 }
 

@@ -142,7 +142,7 @@ fn columns_are_percepts_one_after_the_other() {
         let mut engine = engine(&body, kind, "[all]\nnoise = 1\nunit = \"Pa\"\n[layer]\nsigma_m = 0.002", &[]);
         let percepts = engine.process(&frames).unwrap();
         let mut there = 0;
-        for column in COLUMNS {
+        for column in COLUMNS.iter().filter(|column| !Outputs::OF_OTHER_LETTERS.contains(column.output)) {
             let values = percepts.column(column).unwrap();
             let value = |at: usize| match &values {
                 F32(values) => values[at].into(),

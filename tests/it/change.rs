@@ -210,7 +210,6 @@ fn letters_that_make_no_sense_are_refused() {
         assert!(error.is_usage(), "{error}");
         error.to_string()
     };
-    assert!(why("", Vec::new()).contains("no letter is asked for"));
     assert!(why("", vec![Letter::default(); 2]).contains("letter `sustained` is asked for twice"));
     let raw = Letter { signal: Some(FsrSignal::Raw), receptor: Receptor::Change };
     assert!(why("", vec![raw]).contains("signal `raw` is for sensors of kind `fsr`"));

@@ -12,6 +12,7 @@ use somatic::scene::file::SceneFile;
 struct Listener {
     remarks: Vec<String>,
     frames: usize,
+    began: usize,
 }
 
 impl Observer for Listener {
@@ -21,6 +22,10 @@ impl Observer for Listener {
 
     fn computed(&mut self, _: &somatic::Engine, frames: &[somatic::Frame], _: &somatic::run::FrameInfo) {
         self.frames += frames.len();
+    }
+
+    fn began(&mut self, _: &str, _: &somatic::Engine, _: &[u32]) {
+        self.began += 1;
     }
 }
 
@@ -43,6 +48,43 @@ fn a_scene_becomes_a_file_of_percepts() {
     assert_eq!((outcome.frames as usize, listener.frames), (lines.lines().count(), lines.lines().count()));
     assert!(lines.contains("hand/palm") && !lines.contains("centroid") && !lines.contains("hand/thumb"));
     assert!(folder.path().join("a.csv").exists() && outcome.losses.is_empty() && !outcome.has_failed);
+}
+
+#[test]
+fn several_recordings_are_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../../bodies/touch.csv");
+    for name in ["a.csv", "b.csv"] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let keys = "source = [\"a.csv\", \"b.csv\"]\nsink = \"csv:both.csv\"\noutputs = \"total\"\n";
+    let mut run = Run::of(scene(folder.path(), keys), &Tell::default()).unwrap();
+    let mut listener = Listener::default();
+    let ending = run.run(&mut listener, || false).unwrap();
+    let outcome = run.finish(ending).unwrap();
+    let frames = 2 * (text.lines().count() - 1);
+    assert_eq!((outcome.frames as usize, listener.frames, listener.began), (frames, frames, 1));
+    let both = std::fs::read_to_string(folder.path().join("both.csv")).unwrap();
+    let of =
+        |name: &str| -> Vec<&str> { both.lines().filter_map(|row| row.split_once(name)).map(|(_, row)| row).collect() };
+    assert!(of("a.csv").len() > 50 && of("a.csv") == of("b.csv"));
+    // Interrupted in the second one, there is no part of a table.
+    let keys = keys.replace("both", "cut");
+    let mut run = Run::of(scene(folder.path(), &keys), &Tell::default()).unwrap();
+    let began = std::cell::Cell::new(0);
+    let ending = run.run(&mut Counter(&began), || began.get() > 0).unwrap();
+    let outcome = run.finish(ending).unwrap();
+    assert!(outcome.losses[0].contains("b.csv: interrupted before its first frame"), "{:?}", outcome.losses);
+    assert!(!folder.path().join("cut.csv").exists());
+}
+
+/// Who counts the recordings after the first one.
+struct Counter<'a>(&'a std::cell::Cell<usize>);
+
+impl Observer for Counter<'_> {
+    fn began(&mut self, _: &str, _: &somatic::Engine, _: &[u32]) {
+        self.0.set(self.0.get() + 1);
+    }
 }
 
 #[test]

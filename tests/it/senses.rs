@@ -189,6 +189,37 @@ fn a_twist_has_the_sign_of_its_sense_and_no_direction() {
 }
 
 #[test]
+fn a_touch_pulls_and_is_warm_as_the_taxels_under_it() {
+    let body = skin(3);
+    for kind in backends() {
+        let scene = Scene::default().touches(somatic::touch::Options::default());
+        let mut engine = engine(&body, kind, scene);
+        let at = DVec2::new(PITCH, 0.0);
+        let touch = Touch { at, ..TOUCH };
+        let frame = touch.frame(&engine, 0.0);
+        let touches = engine.process_one(&frame).unwrap().touches(0).unwrap();
+        let [felt] = &touches.touches[..] else { panic!("{} touches", touches.touches.len()) };
+        let force = felt.force_vector_newton.unwrap();
+        let right = felt.total * DVec3::new(0.3, -1.0, -0.1);
+        assert!((force - right).length() < 1e-5 * felt.total, "{kind:?}: {force}, not {right}");
+        assert!((felt.shear.unwrap() - DVec3::new(0.3, 0.0, -0.1) * felt.total).length() < 1e-5 * felt.total);
+        assert!((felt.friction.unwrap() - TOUCH.drag.length()).abs() < 1e-5 && felt.torsion.unwrap().abs() < 1e-8);
+        // A taxel of temperature lies on each pressed one.
+        let under = grid().filter(|&(_, of)| pressure(at, of) > 0.0);
+        let of_each = under.map(|(_, of)| TOUCH.celsius + 300.0 * of.x - 100.0 * of.y).collect::<Vec<_>>();
+        let mean = of_each.iter().sum::<f64>() / of_each.len() as f64;
+        assert!((felt.temperature_celsius.unwrap() - mean).abs() < 1e-4);
+    }
+    let plain = Flat::new(&[[0.0, 0.0], [0.01, 0.0]]).field("skin", None, 0..2).body();
+    let scene = Scene::default().touches(somatic::touch::Options::default());
+    let mut engine = Engine::new(&plain, Options::default().scene(scene).backend(BackendKind::Cpu)).unwrap();
+    let mut frame = engine.frame(0.0);
+    frame.values.fill(RawValue::new(1.0));
+    let touches = engine.process_one(&frame).unwrap().touches(0).unwrap();
+    assert!(touches.touches[0].shear.is_none() && touches.touches[0].temperature_celsius.is_none());
+}
+
+#[test]
 fn vectors_and_places_turn_with_the_link() {
     let body = skin(3);
     let mut engine = engine(&body, BackendKind::Cpu, Scene::default());

@@ -19,9 +19,10 @@ import {
 import { endedTicks } from "../../crates/page/src/web/legend.js";
 import { poseToRows, toWorld } from "../../crates/page/src/web/math.js";
 import { Model } from "../../crates/page/src/web/model.js";
-import { orientationLine, touchInWorld } from "../../crates/page/src/web/places.js";
+import { orientationLine, taxelInWorld, touchInWorld } from "../../crates/page/src/web/places.js";
 import { byPixel, runsOf } from "../../crates/page/src/web/plot.js";
 import { spacings } from "../../crates/page/src/web/rest.js";
+import { Spots } from "../../crates/page/src/web/spots.js";
 import { roundLength } from "../../crates/page/src/web/scale_bar.js";
 import { sideLoadText } from "../../crates/page/src/web/self_contacts.js";
 import { tokenIn } from "../../crates/page/src/web/tokens.js";
@@ -71,15 +72,74 @@ test("the colour of a pressure is round(clamp(p / max) * 255)", () => {
 test("changed taxels give few rectangles that hold them", () => {
   const [before, now] = [new Uint8Array(16), new Uint8Array(16)];
   now[0] = now[12] = 1;
-  const at = (taxel) => ({ x0: 100 * taxel, y0: 0, x1: 100 * taxel + 10, y1: 10 });
-  assert.deepEqual(changedRects(before, now, at, { width: 1000, height: 5, rects: 4 }), [
+  const spots = new Spots(new Model(), new Camera());
+  spots.x = Float32Array.of(5, 105, 205, 305);
+  [spots.y, spots.reach] = [new Float32Array(4).fill(5), new Float32Array(4).fill(5)];
+  const limits = { width: 1000, height: 5, rects: 4 };
+  assert.deepEqual(changedRects(before, now, spots, limits), [
     { x0: 0, y0: 0, x1: 10, y1: 5 },
     { x0: 300, y0: 0, x1: 310, y1: 5 },
   ]);
+  spots.reach[3] = 0;
+  assert.equal(changedRects(before, now, spots, limits).length, 1, "what is not drawn changes nothing");
   const rects = [];
-  for (let i = 0; i < 5; i++) addRect(rects, at(i), 2);
+  for (let i = 0; i < 5; i++) addRect(rects, { x0: 100 * i, y0: 0, x1: 100 * i + 10, y1: 10 }, 2);
   assert.equal(rects.length, 2);
   assert.equal(Math.max(...rects.map((r) => r.x1)), 410);
+});
+
+test("of very many changed taxels one rectangle holds all", () => {
+  const count = 1000;
+  const spots = new Spots(new Model(), new Camera());
+  spots.x = Float32Array.from({ length: count }, (_, i) => 10 + (i % 2 ? 900 - 0.1 * i : 0.1 * i));
+  [spots.y, spots.reach] = [new Float32Array(count).fill(20), new Float32Array(count).fill(5)];
+  const now = new Uint8Array(4 * count).fill(1);
+  const limits = { width: 2000, height: 100, rects: 4 };
+  assert.deepEqual(changedRects(new Uint8Array(4 * count), now, spots, limits), [
+    { x0: 5, y0: 15, x1: 915, y1: 25 },
+  ]);
+});
+
+test("taxels are in the picture where the camera has them, but for those that look away", () => {
+  const model = new Model();
+  const s = Math.SQRT1_2;
+  model.setMesh({
+    taxelId: Uint32Array.of(0, 1, 2),
+    taxelLink: Uint32Array.of(0, 0, 0),
+    taxelPosition: Float32Array.of(0, 0, 0, 0.01, 0.02, 0, 0, 0, 0.03),
+    taxelNormal: Float32Array.of(1, 0, 0, 1, 0, 0, -1, 0, 0),
+    taxelRadius: Float32Array.of(0.001, 0.002, 0.003),
+    taxelArea: new Float32Array(3),
+    // Turned by a quarter about z, and moved.
+    restPose: Float32Array.of(0.1, 0.2, 0.3, 0, 0, s, s),
+  });
+  const camera = new Camera();
+  camera.resize(800, 600);
+  [camera.target, camera.distance, camera.yaw, camera.pitch] = [[0.1, 0.2, 0.3], 0.3, Math.PI / 2, 0];
+  camera.update();
+  const spots = new Spots(model, camera);
+  spots.update(0.5, false);
+  near(spots.x[0], 200, 1e-3);
+  near(spots.y[0], 150, 1e-3);
+  for (const taxel of [0, 1]) {
+    const { point, radius } = taxelInWorld(model, taxel);
+    const at = camera.project(point);
+    near(spots.x[taxel], at.x / 2, 1e-3);
+    near(spots.y[taxel], at.y / 2, 1e-3);
+    assert.ok(spots.reach[taxel] > (radius * camera.pixelsPerMetre(at.depth)) / 2);
+  }
+  assert.equal(spots.reach[2], 0, "it looks away");
+  const { x0, x1 } = spots.rectOf(0);
+  assert.ok(spots.isIn(0, { x0: x1 - 1, y0: 0, x1: 800, y1: 600 }));
+  assert.ok(!spots.isIn(0, { x0: x1 + 1, y0: 0, x1: 800, y1: 600 }) && x0 < x1);
+  assert.ok(!spots.isIn(2, { x0: 0, y0: 0, x1: 800, y1: 600 }));
+  spots.update(0.5, true);
+  assert.ok(spots.reach[2] > 0, "where both sides are drawn it is there");
+  // Behind the eye.
+  [camera.target, camera.distance] = [[0.1, -0.5, 0.3], 0.1];
+  camera.update();
+  spots.update(0.5, true);
+  assert.deepEqual([...spots.reach], [0, 0, 0]);
 });
 
 test("a pose turns and moves a point", () => {

@@ -52,6 +52,20 @@ def test_a_calibration_is_the_commands(somatic, tmp_path: pathlib.Path) -> None:
 
 
 @pytest.mark.once
+def test_arrays_in_messages_are_calibrated_by_a_map(tmp_path: pathlib.Path) -> None:
+    source, body = session(tmp_path / "session.csv"), st.Body.grid(1, 4, 0.01)
+    rows = np.loadtxt(source, delimiter=",", skiprows=1)
+    lines = [json.dumps({"t": row[0], "pads": [{"force": list(row[1:3])}, {"force": list(row[3:])}]}) for row in rows]
+    (tmp_path / "session.ndjson").write_text("\n".join(lines) + "\n")
+    (tmp_path / "pads.toml").write_text('values = "pads[*].force"\n')
+    with pytest.warns(UserWarning, match="4 values a message"):
+        found = st.calibrate(body, tmp_path / "session.ndjson", bits=10, map=str(tmp_path / "pads.toml"))
+    assert found.calibration.text == st.calibrate(body, source, bits=10).calibration.text
+    with pytest.raises(st.UsageError, match="neither a file nor a preset"):
+        st.calibrate(body, source, map="dex4")
+
+
+@pytest.mark.once
 def test_what_cannot_be_calibrated_says_so(tmp_path: pathlib.Path) -> None:
     source, body = session(tmp_path / "session.csv"), st.Body.grid(1, 4, 0.01)
     with pytest.raises(st.InputError, match="moved during the rest.*mask_moved"):

@@ -6,6 +6,7 @@ import inspect
 import json
 import pathlib
 import re
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -25,23 +26,53 @@ def test_all_that_the_command_lists_is_callable(somatic) -> None:
     assert listed - ALONE - callables == set()
 
 
+ITS_RESULT = "what the function gives is Python's own, with names"
+"""Why `--json` is no keyword."""
+
 ELSEWHERE = {
-    "info": "json contacts force",
-    "convert": "output",
-    "plot": "output calibration",
-    "author": "output force json errors compare grid pitch ids cells zones",
-    "inspect": "json strict",
-    "render": "output force source",
-    "calibrate": "output force json plot",
-    "plan": "json schema",
-    "tradeoff": "json plot",
-    "simulate": "output force truth",
-    "bench": "sensors fields members wide local outputs calls seed dump force json",
-    "outputs": "json",
-    "run": "describe for summary table",
-    "view": "beside for",
+    "info": {"json": ITS_RESULT},
+    "convert": {"output": "=to"},
+    "plot": {"output": "=path"},
+    "author": {
+        "output": "Body.save",
+        "force": "Body.save",
+        "json": "Body.taxels",
+        "errors": "inspect",
+        "compare": "compare",
+        "grid": "Body.grid",
+        "pitch": "Body.grid",
+        "ids": "Body.grid",
+        "cells": "Body.grid",
+    },
+    "inspect": {"json": ITS_RESULT, "strict": "it is the exit code of a process; `findings` are empty or not"},
+    "render": {"output": "Picture.save", "force": "Picture.save", "source": "=what"},
+    "calibrate": {"output": "Calibration.save", "force": "Calibration.save", "json": ITS_RESULT, "plot": "Calibrated.plot"},
+    "plan": {"json": ITS_RESULT, "schema": "it prints what editors of scene files read, whatever the scene"},
+    "tradeoff": {"json": ITS_RESULT, "plot": "Tradeoff.plot"},
+    "simulate": {"output": "convert", "force": "convert", "truth": "Simulation.truth"},
+    "bench": {
+        **dict.fromkeys(
+            ("sensors", "fields", "members", "wide", "local", "seed", "dump", "force"),
+            "the command measures made-up skins; this measures a body, from Python",
+        ),
+        "outputs": "=scene",
+        "calls": "=seconds",
+        "json": ITS_RESULT,
+    },
+    "outputs": {"json": ITS_RESULT},
+    "run": {
+        "check-order": "it is for somebody who presses one pad after the other, at a terminal",
+        "describe": "Engine.columns",
+        "for": "Live.stop",
+        "summary": "Live.boards",
+        "table": "Percepts.touches",
+    },
+    "view": {"beside": "a page shows what one engine computes; each recording has a `view` of its own", "for": "Shown.close"},
 }
-"""Flags without a keyword: what Python gives back instead of writing it, has as a function, a method or a type of its own, or leaves to the command."""
+"""
+Flags without a keyword, and where Python has them: a function, a method, or another parameter of the function (after `=`); else why it
+has not.
+"""
 
 
 @pytest.mark.once
@@ -56,9 +87,91 @@ def test_flags_of_a_command_are_keywords(somatic) -> None:
         # A run's flags are keys of its scene.
         keywords |= of_scene if {"letters", "tare"} <= flags else set()
         words = {flag: flag.replace("-", "_") for flag in flags}
-        missing = {flag for flag, word in words.items() if not keywords & {word + end for end in ("", "s", "_s", "_hz", "_m")}}
-        assert missing - set(others.split()) == set(), command
-        assert set(others.split()) <= flags, f"{command} has lost a flag"
+        # `outputs` are other things than an `output`.
+        ends = {"output": ("",)}
+        missing = {flag for flag, word in words.items() if not keywords & {word + end for end in ends.get(flag, ("", "s", "_s", "_hz", "_m"))}}
+        assert missing - set(others) == set(), command
+        assert set(others) <= flags, f"{command} has lost a flag"
+        # What has a keyword needs no place elsewhere.
+        assert set(others) <= missing, command
+        for flag, place in others.items():
+            is_there = place[1:] in keywords if place.startswith("=") else " " in place or attrgetter(place)(st) is not None
+            assert is_there, f"{command} --{flag}: {place}"
+
+
+@pytest.mark.once
+def test_columns_are_described_as_by_the_command(somatic) -> None:
+    engine = st.Engine(st.Body.bundled("hand"), {"outputs": ["total", "centroid", "touches"]}, backend="cpu")
+    told = somatic("run", "--quiet", "--describe", "--outputs", "total,centroid,touches")
+    parts = told.split("\n\nin a second file")
+    for table, text in zip(("fields", "touches"), parts, strict=True):
+        rows = [line.split() for line in text.splitlines()[2:]]
+        columns = engine.columns(table)  # type: ignore[arg-type]
+        assert [row[0] for row in rows] == columns["name"].tolist()
+        for row, column in zip(rows, columns, strict=True):
+            assert column["unit"] in (*row, "") and column["type"].split()[0] in row and column["what"].split()[-1] == row[-1]
+            assert column["absent"] == ("or absent" in " ".join(row[:8]))
+    with pytest.raises(st.UsageError, match="were not asked for"):
+        engine.columns("self_contacts")
+    with pytest.raises(KeyError, match="did you mean `touches`"):
+        engine.columns("touch")  # type: ignore[arg-type]
+
+
+@pytest.mark.once
+def test_contacts_of_a_recording_are_a_table(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> None:
+    st.convert(touch, tmp_path / "touch.mcap")
+    somatic("info", tmp_path / "touch.mcap", "--contacts", tmp_path / "theirs.csv", "--shortest", "0")
+    known = st.info(tmp_path / "touch.mcap", contacts=tmp_path / "mine.csv", shortest_s=0.0)
+    assert (tmp_path / "mine.csv").read_bytes() == (tmp_path / "theirs.csv").read_bytes()
+    contacts = known["contacts"]
+    counts = {field["field"]: field["contacts"] for field in known["fields"]}
+    assert {name: contacts["field"].tolist().count(name) for name in counts} == counts and len(contacts) > 3
+    assert (contacts["offset [s]"] > contacts["onset [s]"]).all() and contacts["whole"].dtype == bool
+    assert np.isnan(contacts["force_peak [N]"].astype(float)).all() and (contacts["total_peak"] > 0).all()
+    assert "contacts" not in st.info(tmp_path / "touch.mcap") and len(contacts.to_pandas()) == len(contacts)
+    again = st.info(tmp_path / "touch.mcap", contacts=True, shortest_s=0.0)["contacts"]
+    assert again["path [m]"].tolist() == pytest.approx(contacts["path [m]"].tolist(), nan_ok=True)
+    with pytest.raises(st.SomaticError, match="exists"):
+        st.info(tmp_path / "touch.mcap", contacts=tmp_path / "mine.csv")
+    st.info(tmp_path / "touch.mcap", contacts=tmp_path / "mine.csv", force=True)
+    with pytest.raises(st.SomaticError, match="touch.mcap"):
+        st.info(tmp_path / "touch.mcap", contacts=tmp_path / "touch.mcap", force=True)
+    with pytest.warns(UserWarning, match="no place for what is attached"):
+        st.convert(touch, tmp_path / "touch.csv")
+    with pytest.raises(st.UsageError, match="it has no body, which contacts need"):
+        st.info(tmp_path / "touch.csv", contacts=True)
+
+
+@pytest.mark.once
+def test_zones_are_the_commands(somatic, tmp_path: pathlib.Path) -> None:
+    insole = st.Body.grid(20, 8, 0.01, name="insole")
+    insole.save(tmp_path / "insole.glb")
+    somatic("author", tmp_path / "insole.glb", "--zones", "heel=30%,midfoot,toes", "-o", tmp_path / "theirs.glb")
+    theirs = st.Body.load(tmp_path / "theirs.glb").fields
+    for shape in (insole, tmp_path / "insole.glb"):
+        fields = st.author(shape, zones="heel=30%,midfoot,toes").fields
+        assert {name: field.taxels.tolist() for name, field in fields.items()} == {
+            name: field.taxels.tolist() for name, field in theirs.items()
+        }
+    assert len(theirs["insole/heel"]) == 48 and st.author(insole, zones="heel,toes").name == "insole"
+    (tmp_path / "zones.csv").write_text("taxel,zone\n0,toe\n1,toe\n159,heel\n")
+    for zones in ({0: "toe", 1: "toe", 159: "heel"}, tmp_path / "zones.csv", str(tmp_path / "zones.csv")):
+        body = st.author(insole, zones=zones)  # type: ignore[arg-type]
+        assert body.fields["insole/toe"].taxels.tolist() == [0, 1] and body.fields["insole/heel"].taxels.tolist() == [159]
+    wrong: list[tuple[dict[str, object], str]] = [
+        ({"zones": "heel=130%,toes"}, "zones: .*heel=30%"),
+        ({"zones": {}}, "zones should have by taxel its zone"),
+        ({"zones": {0: " "}}, "zones should have by taxel its zone"),
+        ({"zones": "a,b", "taxels": 3}, "taxels: zones are parts of a skin that is there"),
+        ({"zones": "a,b", "up": "y"}, "up: a body has been read"),
+    ]
+    for keys, what in wrong:
+        with pytest.raises(st.UsageError, match=what):
+            st.author(insole, **keys)  # type: ignore[arg-type]
+    with pytest.raises(st.UsageError, match="zones: this skin has its places"):
+        st.author(csv_skin=tmp_path / "zones.csv", zones="a,b")
+    with pytest.raises(st.InputError, match="taxel 999"):
+        st.author(insole, zones={999: "toe"})
 
 
 @pytest.mark.once

@@ -299,7 +299,7 @@ def test_frames_may_be_dicts_by_taxel() -> None:
     assert np.nanmax(few.step(0, {4: 512})["total"]) == 512
     for wrong, says in [
         ({99: 1}, "frame 0 has a value of taxel 99"),
-        ({"4": 1}, "taxel '4'"),
+        ({"four": 1}, "taxel 'four'"),
         ({4: "much"}, "taxel 4 should have a number"),
     ]:
         with pytest.raises(st.UsageError, match=says):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import pathlib
 import pickle
@@ -127,7 +128,15 @@ def test_boards_are_read_as_the_command_reads_them(command: pathlib.Path, tmp_pa
     with boards(command, tmp_path) as port, st.live(source=port, body="hand", outputs=["total", "touches"], backend="cpu") as live:
         assert len(live.taxels) == 40 and len(live.fields) == 13
         totals = [float(np.nan_to_num(p["total"]).max()) for p, _ in zip(live, range(100), strict=False)]
+        (row,) = live.boards
+        assert row["port"] == port.removeprefix("serial:") and row["delivered"] >= 100 and row["sent"] == row["delivered"] + row["lost"]
     assert len(totals) == 100 and max(totals) > 100
+    summary = tmp_path / "summary.json"
+    with boards(command, tmp_path) as port:
+        words = ["run", "--quiet", "--body", "hand", "--source", port, "--for", "1s", "--summary", summary, "--sink", f"ndjson:{tmp_path / 'a.ndjson'}"]
+        subprocess.run([command, *words], check=True, capture_output=True)
+    (told,) = json.loads(summary.read_text())["boards"]
+    assert set(live.boards.keys()) == set(told)
     calibrated = st.Calibration("[all]\ngain = 2\nunit = 'kPa'", st.Body.bundled("hand"))
     with boards(command, tmp_path) as port, st.live(source=port, body="hand", calibration=calibrated, outputs=["total"]) as live:
         assert next(live).unit("total") == "Pa"
@@ -146,7 +155,7 @@ def test_a_recording_is_played_with_the_same_bits(touch: st.Recording, tmp_path:
     (tmp_path / "touch.csv").write_text("t,0,1\n0,1,2\n0.1,3,4\n")
     (tmp_path / "a.scene.toml").write_text('body = "own.glb"\nsource = "touch.csv"\noutputs = ["total"]\n')
     live = st.live(tmp_path / "a.scene.toml")
-    assert [p.t.tolist() for p in live] == [[0.0, 0.1]] and live.losses == []
+    assert [p.t.tolist() for p in live] == [[0.0, 0.1]] and live.losses == [] and len(live.boards) == 0
 
 
 def test_what_makes_no_sense_is_one_line(tmp_path: pathlib.Path) -> None:

@@ -51,3 +51,18 @@ assert_type(st.outputs()["name"], npt.NDArray[Any])
 with st.view(body, open=False) as shown:
     assert_type(shown.url, str)
 st.author("a.stl", up="x")  # type: ignore[arg-type]
+grip = st.Body.from_arrays([[0, 0, 0]], [[0, 0, 1]], modality="force3", tangents=[[1, 0, 0]])
+three = st.Engine(grip, backend="cpu", taxels=["0", "0.u", "0.v"])
+three.process([0.0], [{0: [1.0, 0.1, None]}])
+three.step(0.0, {"0": 1.0, "0.u": None})
+three.step(0.0, np.zeros((1, 3), np.float32))
+assert_type(three.channels + three.letters + body.channels, list[str])
+assert_type(p.select(letters="shear").select("hand/*", letters=["shear", "temperature"]), st.Percepts)
+assert_type(three.columns("touches"), st.Table)
+assert_type(live.boards, st.Table)
+assert_type(st.author(body, zones={0: "heel"}), st.Body)
+assert_type(st.info("a.mcap", contacts="a.csv")["contacts"], Any)
+st.plot("a.csv", "a.svg", calibration=st.Calibration("", body))
+grip.plot([[1.0, 0.0, 0.0]], letter="shear")
+p.select(letters="sheer")  # type: ignore[arg-type]
+st.Body.from_arrays([[0, 0, 0]], [[0, 0, 1]], modality="force")  # type: ignore[arg-type]

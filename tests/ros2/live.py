@@ -1,13 +1,13 @@
 """A node of ROS 2 in all but name: cyclonedds with ROS's names of topics and types, by rosbags' definitions.
 
     live.py receive TOPIC=TYPE:reliable|best_effort[:stamps] ...
-    live.py send TOPIC TYPE reliable|best_effort
+    live.py send TOPIC TYPE reliable|best_effort [FILE.msg]
     live.py node NAME COUNT
 
 The domain is that of ROS_DOMAIN_ID. `receive` prints `matched` each time every topic has a writer and `unmatched` each time one
 has none, and `received` with the first message, until a line comes on its standard input; then a line of JSON: [topic, when it
 came in ns, message] each; with `stamps` the header's stamp in ns is all that is kept of a message. `send` prints `matched` once
-its topic has a reader, and sends each line of its standard input, a message as JSON. `node` waits until the node NAME has COUNT
+its topic has a reader, and sends each line of its standard input, a message as JSON; FILE.msg defines TYPE. `node` waits until the node NAME has COUNT
 writers and readers and all are found, and prints as JSON which topics of DDS it writes and reads; then `gone` once it says that
 it is no more.
 """
@@ -150,7 +150,9 @@ def node(full_name, count):
 match sys.argv[1:]:
     case ["receive", *topics]:
         receive(topics)
-    case ["send", name, typename, reliability]:
+    case ["send", name, typename, reliability, *definitions]:
+        for path in definitions:
+            read.define(typename, path)
         send(name, typename, reliability)
     case ["node", name, count]:
         node(name, int(count))

@@ -37,11 +37,17 @@ def plain(value):
     return {name: plain(getattr(value, name)) for name in names if not name.isupper()}
 
 
+def define(typename, path):
+    """Makes the type that a .msg file defines known."""
+    STORE.register(get_types_from_msg(Path(path).read_text(), typename))
+
+
 def cyclonedds_type(typename, known={}):
     """A type of cyclonedds after rosbags' definition."""
     from cyclonedds.idl import make_idl_struct, types
 
     numbers = {
+        "int8": types.int8, "int16": types.int16, "uint16": types.uint16, "int64": types.int64, "uint64": types.uint64,
         "int32": types.int32, "uint32": types.uint32, "float32": types.float32, "float64": types.float64,
         "uint8": types.uint8, "byte": types.uint8, "octet": types.uint8, "char": types.uint8, "bool": bool, "string": str,
     }

@@ -15,6 +15,9 @@ fn sound() -> Vec<(VendorFormat, String)> {
         (VendorFormat::Emed, make::emed(&KPA, [5, 4], &[1, 2, 3], 1.0)),
         (VendorFormat::Pedar, make::novel(&KPA, &[5, 5], None, &[1, 2, 3])),
         (VendorFormat::Pliance, make::novel(&KPA, &[12], Some(4), &[1, 2, 3])),
+        (VendorFormat::Loadsol, make::loadsol(&["A12-L", "A12-R"], &[1, 2, 3])),
+        (VendorFormat::Footscan, make::footscan(&["Right"], [4, 3], &[1, 2, 3])),
+        (VendorFormat::Stappone, make::stappone(&[1, 2], &[1, 2, 3])),
         (VendorFormat::Matrix, "1,2\n3,4\n\n5,6\n7,8\n\n9,10\n11,12\n".to_owned()),
     ]
 }
@@ -83,7 +86,7 @@ fn a_wrong_row_in_the_middle_is_an_error_with_its_line() {
         };
         let rows: Vec<usize> = (0..lines.len()).filter(|&line| is_row(lines[line])).collect();
         let at = match format {
-            VendorFormat::Pedar | VendorFormat::Pliance => rows[1],
+            VendorFormat::Pedar | VendorFormat::Pliance | VendorFormat::Loadsol | VendorFormat::Stappone => rows[1],
             _ => rows[rows.len() / 2],
         };
         let with = |row: String| {
@@ -103,13 +106,19 @@ fn a_wrong_row_in_the_middle_is_an_error_with_its_line() {
         let word = row.split(separator).filter(|word| word.parse::<f64>().is_ok()).nth(1).unwrap();
         let position = row.match_indices(word).map(|(at, _)| at).find(|at| *at > 1).unwrap();
         let changed = format!("{}x?{}", &row[..position], &row[position + word.len()..]);
-        let shorter = row.trim_end_matches(',').rsplit_once(separator).unwrap().0.to_owned();
+        let shorter = match format {
+            // What follows the sensors is not read.
+            VendorFormat::Loadsol => row.split('\t').take(9).collect::<Vec<_>>().join("\t"),
+            _ => row.trim_end_matches(',').rsplit_once(separator).unwrap().0.to_owned(),
+        };
         for (what, row) in [("another word", changed), ("a cell less", shorter)] {
             let error = try_read(format, with(row.clone()).as_bytes()).expect_err(&format!("{format}, {what}: {row}"));
             assert!(error.contains(&format!("line {}: ", at + 1)), "{format}, {what}: {error}");
         }
         // A row that is not there at all.
-        if !matches!(format, VendorFormat::Pedar | VendorFormat::Pliance) {
+        let is_of_one_line =
+            [VendorFormat::Pedar, VendorFormat::Pliance, VendorFormat::Loadsol, VendorFormat::Stappone];
+        if !is_of_one_line.contains(&format) {
             let mut fewer = lines.clone();
             fewer.remove(at);
             let error = try_read(format, (fewer.join("\n") + "\n").as_bytes()).expect_err(&format!("{format}"));

@@ -6,6 +6,7 @@ mod damaged;
 mod insoles;
 mod make;
 mod oracle;
+mod soles;
 mod variants;
 
 use std::path::{Path, PathBuf};

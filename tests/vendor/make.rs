@@ -265,3 +265,117 @@ pub fn insoles() -> String {
     }
     text
 }
+
+/// The value of cell `index` of [`xsensor_groups`] in frame `number`: another one than that of every other cell, or 0 in every third frame.
+pub fn grouped_value(number: usize, index: usize) -> f64 {
+    if (number + index).is_multiple_of(3) { 0.0 } else { (100 + 7 * index) as f64 + 0.5 * number as f64 }
+}
+
+/// XSENSOR's with groups: two sensors of 4 × 3 cells, and their groups, which print the cells of [`GROUPS`] in that order.
+pub fn xsensor_groups(numbers: &[usize]) -> String {
+    let mut text = "Units:,mmHg\n".to_owned();
+    let n = |number: usize, index: usize| format!("{}", grouped_value(number, index));
+    for number in numbers {
+        let _ = writeln!(text, "FRAME,{number}\nTime, 08:21:17.{:03}", 13 * number);
+        for (sensor, name) in ["a-LF", "a-RF"].into_iter().enumerate() {
+            let _ = writeln!(
+                text,
+                "SENSOR,{name}\nRows,4\nColumns,3\nSensel Width (cm),0.86\nSensel Height (cm),0.86\nSENSELS"
+            );
+            for row in 0..4 {
+                let cells: Vec<String> = (0..3).map(|column| n(*number, 12 * sensor + 3 * row + column)).collect();
+                let _ = writeln!(text, "{}", cells.join(","));
+            }
+        }
+        for (index, (name, cells)) in GROUPS.iter().enumerate() {
+            let _ = writeln!(text, "GROUP,{}\nName,{name}\nCells,{}\nContact %,0\nSENSELS", index + 1, cells.len());
+            for part in cells.chunks(4) {
+                let _ = writeln!(text, "{}", part.iter().map(|&cell| n(*number, cell)).collect::<Vec<_>>().join(","));
+            }
+        }
+    }
+    text
+}
+
+/// The groups of [`xsensor_groups`]: their names, and the cells of both sensors that they have, in the file's order.
+pub const GROUPS: [(&str, &[usize]); 3] =
+    [("Left Heel", &[11, 8, 7, 10, 9, 6]), ("Right Toe", &[14, 13, 12]), ("Both sides", &[1, 13])];
+
+/// XSENSOR's of newer programs: quotation marks, colons, decimal commas, and no line above a table. One sensor of 2 × 3 cells.
+pub fn xsensor_newer(numbers: &[usize]) -> String {
+    let mut text = "\"File:\",\"C:\\mat, new.xsn\"\n\"Units:\",\"mmHg\"\n\"Threshold:\",\"51,72\"\n\n".to_owned();
+    for number in numbers {
+        let _ = writeln!(
+            text,
+            "\"Frame:\",\"{number}\"\n\"Date:\",\"16-8-2022\"\n\"Time:\",\"08:21:17,{:03}\"",
+            13 * number
+        );
+        text += "\"Sensor:\",\"PX100.L S0000\"\n\"Rows:\",\"2\"\n\"Columns:\",\"3\"\n\"Sensel Width (cm):\",\"0,86\"\n\"Sensel Height (cm):\",\"0,5\"\n";
+        text += "\"Total Area (cm²):\",\"2,58\"\n\"COP Row:\",\"1,00\"\n\n";
+        for row in 0..2 {
+            let cells: Vec<String> =
+                (0..3).map(|column| format!("\"{:.2}\"", value(*number, 0, row, column)).replace('.', ",")).collect();
+            let _ = writeln!(text, "{}", cells.join(","));
+        }
+        text += "\n";
+    }
+    text
+}
+
+/// loadsol's of `devices`, each with three zones, their total and two more columns.
+pub fn loadsol(devices: &[&str], numbers: &[usize]) -> String {
+    let mut text = "trial.loadflux\ncomment \n".to_owned();
+    let zones = ["::lateral", "::medial", "::heel", ""];
+    let names = devices.iter().map(|device| {
+        let forces: Vec<String> = zones.iter().map(|zone| format!("{device}{zone}")).collect();
+        format!("\t{}\t\t{device}::xAcc", forces.join("\t"))
+    });
+    let _ = writeln!(text, "{}\t", names.collect::<Vec<_>>().join("\t"));
+    let units = vec!["Time[secs]\tForce[N]\tForce[N]\tForce[N]\tForce[N]\tTime[secs]\t[g]"; devices.len()];
+    let _ = writeln!(text, "{}\t", units.join("\t"));
+    for number in numbers {
+        let row = (0..devices.len()).map(|device| {
+            let forces: Vec<f64> = (0..3).map(|zone| value(*number, device, 0, zone)).collect();
+            let t_s = 0.005 * *number as f64;
+            let cells: Vec<String> = forces.iter().map(|force| format!("{force:.3}")).collect();
+            format!("{t_s:.3}\t{}\t{:.3}\t{t_s:.3}\t-1.345", cells.join("\t"), forces.iter().sum::<f64>())
+        });
+        let _ = writeln!(text, "{}\t", row.collect::<Vec<_>>().join("\t"));
+    }
+    text
+}
+
+/// footscan's of `sides`, one after the other, each on a rectangle of `rows` by `columns`, 2 ms from one frame to the next.
+pub fn footscan(sides: &[&str], [rows, columns]: [usize; 2], numbers: &[usize]) -> String {
+    let mut text = "Dynamic Roll offfor measurement: Trial_1\nPatient name: NA\n\n".to_owned();
+    for (foot, side) in sides.iter().enumerate() {
+        let _ = writeln!(
+            text,
+            "{side} foot data\n\n{side} rectangle position\nRectangle bottom\n6\nRectangle left\n{}",
+            20 * foot
+        );
+        let _ = writeln!(text, "Rectangle width\n{columns}\nRectangle height\n{rows}\n");
+        for number in numbers {
+            let _ = writeln!(text, "Frame {} ({:.2} ms)", number - numbers[0], 2.0 * (number - numbers[0]) as f64);
+            for row in 0..rows {
+                let cells: Vec<String> =
+                    (0..columns).map(|column| format!("{}", value(*number, foot, row, column))).collect();
+                let _ = writeln!(text, "{}", cells.join("\t"));
+            }
+            text += "\n";
+        }
+    }
+    text
+}
+
+/// StappOne's of `soles`, four sensors each, 16 ms from one row of a sole to the next.
+pub fn stappone(soles: &[u32], numbers: &[usize]) -> String {
+    let mut text = "sole_id,timestamp,accel_x,pressure_01,pressure_02,pressure_03,pressure_04,corrupt\n".to_owned();
+    for number in numbers {
+        for (sole, id) in soles.iter().enumerate() {
+            let cells: Vec<String> = (0..4).map(|cell| format!("{}", value(*number, sole, 0, cell).round())).collect();
+            let _ = writeln!(text, "{id},{},-1780,{},0", 1_768_494_979_568 + 16 * number, cells.join(","));
+        }
+    }
+    text
+}

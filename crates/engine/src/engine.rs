@@ -20,6 +20,7 @@ mod skin_sigmas;
 mod spread;
 mod state;
 mod touch_check;
+mod touch_senses;
 
 use self::cadence::OnChange;
 use self::check::Check;

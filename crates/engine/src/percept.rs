@@ -33,6 +33,7 @@ mod contact_kind;
 mod export;
 mod flags;
 mod keep;
+mod outputs;
 mod presence;
 mod self_contacts;
 mod touch;

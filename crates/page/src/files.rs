@@ -74,6 +74,7 @@ const FILES: &[PageFile] = files![
     "senses.js",
     "socket.js",
     "span.js",
+    "spots.js",
     "stage.css",
     "status.js",
     "style.css",

@@ -22,6 +22,17 @@ pub fn on_threads(threads: usize, work: impl Fn() + Sync) {
     });
 }
 
+/// Calls `work` on one thread that shares nothing with others: for what nobody waits for, so
+/// that what somebody waits for never waits for it.
+pub fn aside<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    match pool {
+        Ok(pool) => pool.install(work),
+        // The system has no thread to give.
+        Err(_) => work(),
+    }
+}
+
 /// Tasks that threads take one after the other.
 pub struct Tasks<I>(Mutex<I>);
 
@@ -44,4 +55,18 @@ pub fn for_each<T: Send>(threads: usize, tasks: impl IntoIterator<Item = T, Into
             work(task);
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_aside_has_one_thread() {
+        let named = std::thread::current().id();
+        let (count, id) = aside(|| (threads(), std::thread::current().id()));
+        assert_eq!(count, 1);
+        assert_ne!(id, named);
+        assert_eq!(aside(threads), 1, "again");
+    }
 }

@@ -9,6 +9,7 @@ use super::PyEngine;
 use super::inner::Inner;
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
+use crate::channels::Channels;
 use crate::error::OrRaise;
 use crate::scene::PyScene;
 use crate::session::Run;
@@ -42,8 +43,8 @@ impl Wish {
         let engine = made.or_raise(py)?;
         let text = calibration.as_ref().map(|calibration| calibration.text.as_str());
         let run = Arc::new(Run::new(&engine, &body.inner, &body.bytes, &self.scene, text));
-        let channels = taxels.clone().unwrap_or_else(|| body.ids());
+        let channels = Channels::new(taxels.clone().unwrap_or_else(|| body.channels()));
         let inner = Mutex::new(Inner { engine, lent: Vec::new(), page: None });
-        Ok(PyEngine { inner, run, width: channels.len(), channels, wish: self })
+        Ok(PyEngine { inner, run, channels, wish: self })
     }
 }

@@ -7,9 +7,8 @@ use serde_json::json;
 use somatic::internal::gains::{GainsEstimate, GainsSurvey};
 use somatic::internal::limits::{self, MAX_TOML_BYTES};
 use somatic::internal::run::left_out;
-use somatic::internal::setup::bodies::in_body;
 use somatic::internal::survey::gains::{layer_under, spread, spread_without_gain, with_gains};
-use somatic::source::{SourceSpec, VendorOptions};
+use somatic::source::Source;
 use somatic::{Body, Calibration, Error, Frame, OutputPath, Result};
 
 use crate::cli::bar::Bar;
@@ -25,21 +24,23 @@ const MOST_SPREAD: f64 = 0.08;
 
 /// Touches, and the calibration that they are to improve.
 pub(super) struct Touches<'a> {
-    pub(super) recording: &'a str,
+    /// As the recording is called.
+    pub(super) name: &'a str,
+    pub(super) source: Box<dyn Source + Send>,
     pub(super) calibration: Option<&'a Path>,
-    pub(super) rate_hz: Option<f64>,
 }
 
 /// Finds gains and width from `touches` on `body`, all by a stamp of the radius `stamp_m` if one is given, and writes their calibration
 /// with these to `to`.
 pub(super) fn calibrate(
-    touches: &Touches<'_>,
+    touches: Touches<'_>,
     body: &Body,
+    channels: &[u32],
     stamp_m: Option<f64>,
     to: OutputPath,
     as_json: bool,
 ) -> Result<u8> {
-    let &Touches { recording, calibration, rate_hz } = touches;
+    let Touches { name: recording, mut source, calibration } = touches;
     let Some(path) = calibration else {
         return Err(Error::usage(
             "--gains-from improves a calibration; name the one with baselines and dead bands as --calibration",
@@ -48,10 +49,7 @@ pub(super) fn calibrate(
     let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(&text, &ids).map_err(|e| e.at(path.display()))?;
-    let spec: SourceSpec = recording.parse()?;
-    let mut source = spec.open(&ids, &VendorOptions { rate_hz, ..VendorOptions::default() })?;
-    let channels = in_body(body, &*source)?;
-    let mut survey = GainsSurvey::new(body, calibration, &channels)?;
+    let mut survey = GainsSurvey::new(body, calibration, channels)?;
     let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("read");
     let mut frames = Vec::with_capacity(BATCH);

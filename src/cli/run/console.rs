@@ -10,6 +10,7 @@ use somatic::internal::sink::Question;
 use somatic::run::{Ending, FrameInfo, Observer, Remark};
 use somatic::{Engine, Frame, Plan, Result};
 
+use super::order::OrderReport;
 use crate::cli::doubts::Doubts;
 #[cfg(feature = "page")]
 use crate::cli::explanation::LiveExplainer;
@@ -24,6 +25,8 @@ pub(super) struct Console {
     pub(super) live: Option<LineReport>,
     /// What is looked for in the first frames.
     pub(super) doubts: Option<Doubts>,
+    /// What is pressed, where that is asked for.
+    pub(super) order: Option<OrderReport>,
     /// With a page.
     #[cfg(feature = "page")]
     pub(super) explainer: Option<LiveExplainer>,
@@ -53,6 +56,18 @@ impl Observer for Console {
             self.tell_doubts(engine.plan());
         }
         self.view.see(engine.percepts(), info.progress);
+        if let Some(Err(error)) = self.order.as_mut().map(|order| order.see(engine, frames)) {
+            self.order = None;
+            say(&error.to_string());
+        }
+    }
+
+    fn began(&mut self, name: &str, engine: &Engine, taxels: &[u32]) {
+        let is_table = self.view.is_table();
+        let Some(doubts) = &mut self.doubts else { return };
+        let told = doubts.restart(name, taxels, engine.plan());
+        // Under a table they wait for its end.
+        if is_table { doubts.hold(told) } else { told.iter().for_each(|doubt| say(doubt)) }
     }
 
     fn written(&mut self, read_at: &[Instant]) {
@@ -80,8 +95,7 @@ impl Observer for Console {
 impl Console {
     /// Says, the first time, what is doubtful in the frames so far.
     fn tell_doubts(&mut self, plan: &Plan) {
-        let doubts = self.doubts.take();
-        doubts.iter().flat_map(|doubts| doubts.of_frames(plan)).for_each(|doubt| say(&doubt));
+        self.doubts.iter_mut().flat_map(|doubts| doubts.told(plan)).for_each(|doubt| say(&doubt));
     }
 
     /// Removes the table, and closes the lines, whose losses are those of the run. The doubts are not reported yet.
@@ -90,6 +104,7 @@ impl Console {
     /// No board was heard.
     pub(super) fn close(self, ending: &mut Ending) -> Result<Option<Doubts>> {
         self.view.finish();
+        self.order.map_or(Ok(()), OrderReport::finish)?;
         if let Some(live) = self.live {
             ending.losses = live.finish()?;
         }

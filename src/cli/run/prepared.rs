@@ -2,16 +2,17 @@
 
 use std::time::{Duration, Instant};
 
-use somatic::internal::run::{Opened, Pace, RunOptions};
+use somatic::internal::run::{Opened, Pace, RunOptions, Several};
 use somatic::internal::setup::{Input, Setup};
 use somatic::output::OutputPath;
 use somatic::run::Run;
 use somatic::sink::Sink;
 #[cfg(feature = "page")]
 use somatic::sink::SinkSpec;
-use somatic::{BackendKind, Error, Result};
+use somatic::{BackendKind, Error, Options, Result};
 
 use super::console::Console;
+use super::order::{OrderOf, OrderReport};
 use crate::cli::doubts::Doubts;
 #[cfg(feature = "page")]
 use crate::cli::explanation::LiveExplainer;
@@ -25,11 +26,11 @@ use crate::cli::words;
 /// All that a run at a terminal has before its sinks are opened.
 pub(super) struct Prepared {
     pub(super) opened: Opened,
-    #[cfg(feature = "page")]
-    options: somatic::Options,
+    options: Options,
     /// What is written of boards at the end.
     summary: Option<OutputPath>,
     doubts: Option<Doubts>,
+    has_calibration: bool,
     verify: bool,
     /// How long it goes at most.
     lasts: Option<Duration>,
@@ -63,16 +64,9 @@ impl Prepared {
         })?;
         let (options, why) = chosen.unwrap_or_default();
         let is_raw = options.calibration.is_none() && !options.tare;
+        let has_calibration = options.calibration.is_some();
         let verify = asked.verify && has_another_to_compare(&opened.engine, why.as_deref())?;
-        let mut prepared = Self {
-            opened,
-            #[cfg(feature = "page")]
-            options,
-            summary,
-            doubts: None,
-            verify,
-            lasts,
-        };
+        let mut prepared = Self { opened, options, summary, doubts: None, has_calibration, verify, lasts };
         prepared.tell(asked, input, is_raw);
         Ok(prepared)
     }
@@ -92,34 +86,42 @@ impl Prepared {
         self.doubts = Some(doubts);
     }
 
-    /// Starts to read, for `sinks` and what a `view` shows.
+    /// Starts to read, for `sinks` and what a `view` shows, what is asked of each recording; the first one is open. Prints the order
+    /// of what is pressed, if that is asked for.
     pub(super) fn start(
         self,
-        asked: &Setup,
+        several: Several,
         input: &Input,
         view: ViewKind,
         sinks: Vec<Box<dyn Sink + Send>>,
+        check_order: Option<OrderOf>,
     ) -> Result<(Run, Console)> {
+        let asked = several.first();
         let Opened { body, engine, lines, .. } = &self.opened;
+        let word = if asked.map.is_some() { "pad" } else { "field" };
+        let order = check_order
+            .map(|of| OrderReport::new(&self.opened, of, word, !self.has_calibration, !input.is_recording()));
         #[cfg(feature = "page")]
         let explainer = match asked.sinks.iter().any(|sink| matches!(sink, SinkSpec::Page(_))) {
             true => {
                 let Opened { backend, source, .. } = &self.opened;
-                let options = self.options.backend(backend[0].parse()?);
+                let options = self.options.clone().backend(backend[0].parse()?);
                 Some(LiveExplainer::start(body.clone(), options, source.taxels().to_vec()))
             }
             false => None,
         };
-        let about = RunInfo { engine, body, source: &input.name, all_fields: asked.all_fields };
+        let about = RunInfo { engine, body, source: several.title(&input.name), all_fields: asked.all_fields };
         let console = Console {
             view: view.open(&about),
             live: lines.clone().map(|lines| LineReport::new(lines, self.summary, asked.quiet)),
             doubts: self.doubts,
+            order,
             #[cfg(feature = "page")]
             explainer,
         };
         let until = self.lasts.map(|span| Instant::now() + span);
+        let following = several.following(&self.opened, &self.options)?;
         let run = self.opened.start(sinks, input, &RunOptions { verify: self.verify, until, ..RunOptions::default() });
-        Ok((run, console))
+        Ok((run.followed_by(following), console))
     }
 }

@@ -23,7 +23,7 @@ use crate::cli::text_flags::TextFlags;
 /// find it by that name. The keys of `--force` and `--speed` are `overwrite` and `playback_speed`. Flags override keys.
 #[derive(Args, Clone, Debug, Default)]
 pub(in crate::cli) struct RunFlags {
-    /// The robot's body: a .glb or .gltf file, or the bundled hand, mat or humanoid [default: the source's own, or
+    /// The robot's body: a .glb or .gltf file, or the bundled hand, sensing-hand, mat or humanoid [default: the source's own, or
     /// hand].
     #[arg(long, value_name = "BODY")]
     pub(in crate::cli) body: Option<String>,
@@ -35,7 +35,8 @@ pub(in crate::cli) struct RunFlags {
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
-    /// text:-. Standard input: - for NDJSON, csv:- for CSV.
+    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with --map. Standard input: - for NDJSON, csv:- for CSV. Several
+    /// recordings go into one table with a column `recording`, each from its own beginning.
     #[arg(id = "source", long = "source", value_name = "SOURCE")]
     pub(in crate::cli) sources: Vec<String>,
 
@@ -82,10 +83,10 @@ pub(in crate::cli) struct RunFlags {
     #[arg(long = "force")]
     pub(in crate::cli) overwrite: bool,
 
-    /// Compute the fields from pressures (sustained), from their change per second (change), or once from each
-    /// [default: sustained].
+    /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
+    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and those of other taxels].
     #[arg(long, help_heading = COMPUTED, value_name = "LETTER,...", value_delimiter = ',',
-        value_parser = one_of::<Receptor>(&["sustained", "change"]))]
+        value_parser = one_of::<Receptor>(&["sustained", "change", "shear", "temperature", "proximity"]))]
     pub(in crate::cli) letters: Vec<Receptor>,
 
     /// Compute from the raw or the linear signal of force-sensing resistors, not the one in the calibration.
@@ -179,7 +180,7 @@ pub(in crate::cli) struct RunFlags {
 
     /// Read the source as the export of a pressure system [default: as its content says].
     ///
-    /// One of xsensor, tekscan, emed, pliance, pedar, or matrix for plain numbers.
+    /// One of xsensor, tekscan, emed, pliance, pedar, loadsol, footscan, stappone, or matrix for plain numbers.
     #[arg(long, help_heading = RECORDINGS, value_name = "FORMAT",
         value_parser = one_of::<VendorFormat>(VendorFormat::WORDS))]
     pub(in crate::cli) format: Option<VendorFormat>,
@@ -248,7 +249,7 @@ pub(in crate::cli) struct RunFlags {
 
     /// Which arrays of messages are sensors: a TOML file, or dex3, inspire, tactile-state or mujoco.
     ///
-    /// For ROS 2 bags with messages of any type, NDJSON, and lines of JSON. dex3 and inspire are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. dex3 and inspire are untested.
     #[arg(long, help_heading = RECORDINGS, value_name = "FILE")]
     pub(in crate::cli) map: Option<String>,
 

@@ -55,7 +55,7 @@ play; nobody can change a file.";
 pub(super) struct Arguments {
     /// What to show: a body, a recording, a scene or a simulation [default: the bundled touch].
     ///
-    /// A body is a .glb or .gltf, or hand, mat or humanoid. A recording is a .mcap, a .csv, or a pressure system's
+    /// A body is a .glb or .gltf, or hand, sensing-hand, mat or humanoid. A recording is a .mcap, a .csv, or a pressure system's
     /// .asf, .lst, .asc or .txt. A scene or a simulation is a .toml.
     #[arg(value_name = "WHAT")]
     what: Option<String>,

@@ -19,6 +19,8 @@ use super::timeline::Timeline;
 const MAX_WAIT: Duration = Duration::from_millis(50);
 /// Times since the beginning of a recording are rounded by less, s.
 const ROUNDING_S: f64 = 1e-6;
+/// A call takes about so long at most, so that pictures follow each other also where frames take long.
+const CALL_S: f64 = 0.05;
 /// Requests that are answered before the next frame, and before a look at whether to end.
 const REQUESTS_AT_ONCE: usize = 256;
 
@@ -36,6 +38,8 @@ pub(super) struct Player {
     clock: Clock,
     /// What the clock counted when it was last heeded: changes and jumps.
     heeded: [u64; 2],
+    /// Smoothed time that a frame takes, s.
+    frame_s: f64,
 }
 
 impl Player {
@@ -47,7 +51,18 @@ impl Player {
         timeline: Arc<Timeline>,
         clock: Clock,
     ) -> Self {
-        Self { engine, shared, publisher, explainer, timeline, done: 0, target: Some(0), clock, heeded: [0; 2] }
+        Self {
+            engine,
+            shared,
+            publisher,
+            explainer,
+            timeline,
+            done: 0,
+            target: Some(0),
+            clock,
+            heeded: [0; 2],
+            frame_s: 0.0,
+        }
     }
 
     /// Plays and answers `requests` until `is_ended`.
@@ -208,15 +223,19 @@ impl Player {
         }
         let now_s = self.start_s() + state.now_s();
         let rest = &self.shared.recording.frames[self.done..];
-        let count = rest.iter().take(CHUNK).take_while(|frame| frame.t_s <= now_s).count();
+        let most = frames_at_once(self.frame_s);
+        let count = rest.iter().take(most).take_while(|frame| frame.t_s <= now_s).count();
         if count > 0 {
             let started = Instant::now();
             self.engine.process(&rest[..count])?;
             self.done += count;
             self.publish(count, started);
+            self.frame_s += 0.3 * (started.elapsed().as_secs_f64() / count as f64 - self.frame_s);
         }
-        if count == CHUNK {
-            // So fast that frames are late: slower, not ever later.
+        // Frames take longer to compute than to play: slower, not ever later.
+        let now_s = self.start_s() + self.clock.state().now_s();
+        let next = self.shared.recording.frames.get(self.done);
+        if next.is_some_and(|next| now_s - next.t_s > 2.0 * CALL_S * state.speed) {
             self.clock.is_late(self.at_s());
         }
         self.clock.at_end(self.is_at_end(), self.heeded[1]);
@@ -241,5 +260,24 @@ impl Player {
         });
         self.publisher.publish(self.engine.percepts());
         self.publisher.flush();
+    }
+}
+
+/// How many frames a call may have that take `frame_s` each.
+fn frames_at_once(frame_s: f64) -> usize {
+    ((CALL_S / frame_s.max(1e-9)) as usize).clamp(1, CHUNK)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_call_has_as_many_frames_as_its_time_allows() {
+        assert_eq!(frames_at_once(0.0), CHUNK, "before anything is known");
+        assert_eq!(frames_at_once(1e-6), CHUNK);
+        assert_eq!(frames_at_once(0.004), 12);
+        assert_eq!(frames_at_once(0.03), 1);
+        assert_eq!(frames_at_once(10.0), 1, "at least one, or it would never go on");
     }
 }

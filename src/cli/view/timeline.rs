@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 use somatic::internal::page::RecordingEvents;
+use somatic::internal::parallel;
 use somatic::{Engine, Letter, Result};
 
 use super::super::stdio::say;
@@ -101,7 +102,8 @@ pub(super) fn start(shared: Shared, recorded: Option<Recorded>, events: Recordin
     let timeline = Arc::new(Timeline::new(&shared.recording));
     let filled = Arc::clone(&timeline);
     std::thread::spawn(move || {
-        if let Err(error) = pass(&shared, recorded, events, &filled) {
+        // The player's calls share the cores' other threads among each other.
+        if let Err(error) = parallel::aside(|| pass(&shared, recorded, events, &filled)) {
             say(&format!("{error}; the recording can be played, but jumps take long"));
         }
     });

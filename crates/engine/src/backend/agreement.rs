@@ -405,11 +405,13 @@ mod tests {
 
     const NAMES: [&str; 1] = ["field"];
 
+    const OF_PRESSURE: Outputs = Outputs::all().difference(Outputs::OF_OTHER_LETTERS);
+
     /// One field in one frame, in double precision, changed by `change`.
     fn percepts(change: impl Fn(&mut Percepts, &mut Components<f64>)) -> Percepts {
-        let mut percepts = Percepts::new(Outputs::all(), 1, Precision::F64);
+        let mut percepts = Percepts::new(OF_PRESSURE, 1, Precision::F64);
         percepts.reset(1);
-        percepts.set_present(0, Outputs::all());
+        percepts.set_present(0, OF_PRESSURE);
         percepts.active[0] = 3;
         let Values::F64(mut columns) = percepts.values.clone() else { unreachable!("made so") };
         (columns[Component::Total][0], columns[Component::Peak][0], columns[Component::Area][0]) = (10.0, 5.0, 1.0);
@@ -424,7 +426,7 @@ mod tests {
 
     fn bound() -> CellBound {
         let mut bound = CellBound { centroid: Limit::Within([0.01; 2]), ..CellBound::default() };
-        bound.set(Outputs::all().iter().map(|output| (output, Limit::Within(0.01))));
+        bound.set(OF_PRESSURE.iter().map(|output| (output, Limit::Within(0.01))));
         bound.set([(Outputs::ACTIVE, Limit::Within(0.0))]);
         bound
     }

@@ -225,7 +225,8 @@ impl Engine {
         if let Some(on_skin) = &mut self.on_skin {
             let of_touches = check.as_deref_mut().and_then(|check| check.touches.as_mut());
             let about = (&self.plan, &self.links);
-            on_skin.find(about, frames, &raw, self.intake.stale(), &mut self.percepts, of_touches);
+            let beside = (self.intake.stale(), sensed);
+            on_skin.find(about, frames, &raw, beside, &mut self.percepts, of_touches);
             if let Some(check) = &mut check {
                 check.take_several(&raw, &self.percepts);
                 check.touches.iter_mut().for_each(TouchCheck::end_of_run);

@@ -5,12 +5,11 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::links::Links;
-use super::post::PostFieldState;
 use super::spread::{Frames, Now};
 use crate::backend::Step;
 use crate::percept::{Flags, Host, Outputs, Percepts};
 use crate::scene::{Plan, PlanField, SensedMember};
-use crate::signal::{Quantity, RawValue, Reading, Receptor, SenseCalibration, ShearCalibration};
+use crate::signal::{Quantity, RawValue, Reading, Receptor, SenseCalibration, ShearCalibration, TaxelCalibration};
 use crate::stage::proximity::{LEAST_M, Near};
 use crate::stage::shear::Pulled;
 use crate::stage::temperature::Warm;
@@ -26,7 +25,7 @@ pub(super) struct SensedValues<'a> {
 }
 
 impl<'a> SensedValues<'a> {
-    fn row(self, frame: usize) -> &'a [RawValue] {
+    pub(super) fn row(self, frame: usize) -> &'a [RawValue] {
         &self.values[frame * self.width..][..self.width]
     }
 }
@@ -69,22 +68,22 @@ impl Made<'_> {
 }
 
 impl Cell<'_> {
-    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing.
-    pub(super) fn make(&self, cell: usize, percepts: &mut Percepts, now: &mut Now, memory: &mut PostFieldState) {
+    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `window` has what the letter measured before.
+    pub(super) fn make(&self, cell: usize, percepts: &mut Percepts, now: &mut Now, window: &mut Window) {
         percepts.set_present(cell, Outputs::empty());
         let mut made = Made { percepts, cell, flags: Flags::empty(), is_there: false };
         if self.step.restarts() {
-            memory.window.clear();
+            window.clear();
         }
         let senses = &self.plan.senses;
         match self.plan.letters()[self.field.letter].receptor {
             Receptor::Sustained | Receptor::Change => {}
             Receptor::Shear => senses.shear.iter().for_each(|shear| self.shear(shear, now, &mut made)),
             Receptor::Temperature => {
-                senses.temperature.iter().for_each(|by| self.temperature(by, now, &mut made, &mut memory.window));
+                senses.temperature.iter().for_each(|by| self.temperature(by, now, &mut made, window));
             }
             Receptor::Proximity => {
-                senses.proximity.iter().for_each(|by| self.proximity(by, now, &mut made, &mut memory.window));
+                senses.proximity.iter().for_each(|by| self.proximity(by, now, &mut made, window));
             }
         }
         made.flags.set(Flags::NO_CONTACT, !made.is_there);
@@ -236,7 +235,8 @@ impl Cell<'_> {
             made.give(Outputs::PROXIMITY_CENTROID, Host::ProximityCentroid, &centroid);
         }
         match window.take(self.t_s(), distance_m, by.window_s) {
-            Some(slope) => made.give(Outputs::APPROACH_SPEED, Host::ApproachSpeed, &[-slope]),
+            // From 0, so that what stays has no sign.
+            Some(slope) => made.give(Outputs::APPROACH_SPEED, Host::ApproachSpeed, &[0.0 - slope]),
             None => made.flags |= Flags::NO_PREVIOUS,
         }
     }
@@ -255,15 +255,14 @@ impl Cell<'_> {
             if own.value <= 0.0 {
                 continue;
             }
-            let tangential = member.values.map(|value| row[value]);
-            let numbers = tangential.map(|raw| raw.number().filter(|number| number.abs() <= calibrate::HUGE));
-            let [Some(u), Some(v)] = numbers else {
-                let is_missing = tangential.iter().any(|raw| raw.is_missing());
-                made.flags |= if is_missing { Flags::INCOMPLETE } else { Flags::FAULTY_INPUT };
-                continue;
+            let gain = tangential_gain(by, member.taxel, calibration);
+            let [su, sv] = match tangential(by, member.taxel, gain, own.value, member.values.map(|value| row[value])) {
+                Ok(pulls) => pulls,
+                Err(why) => {
+                    made.flags |= why;
+                    continue;
+                }
             };
-            let gain = by.gain_of(member.taxel, calibration.gain, calibration.unit_factor);
-            let [su, sv] = by.forces(member.taxel, gain, own.value, [u, v]);
             let [tu, tv] = member.tangents_in_chart;
             quantity = Some(calibration.quantity);
             members.push(index);
@@ -340,4 +339,25 @@ impl Cell<'_> {
             None => made.flags |= Flags::STILL,
         }
     }
+}
+
+/// P for a raw unit of a tangential value of the body's taxel `taxel`.
+pub(super) fn tangential_gain(by: &ShearCalibration, taxel: usize, calibration: &TaxelCalibration) -> f64 {
+    by.gain_of(taxel, calibration.gain, calibration.unit_factor)
+}
+
+/// The tangential forces of the body's taxel `taxel` along t and n × t, where it is pressed by `pressure` and reads `raw`.
+pub(super) fn tangential(
+    by: &ShearCalibration,
+    taxel: usize,
+    gain: f64,
+    pressure: f64,
+    raw: [RawValue; 2],
+) -> Result<[f64; 2], Flags> {
+    let numbers = raw.map(|raw| raw.number().filter(|number| number.abs() <= calibrate::HUGE));
+    let [Some(u), Some(v)] = numbers else {
+        let is_missing = raw.iter().any(|raw| raw.is_missing());
+        return Err(if is_missing { Flags::INCOMPLETE } else { Flags::FAULTY_INPUT });
+    };
+    Ok(by.forces(taxel, gain, pressure, [u, v]))
 }

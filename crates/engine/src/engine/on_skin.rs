@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
+use super::letters::SensedValues;
 use super::links::Links;
 use super::self_contacts::SelfContacts;
 use super::skin_fits::{FitTrails, Moment, SkinFits};
 use super::skin_sigmas::SkinSigmas;
 use super::touch_check::TouchCheck;
+use super::touch_senses::TouchSenses;
 use crate::backend::RawBatch;
 use crate::body::Body;
 use crate::field::TaxelGraph;
@@ -43,6 +45,8 @@ pub(super) struct OnSkin {
     self_contacts: Option<SelfContacts>,
     /// Where standard deviations are asked for.
     sigmas: Option<SkinSigmas>,
+    /// Where taxels have three axes or measure temperature.
+    senses: Option<TouchSenses>,
     /// Memory for a frame.
     without_value: Vec<u32>,
     notes: Vec<(u32, TouchFlags)>,
@@ -74,8 +78,9 @@ impl OnSkin {
             SkinFits::new(layer, scene.knobs.orientation_by.steps().unwrap_or(STEPS), over_s)
         });
         let sigmas = SkinSigmas::new(options.outputs);
-        if fits.is_some() || sigmas.is_some() {
-            // Which taxels are fitted, or vary.
+        let senses = TouchSenses::new(body, plan, &skin);
+        if fits.is_some() || sigmas.is_some() || senses.is_some() {
+            // Which taxels are fitted, vary, or are pulled.
             options.outputs |= TouchOutputs::TAXELS;
         }
         Some(Self {
@@ -83,6 +88,7 @@ impl OnSkin {
             fits,
             self_contacts: SelfContacts::new(body, plan, scene),
             sigmas,
+            senses,
             all_in_fields: in_fields.len() == plan.channels(),
             remarks: note.into_iter().chain(sensors_are_unknown(plan, &skin)).collect(),
             touches: Touches::new(Arc::new(skin), options),
@@ -132,13 +138,13 @@ impl OnSkin {
     }
 
     /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `stale` has the taxels of the
-    /// body that are stale, by frame of the call. With `check`, touches are compared with their definition.
+    /// body that are stale, by frame of the call, and `sensed` what is read beside pressures. With `check`, touches are compared with their definition.
     pub(super) fn find(
         &mut self,
         (plan, links): (&Plan, &Links),
         frames: &[Frame],
         raw: &RawBatch<'_>,
-        stale: &[Vec<usize>],
+        (stale, sensed): (&[Vec<usize>], SensedValues<'_>),
         percepts: &mut Percepts,
         mut check: Option<&mut TouchCheck>,
     ) {
@@ -165,6 +171,9 @@ impl OnSkin {
             flag_several(&found, &mut percepts.flags[index * plan.fields.len()..][..plan.fields.len()]);
             if let Some(sigmas) = &mut self.sigmas {
                 sigmas.add((plan, self.touches.skin()), raw, offset, pressures, &mut found);
+            }
+            if let Some(senses) = &self.senses {
+                senses.add(plan, sensed.row(index), pressures, &mut found);
             }
             self.poses.clear();
             if !found.touches.is_empty() && links.may_pose(frame) {
@@ -319,7 +328,9 @@ fn put_in_world(poses: &[Option<DAffine3>], found: &mut TouchFrame) {
         touch.position = world_from_link.transform_point3(touch.position);
         touch.centre = world_from_link.transform_point3(touch.centre);
         turn(&mut touch.normal);
-        [&mut touch.principal_axis, &mut touch.orientation, &mut touch.velocity].into_iter().flatten().for_each(turn);
+        let vectors = [&mut touch.principal_axis, &mut touch.orientation, &mut touch.velocity];
+        let pulls = [&mut touch.shear, &mut touch.force_vector_newton];
+        vectors.into_iter().chain(pulls).flatten().for_each(turn);
         touch.in_world = true;
     }
 }

@@ -147,7 +147,7 @@ impl Post<'_> {
             if !field.sensed.is_empty() {
                 let frames = self.frames(alone, raw, offset, &state.raw_before);
                 let of = Cell { plan: self.plan, field, frames, frame: index, step, sensed: self.sensed };
-                of.make(cell, percepts, &mut now, &mut state.fields[number]);
+                of.make(cell, percepts, &mut now, &mut state.fields[number].window);
                 continue;
             }
             if let Some(cadence) = self.cadence {

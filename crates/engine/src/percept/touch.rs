@@ -118,6 +118,16 @@ pub struct Touch {
     pub position_sigma_m: Option<[f64; 2]>,
     /// Standard deviation of the principal axis, rad.
     pub principal_axis_sigma_rad: Option<f64>,
+    /// Σs over its taxels that have three axes, in the unit of P.
+    pub shear: Option<DVec3>,
+    /// The force on the skin by those taxels, normal and tangential, N.
+    pub force_vector_newton: Option<DVec3>,
+    /// Σ(x − c) × s · n about its position, in the unit of P times m.
+    pub torsion: Option<f64>,
+    /// ‖Σs‖ / ΣP of those taxels.
+    pub friction: Option<f64>,
+    /// Mean of the temperature taxels that are nearest to its taxels, °C.
+    pub temperature_celsius: Option<f64>,
     /// Whether its place and directions are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the frame carried a pose of its
     /// link.
     pub in_world: bool,

@@ -71,6 +71,10 @@ bitflags! {
         const PRINCIPAL_AXIS_SIGMA = 1 << 28;
         /// Where it is by its fit and by its moments; only on request.
         const PLACE = 1 << 29;
+        /// How it pulls along the skin: shear, force as a vector, torsion and friction; given by default where taxels have three axes.
+        const SHEAR = 1 << 30;
+        /// The mean temperature of the taxels under it; given by default where some measure temperature.
+        const TEMPERATURE = 1 << 31;
     }
 }
 
@@ -87,7 +91,9 @@ impl TouchOutputs {
         .difference(Self::TAXELS)
         .difference(Self::WRENCH)
         .difference(Self::FIT)
-        .difference(Self::SIGMAS);
+        .difference(Self::SIGMAS)
+        .difference(Self::SHEAR)
+        .difference(Self::TEMPERATURE);
 
     /// What is made of fits.
     pub const FIT: Self = Self::FIT_KIND
@@ -215,4 +221,9 @@ touch_columns! {
     TOTAL_SIGMA "total_sigma" P 1 "The standard deviation of its total, from the sensors' noise." |touch| one_of(touch.total_sigma);
     POSITION_SIGMA "position_sigma" Metre 2 "The standard deviation of its position along u and v of its own chart, m." |touch| touch.position_sigma_m.map(|[u, v]| [u, v, 0.0]);
     PRINCIPAL_AXIS_SIGMA "principal_axis_sigma" Radian 1 "The standard deviation of its principal axis, rad." |touch| one_of(touch.principal_axis_sigma_rad);
+    SHEAR "shear" P 3 "Σs over its taxels that have three axes, each along its own tangents." |touch| vector(touch.shear);
+    SHEAR "force_vector" Newton 3 "The force on the skin by those taxels, normal and tangential, N." |touch| vector(touch.force_vector_newton);
+    SHEAR "torsion" PMetre 1 "Σ(x − c) × s · n about its position, counter-clockwise seen from outside." |touch| one_of(touch.torsion);
+    SHEAR "friction" One 1 "‖Σs‖ / ΣP of those taxels." |touch| one_of(touch.friction);
+    TEMPERATURE "temperature" Celsius 1 "Mean of the temperature taxels that are nearest to its taxels, °C." |touch| one_of(touch.temperature_celsius);
 }

@@ -128,13 +128,21 @@ pub struct PlanField {
 
 impl PlanField {
     /// The same with the members `sensed` alone, which the host reads: backends have none from `first` on.
-    pub(super) fn of_senses(self, letter: usize, first: usize, sensed: Arc<[SensedMember]>) -> Self {
+    pub(super) fn of_senses(
+        self,
+        letter: usize,
+        first: usize,
+        receptor: Receptor,
+        sensed: Arc<[SensedMember]>,
+    ) -> Self {
+        // Of the forces of a taxel, those along its tangents are in the unit of the one along its normal.
+        let quantity = if receptor == Receptor::Shear { self.quantity } else { Quantity::Count };
         Self {
             letter,
             first,
             count: 0,
             thresholds: Thresholds::default(),
-            quantity: Quantity::Count,
+            quantity,
             weights: Vec::new(),
             places: Vec::new(),
             depths: Vec::new(),
@@ -321,12 +329,15 @@ impl Plan {
         self.fields.get(field).map_or(Quantity::Count, |field| field.quantity)
     }
 
-    /// What P is in all fields that have it, if it is the same in all.
+    /// What P is in all fields, if it is the same in all; temperatures and distances, which are not P, do not count.
     #[must_use]
     pub fn common_quantity(&self) -> Option<Quantity> {
-        let mut of_pressure = self.fields.iter().filter(|field| field.sensed.is_empty()).map(|field| field.quantity);
-        let first = of_pressure.next().unwrap_or(Quantity::Count);
-        of_pressure.all(|quantity| quantity == first).then_some(first)
+        let has_p = |field: &&PlanField| {
+            !matches!(self.letters[field.letter].receptor, Receptor::Temperature | Receptor::Proximity)
+        };
+        let mut quantities = self.fields.iter().filter(has_p).map(|field| field.quantity);
+        let first = quantities.next().unwrap_or_default();
+        quantities.all(|other| other == first).then_some(first)
     }
 
     /// What people call field `field` of the percepts: its name, and what is to be said of its letter.

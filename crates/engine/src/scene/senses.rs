@@ -9,7 +9,7 @@ use super::Scene;
 use crate::body::{Body, Taxel, listed};
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
-use crate::percept::{Column, Outputs};
+use crate::percept::{Column, Outputs, TouchOutputs};
 use crate::signal::{Axis, Calibration, Channel, Letter, Receptor, SenseCalibration, ShearCalibration};
 
 /// What the host reads of raw values for a plan's letters.
@@ -147,6 +147,13 @@ impl Senses {
             proximity: proximity.then(|| calibration.proximity.clone()),
             shear: shear.then(|| calibration.shear.clone()),
         }
+    }
+
+    /// What touches have of these letters.
+    pub(super) fn of_touches(&self) -> TouchOutputs {
+        let shear = self.shear.as_ref().map_or(TouchOutputs::empty(), |_| TouchOutputs::SHEAR);
+        let temperature = self.temperature.as_ref().map_or(TouchOutputs::empty(), |_| TouchOutputs::TEMPERATURE);
+        shear | temperature
     }
 
     /// The members of `field` that `receptor` reads.

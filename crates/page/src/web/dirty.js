@@ -37,23 +37,35 @@ export function addRect(rects, added, most) {
   }
 }
 
+/** Where more taxels have changed than this, one rectangle holds all: looking for several would take longer than drawing more. */
+const MANY = 400;
+
 /**
  * The parts of the picture where taxels look different from before.
  * @param {Uint8Array} before four bytes a taxel
  * @param {Uint8Array} now
- * @param {(taxel: number) => Rect | null} rectOf where a taxel is in the picture, or null where it is not
+ * @param {Pick<import("./spots.js").Spots, "x" | "y" | "reach" | "rectOf">} spots where taxels are in the picture
  * @param {{width: number, height: number, rects: number}} limits
  * @returns {Rect[]}
  */
-export function changedRects(before, now, rectOf, limits) {
+export function changedRects(before, now, spots, limits) {
   const [a, b] = [new Uint32Array(before.buffer), new Uint32Array(now.buffer)];
+  const { x, y, reach } = spots;
   /** @type {Rect[]} */
-  const rects = [];
-  for (let taxel = 0; taxel < b.length; taxel++) {
-    if (a[taxel] === b[taxel]) continue;
-    const rect = rectOf(taxel);
-    if (rect) addRect(rects, rect, limits.rects);
+  let rects = [];
+  const all = { x0: Infinity, y0: Infinity, x1: -Infinity, y1: -Infinity };
+  let changed = 0;
+  for (let taxel = 0; taxel < reach.length; taxel++) {
+    const far = reach[taxel];
+    if (a[taxel] === b[taxel] || far === 0) continue;
+    changed++;
+    if (changed <= MANY) addRect(rects, spots.rectOf(taxel), limits.rects);
+    all.x0 = Math.min(all.x0, x[taxel] - far);
+    all.y0 = Math.min(all.y0, y[taxel] - far);
+    all.x1 = Math.max(all.x1, x[taxel] + far);
+    all.y1 = Math.max(all.y1, y[taxel] + far);
   }
+  if (changed > MANY) rects = [all];
   return rects
     .map((r) => ({
       x0: Math.max(0, Math.floor(r.x0)),

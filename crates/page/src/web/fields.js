@@ -7,6 +7,9 @@ import { letterName } from "./senses.js";
 /** @typedef {{row: HTMLElement, bar: HTMLElement, dot: HTMLElement, value: HTMLElement, caret: HTMLElement, depth: number, open: boolean,
  *   text: string, width: number, key: string}} Row */
 
+/** Height of a row, pixels, as in panels.css. */
+const ROW_PX = 22;
+
 export class Fields {
   /**
    * @param {import("./model.js").Model} model
@@ -26,6 +29,12 @@ export class Fields {
     /** @type {Map<number, Row>} */
     this.rows = new Map();
     this.largest = 0;
+    /** Rows that are not folded away, in their order. @type {number[]} */
+    this.listed = [];
+    /** What is in sight of the tree, pixels. To ask it in every frame would cost a layout. */
+    this.sight = { top: 0, height: 0 };
+    /** The colours that the rows have. */
+    this.coloured = { of: model.fieldColours, count: 0 };
     model.on("scene", () => this.build());
     choices.on("letter", () => this.build());
     choices.on("field", () => this.mark());
@@ -36,13 +45,15 @@ export class Fields {
         this.filter();
         this.search.blur();
       } else if (event.key === "Enter") {
-        const first = this.visible()[0];
+        const first = this.listed[0];
         if (first !== undefined) this.choose(first);
       }
       event.stopPropagation();
     });
     this.onlyTouched.addEventListener("change", () => this.filter());
     this.tree.addEventListener("keydown", (event) => this.key(event));
+    this.tree.addEventListener("scroll", () => this.look(), { passive: true });
+    new ResizeObserver(() => this.look()).observe(this.tree);
     this.tree.addEventListener("pointerleave", () => choices.hoverField(null));
   }
 
@@ -61,6 +72,7 @@ export class Fields {
       }),
     );
     this.rows.clear();
+    this.coloured.count = -1;
     this.largest = 0;
     const list = document.createDocumentFragment();
     const indices = fields.map((_, i) => i).filter((i) => fields[i].letter === this.choices.letter);
@@ -161,11 +173,18 @@ export class Fields {
         if (open) shown.add(i);
       }
     }
-    for (const [i, entry] of this.rows) entry.row.hidden = !shown.has(i);
+    this.listed = [];
+    for (const [i, entry] of this.rows) {
+      entry.row.hidden = !shown.has(i);
+      if (!entry.row.hidden) this.listed.push(i);
+    }
+    this.showLoads();
   }
 
-  visible() {
-    return [...this.rows].filter(([, entry]) => !entry.row.hidden).map(([i]) => i);
+  /** Takes which rows are in sight. */
+  look() {
+    this.sight = { top: this.tree.scrollTop, height: this.tree.clientHeight };
+    this.showLoads();
   }
 
   /** Shows which field is chosen. */
@@ -183,10 +202,10 @@ export class Fields {
     if (chosen !== null) row?.scrollIntoView({ block: "nearest" });
     else if (row && !this.tree.matches(":hover")) {
       // What is followed changes by itself: only the tree scrolls, and nothing under the pointer.
-      const top = row.offsetTop - this.tree.offsetTop;
-      const { scrollTop, clientHeight } = this.tree;
-      if (top < scrollTop || top + row.offsetHeight > scrollTop + clientHeight)
-        this.tree.scrollTop = top - clientHeight / 3;
+      const top = ROW_PX * this.listed.indexOf(field);
+      const { sight } = this;
+      if (top < sight.top || top + ROW_PX > sight.top + sight.height)
+        this.tree.scrollTop = top - sight.height / 3;
     }
   }
 
@@ -194,7 +213,20 @@ export class Fields {
   update() {
     const { model } = this;
     for (const i of model.inContact.keys()) this.largest = Math.max(this.largest, model.load(i));
-    for (const [i, entry] of this.rows) {
+    if (this.largest > 0)
+      setText(this.caption, `full bar: ${withUnit(this.largest, model.loadUnit, model.quantity)}`);
+    if (this.onlyTouched.checked) this.filter();
+    else this.showLoads();
+  }
+
+  /** Shows loads in the rows that are in sight: there may be thousands of others. */
+  showLoads() {
+    const { model, sight } = this;
+    this.showColours();
+    const first = Math.floor(sight.top / ROW_PX);
+    for (const i of this.listed.slice(first, first + Math.ceil(sight.height / ROW_PX) + 1)) {
+      const entry = this.rows.get(i);
+      if (!entry) continue;
       const touched = model.inContact.has(i);
       const load = touched ? model.load(i) : 0;
       const text = touched ? model.loadText(i) : "";
@@ -203,16 +235,21 @@ export class Fields {
         entry.text = text;
         setText(entry.value, text);
       }
-      this.showColour(i, entry.dot);
       const width = this.largest > 0 ? Math.round((100 * load) / this.largest) : 0;
       if (width !== entry.width) {
         entry.width = width;
         entry.bar.style.width = `${width}%`;
       }
     }
-    if (this.largest > 0)
-      setText(this.caption, `full bar: ${withUnit(this.largest, model.loadUnit, model.quantity)}`);
-    if (this.onlyTouched.checked) this.filter();
+  }
+
+  /** Shows the colours of fields that have got one since, or have them no more. */
+  showColours() {
+    const { fieldColours } = this.model;
+    const { of, count } = this.coloured;
+    if (of === fieldColours && count === fieldColours.size) return;
+    this.coloured = { of: fieldColours, count: fieldColours.size };
+    for (const [i, { dot }] of this.rows) this.showColour(i, dot);
   }
 
   /**
@@ -234,7 +271,7 @@ export class Fields {
    * @param {number} by
    */
   step(by) {
-    const list = this.visible();
+    const list = this.listed;
     if (!list.length) return;
     const at = this.choices.chosen === null ? -1 : list.indexOf(this.choices.chosen);
     const next = at < 0 ? (by > 0 ? 0 : list.length - 1) : (at + by + list.length) % list.length;

@@ -6,6 +6,8 @@ import { withUnit } from "./format.js";
 
 /** Taxels whose nearest neighbour is looked for, at most: more say nothing new. */
 const SAMPLES = 800;
+/** Distances that are measured for it at most, as the first picture waits meanwhile. */
+const DISTANCES_MAX = 1e7;
 
 export class RestPanel {
   /** @param {import("./model.js").Model} model */
@@ -49,14 +51,18 @@ export class RestPanel {
  * @param {import("./wire.js").Mesh} mesh
  */
 export function spacings({ taxelPosition: at, taxelLink: link }) {
-  const step = Math.max(1, Math.ceil(link.length / SAMPLES));
+  const count = link.length;
+  const step = Math.max(1, Math.ceil(count / SAMPLES), Math.ceil(count ** 2 / DISTANCES_MAX));
   /** @type {number[]} */
   const found = [];
-  for (let i = 0; i < link.length; i += step) {
+  for (let i = 0; i < count; i += step) {
+    const [x, y, z] = [at[3 * i], at[3 * i + 1], at[3 * i + 2]];
     let least = Infinity;
-    for (let k = 0; k < link.length; k++) {
+    for (let k = 0; k < count; k++) {
       if (k === i || link[k] !== link[i]) continue;
-      const [dx, dy, dz] = [0, 1, 2].map((c) => at[3 * i + c] - at[3 * k + c]);
+      const dx = x - at[3 * k];
+      const dy = y - at[3 * k + 1];
+      const dz = z - at[3 * k + 2];
       const squared = dx * dx + dy * dy + dz * dz;
       // Taxels at one place are one sensor to look at.
       if (squared > 1e-18 && squared < least) least = squared;

@@ -19,7 +19,12 @@ const BARE_SHADE = 0.9;
 /** Taxels in a row of the textures of colours. */
 const ROW = 1024;
 
+/** Rings around small discs are thinner, or they would cover their neighbours. */
+const RING_SIZE = `
+float ringSize(float radius) { return clamp(radius / 6.0, 0.3, 1.0); }`;
+
 const VERTEX = `
+${RING_SIZE}
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in vec3 a_normal;
 layout(location = 2) in float a_radius;
@@ -29,8 +34,6 @@ uniform highp sampler2D u_rings;
 uniform mat4 u_clipFromWorld;
 uniform vec3 u_eye;
 uniform float u_pixels;
-uniform bool u_bothSides;
-uniform bool u_special;
 ${POSE_GLSL}
 out vec2 v_corner;
 flat out vec4 v_fill;
@@ -49,16 +52,11 @@ void main() {
   vec3 toEye = u_eye - place;
   float distance = length(toEye);
   v_state = int(fill.a * 255.0 + 0.5);
-  bool special = (v_state != 0 && v_state != ${REST} && v_state != ${NOT_SENT}) || ring.a > 0.0;
-  if (special != u_special || (!u_bothSides && dot(normal, toEye) < 0.0)) {
-    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
-    return;
-  }
   // A disc smaller than a pixel or two would flicker or vanish.
   float radius = max(a_radius, 1.3 * distance / u_pixels);
   v_radius = radius * u_pixels / distance;
   v_metres = radius;
-  float grown = 1.0 + (ring.a > 0.0 ? 4.5 : 1.0) / v_radius;
+  float grown = 1.0 + (ring.a > 0.0 ? 3.2 * ringSize(v_radius) + 1.3 : 1.0) / v_radius;
   v_corner = (vec2(corner & 1, corner >> 1) * 2.0 - 1.0) * grown;
   vec3 one = normalize(cross(normal, abs(normal.z) < 0.9 ? vec3(0, 0, 1) : vec3(0, 1, 0)));
   vec3 two = cross(normal, one);
@@ -115,6 +113,7 @@ void main() {
 /** Of all others. */
 const SPECIAL = `
 ${FRAGMENT_HEAD}
+${RING_SIZE}
 void main() {
   bool hidden = isHidden();
   if (hidden && !u_through) discard;
@@ -147,8 +146,9 @@ void main() {
     colour = mix(colour, colour * 0.7, rim);
   }
   if (v_ring.a > 0.0) {
-    float from = 1.0 + 1.0 / v_radius;
-    float to = 1.0 + 3.2 / v_radius;
+    float size = ringSize(v_radius) / v_radius;
+    float from = 1.0 + size;
+    float to = 1.0 + 3.2 * size;
     float ring = smoothstep(from - pixel, from + pixel, d) * (1.0 - smoothstep(to - pixel, to + pixel, d)) * v_ring.a;
     colour = mix(colour, v_ring.rgb, max(ring, 0.0) / max(ring + alpha, 1e-4));
     alpha = max(alpha, ring);
@@ -240,7 +240,6 @@ export class Taxels {
     this.plain = makeProgram(gl, VERTEX, PLAIN);
     /** Made when first needed. @type {import("./gl.js").Program | null} */
     this.special = null;
-    this.hasSpecial = false;
     this.rows = Math.max(1, Math.ceil(this.count / ROW));
     this.fill = new Uint8Array(4 * ROW * this.rows);
     this.before = new Uint8Array(4 * ROW * this.rows);
@@ -255,11 +254,10 @@ export class Taxels {
     attribute(gl, 1, fourTimes(mesh.taxelNormal, 3), 3);
     attribute(gl, 2, fourTimes(mesh.taxelRadius, 1), 1);
     attribute(gl, 3, fourTimes(mesh.taxelLink, 1), 1);
-    const corners = new Uint32Array(6 * this.count);
-    for (let i = 0; i < this.count; i++)
-      [0, 1, 2, 2, 1, 3].forEach((c, k) => (corners[6 * i + k] = 4 * i + c));
+    /** Of two triangles for each taxel that is drawn. */
+    this.corners = new Uint32Array(6 * this.count);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.corners.byteLength, gl.DYNAMIC_DRAW);
     gl.bindVertexArray(null);
   }
 
@@ -267,11 +265,11 @@ export class Taxels {
    * Takes over the pressures of the newest frame.
    * @param {import("./model.js").Model} model
    * @param {import("./body.js").Theme} theme
-   * @param {(taxel: number) => import("./dirty.js").Rect | null} rectOf where a taxel is in the picture
+   * @param {import("./spots.js").Spots} spots where taxels are in the picture
    * @param {{width: number, height: number, rects: number}} limits
    * @returns where the picture changes
    */
-  update(model, theme, rectOf, limits) {
+  update(model, theme, spots, limits) {
     if (!model.welcome || model.pressure.length !== this.count) return [];
     [this.fill, this.before] = [this.before, this.fill];
     const { scaleMax, welcome } = model;
@@ -280,8 +278,7 @@ export class Taxels {
     const unsent = (/** @type {number} */ taxel) => model.colourAtRest(taxel) ?? bare;
     fillColours(pressure, health, scaleMax, welcome.colours, theme.rest, this.fill, unsent);
     this.upload(this.fills, this.fill);
-    this.findSpecial();
-    return changedRects(this.before, this.fill, rectOf, limits);
+    return changedRects(this.before, this.fill, spots, limits);
   }
 
   /**
@@ -294,37 +291,66 @@ export class Taxels {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, this.rows, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
   }
 
-  findSpecial() {
-    this.hasSpecial = false;
-    for (let i = 3; i < this.fill.length && !this.hasSpecial; i += 4)
-      this.hasSpecial = !PLAIN_STATES.includes(this.fill[i]) || this.ring[i] !== 0;
+  /**
+   * Whether a taxel has a mark of its own.
+   * @param {number} taxel
+   */
+  isSpecial(taxel) {
+    return this.ring[4 * taxel + 3] !== 0 || !PLAIN_STATES.includes(this.fill[4 * taxel + 3]);
+  }
+
+  /**
+   * Chooses what is drawn of a part of the picture, and says how many corners the plain ones have, and the others behind them. Where the
+   * processor draws, every corner costs time, also of what is not seen.
+   * @param {import("./spots.js").Spots} spots
+   * @param {import("./dirty.js").Rect} rect
+   */
+  choose(spots, rect) {
+    const { gl, corners } = this;
+    let end = 0;
+    const add = (/** @type {boolean} */ special) => {
+      for (let i = 0; i < this.count; i++) {
+        if (!spots.isIn(i, rect) || this.isSpecial(i) !== special) continue;
+        const first = 4 * i;
+        corners[end] = first;
+        corners[end + 1] = corners[end + 4] = first + 1;
+        corners[end + 2] = corners[end + 3] = first + 2;
+        corners[end + 5] = first + 3;
+        end += 6;
+      }
+    };
+    add(false);
+    const plain = end;
+    add(true);
+    if (end) gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, corners, 0, end);
+    return { plain, special: end - plain };
   }
 
   /**
    * Rings around taxels, to show which touch or field they belong to.
    * @param {Map<number, number[]>} rings colour by taxel
-   * @param {(taxel: number) => import("./dirty.js").Rect | null} rectOf where a taxel is in the picture
+   * @param {import("./spots.js").Spots} spots where taxels are in the picture
    * @param {{width: number, height: number, rects: number}} limits
    * @returns where the picture changes
    */
-  updateRings(rings, rectOf, limits) {
+  updateRings(rings, spots, limits) {
     [this.ring, this.ringBefore] = [this.ringBefore, this.ring];
     this.ring.fill(0);
     for (const [taxel, [r, g, b]] of rings) this.ring.set([r, g, b, 255], 4 * taxel);
     this.upload(this.rings, this.ring);
-    this.findSpecial();
-    return changedRects(this.ringBefore, this.ring, rectOf, limits);
+    return changedRects(this.ringBefore, this.ring, spots, limits);
   }
 
   /**
-   * Draws into the bound picture, hidden by what the body's picture of the same size has nearer.
+   * Draws into a part of the bound picture, hidden by what the body's picture of the same size has nearer.
+   * @param {{spots: import("./spots.js").Spots, rect: import("./dirty.js").Rect}} where
    * @param {import("./gl.js").Target} body
    * @param {import("./camera.js").Camera} camera
    * @param {import("./gl.js").Poses} poses
    * @param {import("./body.js").Theme} theme
    * @param {boolean} through whether hidden ones show faintly
    */
-  draw(body, camera, poses, theme, through) {
+  draw({ spots, rect }, body, camera, poses, theme, through) {
     const { gl } = this;
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, poses.texture);
@@ -341,10 +367,11 @@ export class Taxels {
     gl.depthFunc(gl.LESS);
     gl.bindVertexArray(this.array);
     const pixels = camera.pixelsPerMetre(1) * (body.height / camera.height);
-    this.pass(this.plain, false, pixels, camera, theme, through);
-    if (this.hasSpecial) {
+    const { plain, special } = this.choose(spots, rect);
+    if (plain) this.pass(this.plain, 0, plain, pixels, camera, theme, through);
+    if (special) {
       this.special ??= makeProgram(gl, VERTEX, SPECIAL);
-      this.pass(this.special, true, pixels, camera, theme, through);
+      this.pass(this.special, plain, special, pixels, camera, theme, through);
     }
     gl.bindVertexArray(null);
     gl.disable(gl.DEPTH_TEST);
@@ -355,21 +382,20 @@ export class Taxels {
 
   /**
    * @param {import("./gl.js").Program} program
-   * @param {boolean} special
+   * @param {number} first of the corners
+   * @param {number} count of them
    * @param {number} pixels that a metre covers at a depth of a metre
    * @param {import("./camera.js").Camera} camera
    * @param {import("./body.js").Theme} theme
    * @param {boolean} through
    */
-  pass({ program, at }, special, pixels, camera, theme, through) {
+  pass({ program, at }, first, count, pixels, camera, theme, through) {
     const { gl } = this;
     gl.useProgram(program);
     gl.uniformMatrix4fv(at("u_clipFromWorld"), false, camera.clipFromWorld);
     gl.uniform3fv(at("u_eye"), camera.eye);
     gl.uniform1f(at("u_pixels"), pixels);
     gl.uniform2f(at("u_planes"), camera.near, camera.far);
-    gl.uniform1i(at("u_special"), special ? 1 : 0);
-    gl.uniform1i(at("u_bothSides"), through || !this.hasBody ? 1 : 0);
     gl.uniform1i(at("u_through"), through ? 1 : 0);
     gl.uniform3fv(at("u_ink"), theme.ink);
     gl.uniform3fv(at("u_paper"), theme.albedo);
@@ -377,6 +403,6 @@ export class Taxels {
     gl.uniform1i(at("u_depth"), 1);
     gl.uniform1i(at("u_fills"), 2);
     gl.uniform1i(at("u_rings"), 3);
-    gl.drawElements(gl.TRIANGLES, 6 * this.count, gl.UNSIGNED_INT, 0);
+    gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
   }
 }

@@ -3,7 +3,7 @@
 import { Body } from "./body.js";
 import { addRect } from "./dirty.js";
 import { openContext, Poses, rendererOf, Target } from "./gl.js";
-import { taxelInWorld } from "./places.js";
+import { Spots } from "./spots.js";
 import { Taxels } from "./taxels.js";
 import { THEMES } from "./theme.js";
 
@@ -12,6 +12,8 @@ const REFINE_AFTER_MS = 220;
 /** Above this time of a drawing in motion the body loses detail; below the second it gains it again. */
 const SLOW_MS = 62;
 const FAST_MS = 40;
+/** Parts of the picture that are drawn anew at most. */
+const RECTS_MAX = 4;
 
 export class View {
   /**
@@ -52,6 +54,7 @@ export class View {
     this.movedAt = 0;
     /** @type {{body: Body, taxels: Taxels, poses: Poses} | null} */
     this.parts = null;
+    this.spots = new Spots(model, camera);
     /** The body alone with its depth, and the body with taxels. @type {{body: Target | null, picture: Target | null}} */
     this.targets = { body: null, picture: null };
     /** Counts the contexts that were lost. */
@@ -148,15 +151,15 @@ export class View {
     }
     const { body } = this.targets;
     if (!body) return;
-    const scale = body.width / camera.width;
     const size = { width: body.width, height: body.height };
+    const { spots } = this;
+    spots.update(body.width / camera.width, choices.xray || !parts.taxels.hasBody);
+    const limits = { ...size, rects: RECTS_MAX };
     /** @type {import("./dirty.js").Rect[]} */
     let rects = [];
-    const limits = { ...size, rects: parts.taxels.count > 3000 ? 2 : 4 };
-    const rectOf = (/** @type {number} */ taxel) => this.rectOf(taxel, scale);
-    if (this.taxelsChanged) rects = parts.taxels.update(model, theme, rectOf, limits);
+    if (this.taxelsChanged) rects = parts.taxels.update(model, theme, spots, limits);
     if (this.ringsChanged)
-      for (const rect of parts.taxels.updateRings(choices.rings(model), rectOf, limits))
+      for (const rect of parts.taxels.updateRings(choices.rings(model), spots, limits))
         addRect(rects, rect, limits.rects);
     this.taxelsChanged = this.ringsChanged = false;
     if (whole) rects = [{ x0: 0, y0: 0, x1: size.width, y1: size.height }];
@@ -170,14 +173,16 @@ export class View {
     if (this.canvas.width !== size.width || this.canvas.height !== size.height)
       [this.canvas.width, this.canvas.height] = [size.width, size.height];
     gl.enable(gl.SCISSOR_TEST);
-    for (const { x0, y0, x1, y1 } of rects) {
+    for (const rect of rects) {
+      const { x0, y0, x1, y1 } = rect;
       gl.scissor(x0, size.height - y1, x1 - x0, y1 - y0);
       body.copy(picture, size.width, size.height);
       picture.bind();
       gl.depthMask(true);
       gl.clear(gl.DEPTH_BUFFER_BIT);
       // Before the first frame nothing is known of any taxel.
-      if (choices.taxels && model.frame) parts.taxels.draw(body, camera, parts.poses, theme, choices.xray);
+      if (choices.taxels && model.frame)
+        parts.taxels.draw({ spots, rect }, body, camera, parts.poses, theme, choices.xray);
     }
     gl.disable(gl.SCISSOR_TEST);
     picture.toScreen();
@@ -190,21 +195,6 @@ export class View {
       this.adapt(performance.now() - begun, moved);
       finish();
     });
-  }
-
-  /**
-   * The part of the picture that a taxel and its ring cover.
-   * @param {number} taxel
-   * @param {number} scale pixels of the picture in a CSS pixel
-   */
-  rectOf(taxel, scale) {
-    const place = taxelInWorld(this.model, taxel);
-    if (!place) return null;
-    const at = this.camera.project(place.point);
-    if (at.depth <= 0) return null;
-    const reach = place.radius * this.camera.pixelsPerMetre(at.depth) * scale * 1.15 + 7;
-    const [x, y] = [at.x * scale, at.y * scale];
-    return { x0: x - reach, y0: y - reach, x1: x + reach, y1: y + reach };
   }
 
   /**

@@ -22,7 +22,7 @@ use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::{MessageTypeName, Name, NodeName, QosProfile};
 use serde::de::DeserializeOwned;
 
-pub(crate) use self::reader::Reader;
+pub(crate) use self::reader::{BytesReader, Reader};
 pub use self::writer::Writer;
 use crate::error::{Error, Result, failed};
 
@@ -142,6 +142,23 @@ impl Node {
         kind: &str,
         delivery: Delivery,
     ) -> Result<Reader<M>> {
+        self.reader_by(topic, kind, delivery)
+    }
+
+    /// A reader of messages of the type `kind` as bytes.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub(crate) fn bytes_reader(&mut self, topic: &str, kind: &str, delivery: Delivery) -> Result<BytesReader> {
+        self.reader_by(topic, kind, delivery)
+    }
+
+    fn reader_by<M: 'static, A: no_key::DefaultDecoder<M> + 'static>(
+        &mut self,
+        topic: &str,
+        kind: &str,
+        delivery: Delivery,
+    ) -> Result<Reader<M, A>> {
         let qos = delivery.qos();
         let made = self.topic(topic, kind, &qos)?;
         let reader = self

@@ -1,11 +1,11 @@
 //! Arrays within messages of a bag of ROS 2, of any type that the bag or a map defines.
 
 use super::bag_source::time_of;
-use super::defined::{Plan, Stamp, Taken, TimePlace, Trouble, is_usual, not_defined};
-use crate::error::{Error, Result, failed};
+use super::defined::{MessageReading, Plan, is_usual, not_defined};
+use crate::error::{Result, failed};
 use crate::recording::{BagReader, DefinedTopic, WantedTopics};
-use crate::signal::{FrameTime, RawValue};
-use crate::source::{ArrayMap, BagName, Came, Lies, MappedSource, Messages};
+use crate::signal::RawValue;
+use crate::source::{ArrayMap, BagName, Came, MappedSource, Messages};
 
 /// Messages of a topic of a bag, by a map.
 struct MappedBag {
@@ -13,11 +13,7 @@ struct MappedBag {
     name: String,
     kind: String,
     bag: BagReader,
-    map: ArrayMap,
-    plan: Plan,
-    taken: Taken,
-    /// Whether a message had no stamp.
-    is_unstamped: bool,
+    reading: MessageReading,
 }
 
 /// Frames from arrays within the messages of `bag`, by `map`, which names the topic or its type. Where it names neither, it is the
@@ -34,10 +30,7 @@ pub fn mapped_bag(bag: &BagName, map: &ArrayMap, skip_bad: bool) -> Result<Mappe
         name: format!("{place}: {}", topic.name),
         kind: topic.kind,
         bag: reader,
-        map: map.clone(),
-        plan,
-        taken: Taken::default(),
-        is_unstamped: false,
+        reading: MessageReading::new(map, plan),
     };
     MappedSource::new(Box::new(messages), map, skip_bad)
 }
@@ -105,7 +98,7 @@ fn plan(topic: &DefinedTopic, map: &ArrayMap) -> Result<Plan> {
         (None, None) => match map.definition.as_deref() {
             Some(text) if map.kind.as_ref() == Some(&topic.kind) => Plan::new(map, &topic.kind, text, false),
             _ if is_usual(&topic.kind) => Plan::new(map, &topic.kind, "", true),
-            _ => Err(not_defined(&topic.kind)),
+            _ => Err(not_defined("the bag does not define", &topic.kind)),
         },
     };
     own.map_err(|e| e.at(&topic.name))
@@ -115,29 +108,21 @@ impl Messages for MappedBag {
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came> {
         let Some(message) = self.bag.next_message()? else { return Ok(Came::End) };
         let (bytes, log) = (message.data.len(), time_of(message.log_ns));
-        match self.plan.read(message.data, &mut self.taken) {
-            Ok(()) => {}
-            Err(Trouble::Damaged) => {
+        let read = self.reading.read(message.data, log, values);
+        match read.map_err(|e| e.at(format!("{}: the message of {} s", self.name, log.s)))? {
+            Some(time) => {
+                self.bag.saw(time.s);
+                Ok(Came::Message(time))
+            }
+            None => {
                 self.bag.damaged(bytes);
-                return Ok(Came::Damaged);
+                Ok(Came::Damaged)
             }
-            Err(Trouble::Wrong(e)) => return Err(e.at(format!("{}: the message of {} s", self.name, log.s))),
         }
-        values.extend(self.taken.values.iter().flatten().map(|number| self.map.value(*number)));
-        let time = match (self.plan.time, self.taken.time) {
-            (TimePlace::Named(per_second), Some(Stamp::Number(number))) => FrameTime::from(number / per_second),
-            (TimePlace::Named(_) | TimePlace::Stamp, Some(Stamp::Ns(ns))) if ns != 0 => FrameTime::from_ns(ns),
-            (place, _) => {
-                self.is_unstamped |= place != TimePlace::Arrival;
-                log
-            }
-        };
-        if !time.s.is_finite() {
-            let what = Error::failed("time: it is not a finite number");
-            return Err(what.at(format!("{}: the message of {} s", self.name, log.s)));
-        }
-        self.bag.saw(time.s);
-        Ok(Came::Message(time))
+    }
+
+    fn named(&self) -> &[(String, usize)] {
+        self.reading.named()
     }
 
     fn name(&self) -> String {
@@ -145,17 +130,7 @@ impl Messages for MappedBag {
     }
 
     fn taken(&self) -> String {
-        let lies = match self.taken.lies {
-            Some(Lies::ByColumns) => ", column by column in the message",
-            Some(Lies::ByRows) => ", row by row",
-            Some(Lies::Plainly) | None => "",
-        };
-        let time = match self.plan.time {
-            TimePlace::Stamp if !self.is_unstamped => "time is header.stamp",
-            TimePlace::Named(_) if !self.is_unstamped => "time is as the map names it",
-            _ => "time is when a message came to the recorder",
-        };
-        format!("{} ({}): {}{lies}; {time}", self.name, self.kind, self.map.paths())
+        format!("{} ({}): {}", self.name, self.kind, self.reading.taken("time is when a message came to the recorder"))
     }
 
     fn progress(&self) -> Option<f64> {

@@ -41,6 +41,8 @@ mod kinematics;
 mod live_joints;
 #[cfg(feature = "mcap")]
 mod mapped_bag;
+#[cfg(feature = "ros2")]
+mod mapped_topic;
 #[cfg(feature = "meshes")]
 mod matching;
 pub mod messages;
@@ -71,6 +73,8 @@ pub use kinematics::Kinematics;
 pub use live_joints::{LiveJoints, StatesTime};
 #[cfg(feature = "mcap")]
 pub use mapped_bag::mapped_bag;
+#[cfg(feature = "ros2")]
+pub use mapped_topic::mapped_topic;
 #[cfg(feature = "meshes")]
 pub use matching::{LinkMatches, MAX_REST_ANGLE_RAD, MAX_REST_DISTANCE_M};
 #[cfg(feature = "mcap")]

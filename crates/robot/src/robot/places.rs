@@ -15,7 +15,10 @@ const ID_FIELDS: [&str; 2] = ["taxel", "id"];
 
 /// That messages of the type `kind` are not frames.
 pub(super) fn not_read(kind: &str) -> Error {
-    failed!("its messages are {kind}; frames are read from {}", FRAME_TYPES.join(" and "))
+    failed!(
+        "its messages are {kind}; frames are read from {}, and from arrays in others with --map",
+        FRAME_TYPES.join(" and ")
+    )
 }
 
 /// Where the values of messages go in a frame of a body.

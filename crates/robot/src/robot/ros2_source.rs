@@ -65,7 +65,7 @@ impl Ros2Source {
 }
 
 /// The type of `topic`, as other nodes have it.
-fn found(node: &Node, topic: &str) -> Result<String> {
+pub(super) fn found(node: &Node, topic: &str) -> Result<String> {
     let kinds = node.types_at(topic, FOUND_WITHIN);
     match &kinds[..] {
         [kind] => Ok(kind.clone()),

@@ -29,6 +29,7 @@ fn in_unit(plan: &Plan, unit: Unit) -> Value {
     match (unit, plan.common_quantity()) {
         (Unit::P, Some(quantity)) => quantity.symbol().into(),
         (Unit::Force, Some(quantity)) => quantity.of_force().symbol().into(),
+        (Unit::PMetre, Some(quantity)) => format!("{} m", quantity.symbol()).into(),
         (Unit::P, None) => {
             let of_field = |index: usize| (plan.label(index), plan.quantity(index).symbol().into());
             Value::Object((0..plan.fields().len()).map(of_field).collect())

@@ -159,6 +159,7 @@ fn print_quantities(line: &mut Vec<u8>, percept: &Percept, precision: Precision)
         match column.store {
             Store::Active => print(line, &(components[0] as u32)),
             // In double precision whatever the backend.
+            Store::Host(_) if column.is_whole() => print(line, &(components[0] as u32)),
             Store::Host(_) if column.components == 1 => print(line, &components[0]),
             Store::Host(_) => print(line, &&components[..column.components]),
             Store::Backend([_]) => scalar(line, components[0]),

@@ -95,6 +95,15 @@ pub trait Sink {
         Ok(Flow::Open)
     }
 
+    /// The frames that follow are of another recording: that of the place `index` in [`Session::recordings`], the next one. Only tables
+    /// hold several.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    fn begin_recording(&mut self, _index: usize) -> Result<Flow> {
+        Ok(Flow::Open)
+    }
+
     /// Percepts of the next frame that somebody behind the sink asks to have explained.
     fn questions(&mut self) -> Vec<Question> {
         Vec::new()
@@ -149,7 +158,7 @@ pub struct FieldNames {
     pub link: String,
     /// The frame of those that are in the world: `world`, or the link that stands for it.
     pub world: String,
-    /// Its letter, if the output names it: `sustained` or `change`.
+    /// Its letter, if the output names it, such as `sustained` or `temperature`.
     pub letter: Option<String>,
     /// Its signal, if the output names it: `raw` or `linear`.
     pub signal: Option<String>,
@@ -241,6 +250,8 @@ pub struct Session<'a> {
     pub plan: Option<&'a Plan>,
     /// What people call the source.
     pub source: &'a str,
+    /// What people call each recording, if there are several, one after the other; empty for any other source.
+    pub recordings: &'a [String],
     /// The backend: its name, what it runs on, and why it was chosen.
     pub backend: [&'a str; 3],
     /// Whether the frames are those of a recording, which ends: a recording or bag that is made of them appears when it is whole.

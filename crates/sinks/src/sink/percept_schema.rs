@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::percept::{COLUMNS, Outputs, TOUCH_COLUMNS, TouchOutputs, Unit};
+use crate::percept::{COLUMNS, TOUCH_COLUMNS, TouchOutputs, Unit};
 
 /// The schema.
 pub(super) fn text() -> String {
@@ -101,7 +101,7 @@ fn field() -> Value {
         ("contact", described("boolean", "Whether it is touched.")),
     ];
     let columns = COLUMNS.iter().map(|column| {
-        let is_count = column.output == Outputs::ACTIVE;
+        let is_count = column.is_whole();
         (column.name, quantity(column.unit, is_count, column.components, column.help))
     });
     let tail = [

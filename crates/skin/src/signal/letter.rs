@@ -101,12 +101,9 @@ impl Letter {
         receptors.iter().flat_map(with).collect()
     }
 
-    /// Checks that there are letters, each once.
+    /// Checks that each letter is there once.
     #[doc(hidden)]
     pub fn check(letters: &[Self]) -> Result<()> {
-        if letters.is_empty() {
-            return Err(Error::usage("no letter is asked for; ask for sustained, change or both"));
-        }
         match letters.iter().enumerate().find(|(index, letter)| letters[..*index].contains(letter)) {
             Some((_, twice)) => {
                 let signal = twice.signal.map_or(String::new(), |signal| format!(" of signal `{signal}`"));

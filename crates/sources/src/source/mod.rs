@@ -51,7 +51,8 @@ pub use joint_states::{JointPosition, JointStates, position_between};
 #[cfg(feature = "zenoh")]
 pub use limbs::{LimbOptions, LimbSource};
 pub use map::{
-    ArrayMap, ArrayPath, Came, Decoder, Dimension, JsonLines, Lies, MapTime, MappedSource, Messages, Step, order,
+    ArrayMap, ArrayPath, Came, Decoder, Dimension, JsonLines, Lies, MapTime, MappedSource, Messages, Step,
+    named_sensors, order,
 };
 pub use ndjson::NdjsonSource;
 #[cfg(feature = "serial")]

@@ -6,18 +6,20 @@ use std::str::FromStr;
 
 use super::bag_name::BagName;
 use super::lerobot_name::LeRobotName;
-use super::map::{ArrayMap, JsonLines, MappedSource};
+use super::map::modbus::{self, ModbusRegisters};
+use super::map::{ArrayMap, JsonLines, MappedSource, Messages};
 use super::refused;
 use super::{CsvSource, NdjsonSource, SimulatedSource, Source, TextPlace, TextSource, VendorOptions, VendorSource};
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 13] = [
+const FORMS: [(&str, &str); 14] = [
     ("csv", "csv:FILE"),
     ("ndjson", "ndjson:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("text", "text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers"),
     ("ros2", "ros2:/TOPIC[@TYPE]"),
+    ("modbus", "modbus://HOST[:PORT][/UNIT]"),
     ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
     ("ros2-mcap", "ros2-mcap:PATH[:/TOPIC,...][@TYPE]"),
@@ -55,6 +57,8 @@ pub enum SourceSpec {
         /// The type of its messages, where one is given, such as `sensor_msgs/msg/PointCloud2`.
         kind: Option<String>,
     },
+    /// `modbus://HOST[:PORT][/UNIT]`: registers of a device that speaks Modbus TCP, by a map.
+    Modbus(String),
     /// `zenoh:KEY`: a limb on another computer.
     Zenoh(String),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
@@ -93,6 +97,7 @@ impl fmt::Display for SourceSpec {
             Self::Text(place) => place.fmt(f),
             Self::Ros2 { topic, kind: None } => write!(f, "ros2:{topic}"),
             Self::Ros2 { topic, kind: Some(kind) } => write!(f, "ros2:{topic}@{kind}"),
+            Self::Modbus(place) => write!(f, "modbus://{place}"),
             Self::Zenoh(key) => write!(f, "zenoh:{key}"),
             Self::Mcap(path) => write!(f, "mcap:{}", path.display()),
             Self::Ros2Mcap(bag) => write!(f, "ros2-mcap:{bag}"),
@@ -137,7 +142,7 @@ fn port(text: &str) -> Result<SourceSpec> {
 }
 
 impl SourceSpec {
-    /// Parses a source of one of `kinds`: `csv`, `serial`, `text`, `ros2`, `zenoh`, `mcap`, `ros2-mcap`, `lerobot`, `export`,
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `text`, `ros2`, `modbus`, `zenoh`, `mcap`, `ros2-mcap`, `lerobot`, `export`,
     /// `sim`, `-` and `csv:-`.
     ///
     /// # Errors
@@ -205,6 +210,10 @@ impl SourceSpec {
             "export" => Self::Vendor(rest.into()),
             "sim" => Self::Sim(rest.into()),
             "text" => Self::Text(rest.parse()?),
+            "modbus" => {
+                let place = rest.strip_prefix("//").unwrap_or(rest);
+                modbus::place_of(place).map(|_| Self::Modbus(place.to_owned()))?
+            }
             "zenoh" => Self::Zenoh(crate::limb::checked_key(rest)?),
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
@@ -217,6 +226,13 @@ impl SourceSpec {
     #[must_use]
     pub fn is_stdin(&self) -> bool {
         matches!(self, Self::Stdin | Self::CsvStdin | Self::Text(TextPlace::Stdin))
+    }
+
+    /// Whether it ends, and can be read again.
+    #[must_use]
+    pub fn is_recording(&self) -> bool {
+        use SourceSpec::{CsvStdin, Modbus, Ros2, Serial, Stdin, Text, Zenoh};
+        !matches!(self, Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Modbus(_) | Zenoh(_))
     }
 
     /// What it is by its file's content and by the options: a `.csv` may be an export.
@@ -242,9 +258,8 @@ impl SourceSpec {
             }
             Self::Ros2Mcap(name) => Some(&name.path),
             Self::LeRobot(name) => Some(&name.path),
-            Self::Serial { .. } | Self::Text(_) | Self::Ros2 { .. } | Self::Zenoh(_) | Self::Stdin | Self::CsvStdin => {
-                None
-            }
+            Self::Serial { .. } | Self::Text(_) | Self::Ros2 { .. } | Self::Modbus(_) | Self::Zenoh(_) => None,
+            Self::Stdin | Self::CsvStdin => None,
         }
     }
 
@@ -280,9 +295,10 @@ impl SourceSpec {
 
     /// Checks that a map is for this source.
     fn check_map(&self, options: &VendorOptions) -> Result<()> {
-        if !matches!(self, Self::Ros2Mcap(_) | Self::Ndjson(_) | Self::Stdin | Self::Text(_)) {
+        use SourceSpec::{Modbus, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
+        if !matches!(self, Ros2Mcap(_) | Ros2 { .. } | Modbus(_) | Ndjson(_) | Stdin | Text(_)) {
             return Err(Error::usage(
-                "--map is for ROS 2 bags, NDJSON and lines of JSON; leave it out here, or name columns with --columns",
+                "--map is for ROS 2 bags and topics, NDJSON, lines of JSON and Modbus; leave it out here, or name columns with --columns",
             ));
         }
         match options.text.given() {
@@ -291,17 +307,18 @@ impl SourceSpec {
         }
     }
 
-    /// Opens lines of JSON by `map`; `None` where it is another source.
+    /// Opens lines of JSON, or registers of a device, by `map`; `None` where it is another source.
     ///
     /// # Errors
     /// They cannot be read, or have not what the map says.
     pub fn open_json(&self, map: &ArrayMap, skip_bad: bool) -> Result<Option<MappedSource>> {
-        let lines = match self {
-            Self::Stdin => JsonLines::stdin(map),
-            Self::Ndjson(path) => JsonLines::open(path, map)?,
+        let messages: Box<dyn Messages + Send> = match self {
+            Self::Stdin => Box::new(JsonLines::stdin(map)),
+            Self::Ndjson(path) => Box::new(JsonLines::open(path, map)?),
+            Self::Modbus(place) => Box::new(ModbusRegisters::connect(place, map)?),
             _ => return Ok(None),
         };
-        MappedSource::new(Box::new(lines), map, skip_bad).map(Some)
+        MappedSource::new(messages, map, skip_bad).map(Some)
     }
 
     /// Opens the source. `taxels` are the ids that the body has; `options` say what its file does not, such as the rate of a
@@ -345,6 +362,10 @@ impl SourceSpec {
             Self::LeRobot(name) => Ok(Box::new(super::LeRobotSource::open(name, taxels)?)),
             #[cfg(not(feature = "parquet"))]
             Self::LeRobot(name) => Err(Error::failed(refused::NO_PARQUET).at(name.path.display())),
+            Self::Modbus(_) => {
+                Err(Error::usage("a map names the registers that are sensors; add --map FILE, or --map inspire")
+                    .at(self))
+            }
             Self::Ros2 { topic, .. } => {
                 let what = "a topic of ROS 2 is read live, by `somatic run` in a build with feature `ros2`: cargo install \
                             --path . --features ros2";
@@ -392,6 +413,7 @@ mod tests {
         assert_eq!(parsed("serial:COM3"), SourceSpec::Serial { port: "COM3".into(), baud: None });
         let ros2 = |kind: Option<&str>| SourceSpec::Ros2 { topic: "/arm/skin".into(), kind: kind.map(str::to_owned) };
         assert_eq!(parsed("ros2:/arm/skin"), ros2(None));
+        assert_eq!(parsed("modbus://hand:6000/2"), SourceSpec::Modbus("hand:6000/2".into()));
         let cloud = Some("sensor_msgs/msg/PointCloud2");
         assert_eq!(parsed("ros2:/arm/skin@sensor_msgs/msg/PointCloud2"), ros2(cloud));
         assert_eq!(parsed("ros2:/arm/skin@sensor_msgs/PointCloud2"), ros2(cloud));
@@ -433,7 +455,7 @@ mod tests {
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, ndjson:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], lerobot:DIR[:FEATURE][#EPISODE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, ndjson:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], modbus://HOST[:PORT][/UNIT], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], lerobot:DIR[:FEATURE][#EPISODE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

@@ -42,7 +42,7 @@ impl Plan {
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
         plan.senses = Senses::new(body, fields, &chosen, &letters, calibration);
         plan.letters = letters;
-        plan.touch_outputs = touches.map(|touches| touches.outputs);
+        plan.touch_outputs = touches.map(|touches| touches.outputs | plan.senses.of_touches());
         plan.left_out = left_out;
         let first_slots = plan.lay_out_slots(calibration)?;
         if touches.is_some() {
@@ -150,9 +150,7 @@ fn check(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibratio
         return Err(Error::failed("the body has no fields: add some with `somatic author`").at(&body.name));
     }
     calibration.check_body(&body.name)?;
-    if !scene.letters.is_empty() {
-        Letter::check(&scene.letters)?;
-    }
+    Letter::check(&scene.letters)?;
     let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
     scene.knobs.check(scene.outputs, has_changes, scene.touches.is_some())?;
     scene.check_world()?;
@@ -212,7 +210,7 @@ impl FieldsMade {
             if !receptor.is_of_pressure() {
                 let sensed = plan.senses.members(from.body, field, receptor);
                 if !sensed.is_empty() {
-                    self.fields.push(in_first.clone().of_senses(letter, self.members.len(), sensed));
+                    self.fields.push(in_first.clone().of_senses(letter, self.members.len(), receptor, sensed));
                 }
                 continue;
             }

@@ -2,8 +2,9 @@
 
 mod definition;
 mod plan;
+mod reading;
 mod walk;
 
 pub(super) use self::definition::is_usual;
-pub(super) use self::plan::{Plan, TimePlace, not_defined};
-pub(super) use self::walk::{Stamp, Taken, Trouble};
+pub(super) use self::plan::{Plan, not_defined};
+pub(super) use self::reading::MessageReading;

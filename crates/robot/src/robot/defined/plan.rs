@@ -11,6 +11,8 @@ use crate::source::{ArrayMap, ArrayPath, Decoder, MapTime, Step};
 pub(super) enum Take {
     /// Numbers, for the path of this number.
     Values(usize),
+    /// A sensor's name.
+    Name,
     Time,
 }
 
@@ -66,6 +68,11 @@ impl Plan {
         for (number, path) in map.values.iter().enumerate() {
             let adding = Adding { definition: &definition, take: Take::Values(number), decoder: map.decoder };
             adding.add(&mut want, Base::Message(0), Many::One, path.steps(), &mut String::new())?;
+        }
+        if let Some(path) = &map.names {
+            let adding = Adding { definition: &definition, take: Take::Name, decoder: None };
+            let added = adding.add(&mut want, Base::Message(0), Many::One, path.steps(), &mut String::new());
+            added.map_err(|e| failed!("names: {e}"))?;
         }
         let adding = Adding { definition: &definition, take: Take::Time, decoder: None };
         let mut add =
@@ -149,6 +156,9 @@ impl Adding<'_> {
             (Take::Time, Base::Message(number)) if self.definition.is_time(number) && many == Many::One => {}
             (Take::Time, base) if base.size().is_some() && many == Many::One => {}
             (Take::Time, _) => return Err(failed!("`{here}` is not a time; a number or a stamp is")),
+            (Take::Name, Base::Text) if many == Many::One => {}
+            (Take::Name, Base::Text) => return Err(failed!("`{here}` is an array of texts; write {here}[*]")),
+            (Take::Name, _) => return Err(failed!("`{here}` is {}, not text", word(base))),
             (Take::Values(_), Base::Message(number)) if self.definition.is_laid_out(number) && many == Many::One => {
                 return self.add(want, base, many, &[Step::Field("data".to_owned())], here);
             }
@@ -183,7 +193,7 @@ fn word(base: Base) -> &'static str {
     }
 }
 
-/// That nothing defines messages of `kind`.
-pub(in crate::robot) fn not_defined(kind: &str) -> Error {
-    failed!("the bag does not define {kind}; give its .msg in the map: definition = \"NAME.msg\"")
+/// That nothing defines messages of `kind`, in words that begin with `who`.
+pub(in crate::robot) fn not_defined(who: &str, kind: &str) -> Error {
+    failed!("{who} {kind}; give its .msg in the map: definition = \"NAME.msg\"")
 }

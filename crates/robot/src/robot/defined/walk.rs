@@ -33,6 +33,9 @@ pub(in crate::robot) enum Stamp {
 pub(in crate::robot) struct Taken {
     /// The numbers of each path.
     pub(in crate::robot) values: Vec<Vec<f64>>,
+    /// How many values each array has, and the sensors' names, where these are read.
+    pub(in crate::robot) counts: Vec<usize>,
+    pub(in crate::robot) names: Vec<String>,
     pub(in crate::robot) time: Option<Stamp>,
     /// How the values of an array with a layout lie.
     pub(in crate::robot) lies: Option<Lies>,
@@ -119,6 +122,8 @@ impl Plan {
         taken.values.resize_with(self.paths, Vec::new);
         taken.values.iter_mut().for_each(Vec::clear);
         taken.time = None;
+        taken.counts.clear();
+        taken.names.clear();
         let mut walk = Walk { plan: self, cdr: Cdr::new(message).ok_or(Trouble::Damaged)?, taken };
         walk.one(Base::Message(0), Some(&self.want), 0)?;
         let left = walk.cdr.bytes.len() - walk.cdr.at;
@@ -182,15 +187,17 @@ impl Walk<'_> {
     /// Takes the numbers of `base` that `bytes` are, for the path of number `path`.
     fn numbers(&mut self, base: Base, bytes: &[u8], path: usize) -> Walked<()> {
         let to = &mut self.taken.values[path];
+        let before = to.len();
         match (self.plan.decoder, base.size()) {
-            (Some(decoder), _) => decoder.bytes(bytes, |number| to.push(number)).map_err(Trouble::Wrong),
+            (Some(decoder), _) => decoder.bytes(bytes, |number| to.push(number)).map_err(Trouble::Wrong)?,
             (None, Some(size)) => {
                 let is_big = self.cdr.is_big;
                 to.extend(bytes.chunks_exact(size).map(|bytes| number(base, bytes, is_big)));
-                Ok(())
             }
-            (None, None) => Ok(()),
+            (None, None) => {}
         }
+        self.taken.counts.push(self.taken.values[path].len() - before);
+        Ok(())
     }
 
     fn one(&mut self, base: Base, want: Option<&Want>, depth: usize) -> Walked<()> {
@@ -201,8 +208,15 @@ impl Walk<'_> {
                 match (take, self.plan.decoder) {
                     (Some(Take::Values(path)), Some(decoder)) => {
                         let to = &mut self.taken.values[path];
+                        let before = to.len();
                         let text = std::str::from_utf8(text).map_err(|_| Trouble::Damaged)?;
-                        decoder.text(text, |number| to.push(number)).map_err(Trouble::Wrong)
+                        decoder.text(text, |number| to.push(number)).map_err(Trouble::Wrong)?;
+                        self.taken.counts.push(self.taken.values[path].len() - before);
+                        Ok(())
+                    }
+                    (Some(Take::Name), _) => {
+                        self.taken.names.push(String::from_utf8_lossy(text).into_owned());
+                        Ok(())
                     }
                     _ => Ok(()),
                 }
@@ -214,9 +228,12 @@ impl Walk<'_> {
             number => {
                 let value = self.cdr.number(number)?;
                 match take {
-                    Some(Take::Values(path)) => self.taken.values[path].push(value),
+                    Some(Take::Values(path)) => {
+                        self.taken.values[path].push(value);
+                        self.taken.counts.push(1);
+                    }
                     Some(Take::Time) => self.taken.time = Some(Stamp::Number(value)),
-                    None => {}
+                    Some(Take::Name) | None => {}
                 }
                 Ok(())
             }
@@ -272,11 +289,13 @@ impl Walk<'_> {
             self.taken.known = Some((dimensions, offset, count, places));
         }
         let is_big = self.cdr.is_big;
-        let Taken { values, numbers, known, .. } = &mut *self.taken;
+        let Taken { values, counts, numbers, known, .. } = &mut *self.taken;
         numbers.clear();
         numbers.extend(bytes.chunks_exact(size).map(|bytes| number(base, bytes, is_big)));
         let places = known.iter().flat_map(|(.., places)| places);
+        let before = values[path].len();
         values[path].extend(places.filter_map(|&place| numbers.get(place)));
+        counts.push(values[path].len() - before);
         Ok(())
     }
 }

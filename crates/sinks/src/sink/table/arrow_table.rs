@@ -109,6 +109,11 @@ impl ArrowTable {
         }
     }
 
+    /// The rows that follow are of the recording of the place `index` in [`Session::recordings`].
+    pub(super) fn begin_recording(&mut self, index: usize) {
+        self.words.recording = index;
+    }
+
     fn push_row(&mut self, row: &Row<'_>) {
         for (column, builder) in &mut self.columns {
             builder.push(row, column.value, &self.words);
@@ -183,6 +188,7 @@ impl Builder {
                 };
                 let skin = words_of.skin.as_ref();
                 let others: Vec<&str> = match column.value {
+                    ValueOf::Recording => words_of.recordings.iter().map(String::as_str).collect(),
                     ValueOf::OnSkin(OfTouch::Kind) => ContactKind::ALL.map(ContactKind::name).to_vec(),
                     ValueOf::OnSkin(of) => {
                         let links = skin.into_iter().flat_map(|skin| skin.links.iter().map(String::as_str));

@@ -72,8 +72,10 @@ impl CsvSink {
         let titles_of = |file: &CsvFile| file.columns.iter().map(TableColumn::title).collect::<Vec<_>>();
         if let Some(percepts) = sink.percepts.as_mut().filter(|_| wide) {
             let columns = wide_columns(session);
-            let keys = percepts.columns.drain(..2).collect();
-            percepts.columns = keys;
+            // Which frame it is of; what follows is of each field.
+            percepts
+                .columns
+                .retain(|column| matches!(column.value, ValueOf::Recording | ValueOf::Time | ValueOf::Frame));
             let titles = percepts.columns.iter().map(TableColumn::title);
             let of_field = |name: &FieldNames| {
                 let head = head_of(name);
@@ -239,6 +241,11 @@ impl Sink for CsvSink {
         }
         let written = self.write_all(percepts).map_err(io_error);
         self.flow(written)
+    }
+
+    fn begin_recording(&mut self, index: usize) -> Result<Flow> {
+        self.words.recording = index;
+        Ok(if self.closed { Flow::Closed } else { Flow::Open })
     }
 
     fn flush(&mut self) -> Result<Flow> {

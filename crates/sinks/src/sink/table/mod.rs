@@ -5,6 +5,7 @@
 #[cfg(feature = "arrow")]
 mod arrow_table;
 mod csv_sink;
+mod frame_columns;
 mod names;
 mod on_skin;
 #[cfg(feature = "parquet")]
@@ -20,16 +21,16 @@ pub use parquet_sink::ParquetSink;
 pub(super) use path_beside::path_beside;
 pub use row::{TableColumn, TableType};
 
+use self::frame_columns::frame_columns;
 use self::names::{X_Y_AND_Z, suffixes, unit_of};
 use self::row::{Row, ValueOf};
 use super::{FieldNames, Session};
 use crate::percept::{Column, Outputs, Percepts, Unit};
 
-/// Time, frame and field, with which every row of either table begins.
-fn keys(names: &[FieldNames]) -> Vec<TableColumn> {
-    let mut columns = vec![
-        TableColumn::new("t", "s", TableType::F64, "Time of the frame.", ValueOf::Time),
-        TableColumn::new("frame", "", TableType::U64, "Number of the frame, from 0.", ValueOf::Frame),
+/// Time, frame and field, with which every row of percepts begins.
+fn keys(session: &Session<'_>) -> Vec<TableColumn> {
+    let mut columns = frame_columns(session);
+    columns.extend([
         TableColumn::new("field", "", TableType::Word, "Name of the field.", ValueOf::Field),
         TableColumn::new(
             "link",
@@ -38,15 +39,15 @@ fn keys(names: &[FieldNames]) -> Vec<TableColumn> {
             "The link in whose frame positions and normals are, or `world`.",
             ValueOf::Link,
         ),
-    ];
-    columns.extend(letter_columns(names));
+    ]);
+    columns.extend(letter_columns(&session.names));
     columns
 }
 
 /// Letter and signal, where a field has percepts of several.
 fn letter_columns(names: &[FieldNames]) -> impl Iterator<Item = TableColumn> {
     let letter = names.iter().any(|name| name.letter.is_some()).then(|| {
-        let help = "Of what the percept is made: `sustained` or `change`.";
+        let help = "Of what the percept is made: `sustained`, `change`, `shear`, `temperature` or `proximity`.";
         TableColumn::new("letter", "", TableType::Word, help, ValueOf::Letter).or_absent()
     });
     let signal = names.iter().any(|name| name.signal.is_some()).then(|| {
@@ -59,7 +60,7 @@ fn letter_columns(names: &[FieldNames]) -> impl Iterator<Item = TableColumn> {
 /// The columns of the percepts of a session: keys, contact, a column for each component of its outputs, and flags.
 #[must_use]
 pub fn percept_columns(session: &Session<'_>) -> Vec<TableColumn> {
-    let mut columns = keys(&session.names);
+    let mut columns = keys(session);
     columns.push(TableColumn::new("contact", "", TableType::Bool, "Whether the field is touched.", ValueOf::Contact));
     columns.extend(output_columns(session));
     let help = "Why quantities are absent or in doubt, by name.";
@@ -90,8 +91,8 @@ fn columns_of(
 }
 
 fn kind_of(column: &Column, session: &Session<'_>) -> TableType {
-    match column.output {
-        Outputs::ACTIVE => TableType::U32,
+    match column {
+        _ if column.is_whole() => TableType::U32,
         _ if column.is_double() || session.is_double => TableType::F64,
         _ => TableType::F32,
     }
@@ -107,11 +108,8 @@ pub fn touch_columns(session: &Session<'_>) -> Vec<TableColumn> {
 #[must_use]
 pub fn self_contact_columns(session: &Session<'_>) -> Vec<TableColumn> {
     let p = unit_of(Unit::P, session);
-    let mut columns = vec![
-        TableColumn::new("t", "s", TableType::F64, "Time of the frame.", ValueOf::Time),
-        TableColumn::new("frame", "", TableType::U64, "Number of the frame, from 0.", ValueOf::Frame),
-        TableColumn::new("id", "", TableType::U64, "Lasts as long as both touches.", ValueOf::ContactId),
-    ];
+    let mut columns = frame_columns(session);
+    columns.push(TableColumn::new("id", "", TableType::U64, "Lasts as long as both touches.", ValueOf::ContactId));
     for (side, letter) in ["a", "b"].into_iter().enumerate() {
         let mut column = |name: &str, unit: &str, kind, help: &str, value| {
             columns.push(TableColumn::new(&format!("{name}_{letter}"), unit, kind, help, value));

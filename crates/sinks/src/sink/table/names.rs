@@ -20,6 +20,7 @@ pub(super) fn unit_of(unit: Unit, session: &Session<'_>) -> String {
     match unit {
         Unit::Force if session.p_unit == "Pa" => "N".to_owned(),
         Unit::P | Unit::Force if !session.p_unit.is_empty() => session.p_unit.to_owned(),
+        Unit::PMetre if !session.p_unit.is_empty() => format!("{} m", session.p_unit),
         unit => unit.symbol().to_owned(),
     }
 }

@@ -1,5 +1,6 @@
 //! The table of touches of the whole body: one row per frame and touch.
 
+use super::frame_columns::frame_columns;
 use super::names::{suffixes, unit_of};
 use super::row::{OfTouch, Row, TableColumn, TableType, ValueOf};
 use crate::percept::{Percepts, TOUCH_COLUMNS, TouchOutputs};
@@ -9,10 +10,13 @@ use crate::sink::Session;
 pub(super) fn columns(outputs: TouchOutputs, session: &Session<'_>) -> Vec<TableColumn> {
     let column =
         |name: &str, unit: &str, kind, help: &str, of| TableColumn::new(name, unit, kind, help, ValueOf::OnSkin(of));
-    let mut columns = vec![
-        TableColumn::new("t", "s", TableType::F64, "Time of the frame.", ValueOf::Time),
-        TableColumn::new("frame", "", TableType::U64, "Number of the frame, from 0.", ValueOf::Frame),
-        column("touch", "", TableType::U64, "Its id: from onset to release, and never used again.", OfTouch::Id),
+    let mut columns = frame_columns(session);
+    let id = match session.recordings {
+        [] => "Its id: from onset to release, and never used again.",
+        _ => "Its id: from onset to release, and not used again in its recording.",
+    };
+    columns.extend([
+        column("touch", "", TableType::U64, id, OfTouch::Id),
         column("age", "s", TableType::F64, "Time since its onset.", OfTouch::Age),
         column("link", "", TableType::Word, "The link with most of its total.", OfTouch::Link),
         column(
@@ -22,7 +26,7 @@ pub(super) fn columns(outputs: TouchOutputs, session: &Session<'_>) -> Vec<Table
             "The link in whose frame its place and directions are, or `world`.",
             OfTouch::In,
         ),
-    ];
+    ]);
     for (index, quantity) in TOUCH_COLUMNS.iter().enumerate().filter(|(_, of)| outputs.contains(of.output)) {
         if quantity.output == TouchOutputs::ACTIVE {
             columns.push(column(quantity.name, "1", TableType::U32, quantity.help, OfTouch::Active));

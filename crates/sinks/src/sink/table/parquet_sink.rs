@@ -117,6 +117,14 @@ impl Sink for ParquetSink {
         Ok(Flow::Open)
     }
 
+    fn begin_recording(&mut self, index: usize) -> Result<Flow> {
+        self.percepts.table.begin_recording(index);
+        for file in [&mut self.touches, &mut self.self_contacts].into_iter().flatten() {
+            file.table.begin_recording(index);
+        }
+        Ok(Flow::Open)
+    }
+
     fn flush(&mut self) -> Result<Flow> {
         // A file without its end cannot be read: it is written as a whole.
         Ok(Flow::Open)
@@ -127,9 +135,70 @@ impl Sink for ParquetSink {
         let beside = [self.touches, self.self_contacts].into_iter().flatten();
         percepts.finish_with(beside.map(ParquetFile::finish).collect::<Result<_>>()?)
     }
+
     fn finish_early(self: Box<Self>) -> Result<Option<String>> {
         let name = self.percepts.name.clone();
         // Where it is a stream it gets an end, as it cannot be read without.
         Ok(self.percepts.finish()?.appears_when_finished().then_some(name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use arrow_array::cast::AsArray as _;
+    use arrow_array::types::{Int32Type, UInt64Type};
+    use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+    use super::*;
+    use crate::output::OutputPaths;
+    use crate::percept::Outputs;
+    use crate::sink::FieldNames;
+    use crate::{Body, Engine, Options, RawValue};
+
+    #[test]
+    fn rows_of_several_recordings_say_which_they_are_of() {
+        let body = Body::from_bytes("hand", crate::bundled::body("hand").unwrap()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("both.parquet");
+        let recordings = ["a.csv".to_owned(), "b.csv".to_owned()];
+        let engine = || Engine::new(&body, Options::default().backend(crate::BackendKind::Cpu)).unwrap();
+        let first = engine();
+        let session = Session {
+            names: FieldNames::all_of(first.plan()),
+            outputs: Outputs::TOTAL,
+            recordings: &recordings,
+            body: Some(&body),
+            plan: Some(first.plan()),
+            ..Session::default()
+        };
+        let mut outputs = OutputPaths::new(false, Vec::<std::path::PathBuf>::new());
+        let output = outputs.add(&path).unwrap();
+        let mut sink = ParquetSink::create(output, None, None, &session).unwrap();
+        for recording in 0..2 {
+            // From a state of its own.
+            let mut engine = engine();
+            if recording > 0 {
+                assert_eq!(sink.begin_recording(recording).unwrap(), Flow::Open);
+            }
+            for time in 0..3 {
+                let mut frame = engine.frame(f64::from(time));
+                frame.values.fill(RawValue::new(5.0));
+                assert_eq!(sink.write(engine.process_one(&frame).unwrap()).unwrap(), Flow::Open);
+            }
+        }
+        Box::new(sink).finish().unwrap();
+        let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&path).unwrap()).unwrap();
+        let (mut names, mut frames) = (Vec::new(), Vec::new());
+        for batch in reader.build().unwrap().map(Result::unwrap) {
+            assert_eq!(batch.schema().field(0).name(), "recording");
+            let column = batch.column(0).as_dictionary::<Int32Type>();
+            let words = column.values().as_string::<i32>();
+            names.extend(column.keys().iter().map(|key| words.value(key.unwrap() as usize).to_owned()));
+            frames.extend(batch.column(2).as_primitive::<UInt64Type>().values().iter().copied());
+        }
+        let half = names.len() / 2;
+        assert!(half >= 9 && names[..half].iter().all(|name| name == "a.csv"), "{names:?}");
+        assert!(names[half..].iter().all(|name| name == "b.csv"));
+        assert_eq!((frames[0], frames[half], &frames[..half]), (0, 0, &frames[half..]));
     }
 }

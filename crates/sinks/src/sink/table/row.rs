@@ -60,6 +60,7 @@ impl TableType {
 /// Where a column's values are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ValueOf {
+    Recording,
     Time,
     Frame,
     Field,
@@ -119,6 +120,9 @@ impl TableColumn {
 /// The words of the columns of words.
 pub(super) struct Words {
     pub(super) names: Vec<FieldNames>,
+    /// If there are several, and which of them the rows are of now.
+    pub(super) recordings: Vec<String>,
+    pub(super) recording: usize,
     pub(super) skin: Option<SkinNames>,
     pub(super) flags: Vec<(Flags, String)>,
     pub(super) touch_flags: Vec<(TouchFlags, String)>,
@@ -128,6 +132,8 @@ impl Words {
     pub(super) fn new(session: &Session<'_>) -> Self {
         Self {
             names: session.names.clone(),
+            recordings: session.recordings.to_vec(),
+            recording: 0,
             skin: session.skin(),
             flags: Flags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect(),
             touch_flags: TouchFlags::all().iter_names().map(|(name, flag)| (flag, name.to_lowercase())).collect(),
@@ -199,6 +205,7 @@ impl Row<'_> {
             ValueOf::OnSkin(OfTouch::Kind) => Some(self.on_skin?.1.fit?.kind.name()),
             ValueOf::OnSkin(OfTouch::In) if self.on_skin?.1.in_world => Some(&words.skin.as_ref()?.world),
             ValueOf::OnSkin(OfTouch::In) => words.link(self.on_skin?.1.link),
+            ValueOf::Recording => words.recordings.get(words.recording).map(String::as_str),
             ValueOf::Field => Some(&name.field),
             ValueOf::Link => Some(self.link(names)),
             ValueOf::Letter => name.letter.as_deref(),

@@ -5,6 +5,8 @@ use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use serde_json::{Value, json};
+
 use super::merge::BoardFrame;
 use super::wipers::{self, ChannelWiper, WiperTrouble};
 use crate::error::{Error, failed};
@@ -87,6 +89,28 @@ impl BoardAccount {
     #[must_use]
     pub fn name(&self) -> String {
         self.limb.as_ref().map_or_else(|| format!("board {}", self.board), |key| format!("limb {key}"))
+    }
+
+    /// What became of its frames: `board` or `limb`, `port`, `state`, frames `sent`, `delivered`, `lost`, `dropped` and `replaced`,
+    /// pieces that were `corrupt`, `restarts`, `unplugs`, the drift of its clock in `drift_ppm`, and `rate_hz`.
+    #[must_use]
+    pub fn as_json(&self) -> Value {
+        let name = self.limb.as_ref().map_or_else(|| ("board", json!(self.board)), |key| ("limb", json!(key)));
+        json!({
+            (name.0): name.1,
+            "port": self.port,
+            "state": self.state.word(),
+            "sent": self.delivered + self.lost,
+            "delivered": self.delivered,
+            "lost": self.lost,
+            "dropped": self.dropped,
+            "replaced": self.replaced,
+            "corrupt": self.corrupt,
+            "restarts": self.restarts,
+            "unplugs": self.unplugs,
+            "drift_ppm": self.drift.map(|drift| drift * 1e6),
+            "rate_hz": self.rate_hz,
+        })
     }
 }
 

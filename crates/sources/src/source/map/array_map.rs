@@ -1,5 +1,6 @@
 //! Maps: which values of a message are sensors, and which taxels these are.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -15,6 +16,9 @@ use crate::error::{Error, Result, failed, parse_toml, suggestion};
 use crate::limits::{self, MAX_TOML_BYTES};
 use crate::signal::RawValue;
 
+/// Registers that a device gives at once.
+const MAX_REGISTERS: u16 = 125;
+
 /// A file of a map, as people write it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,6 +26,7 @@ struct Keys {
     message: Option<String>,
     r#type: Option<String>,
     values: OneOrMany,
+    names: Option<String>,
     ids: Option<String>,
     grid: Option<String>,
     pitch: Option<String>,
@@ -31,6 +36,8 @@ struct Keys {
     time: Option<String>,
     decoder: Option<String>,
     definition: Option<PathBuf>,
+    #[serde(default)]
+    registers: BTreeMap<String, [u16; 2]>,
     #[serde(default)]
     pads: Vec<PadKeys>,
 }
@@ -91,6 +98,8 @@ pub struct ArrayMap {
     pub kind: Option<String>,
     /// Where the values are; those of one path follow those of the one before.
     pub values: Vec<ArrayPath>,
+    /// Where the sensors' names are, if they are read: one for each array at the path of values, or for each value.
+    pub names: Option<ArrayPath>,
     /// The taxels of the values, in their order.
     pub ids: Option<Vec<u32>>,
     /// Where the time is.
@@ -106,6 +115,8 @@ pub struct ArrayMap {
     pub(in crate::source) pitch_m: Option<[f64; 2]>,
     missing: Vec<f64>,
     scale: f64,
+    /// Of devices that speak Modbus, the first register of an array and how many it has.
+    registers: BTreeMap<String, [u16; 2]>,
 }
 
 impl ArrayMap {
@@ -159,6 +170,11 @@ impl ArrayMap {
         if values.is_empty() {
             return Err(Error::failed("values: name the array of the values, such as data or pads[*].pressure"));
         }
+        if keys.names.is_some() && (values.len() > 1 || !keys.pads.is_empty()) {
+            return Err(Error::failed(
+                "names: they go with one path of values, and make the pads; leave out the others",
+            ));
+        }
         let scale = keys.scale.unwrap_or(1.0);
         if !(scale.is_finite() && scale != 0.0) {
             return Err(failed!("scale: {scale} is not a factor; give a number other than 0"));
@@ -168,6 +184,13 @@ impl ArrayMap {
             Some(TextIds::Listed(ids)) => Some(ids),
             None => None,
         };
+        for (name, [first, count]) in &keys.registers {
+            if !(1..=MAX_REGISTERS).contains(count) || first.checked_add(count - 1).is_none() {
+                return Err(failed!(
+                    "registers: `{name}` has {count} from {first} on; a device gives 1 to {MAX_REGISTERS} at once, up to 65535"
+                ));
+            }
+        }
         let whole = |kind: String| {
             type_of(&kind).ok_or_else(|| failed!("type: `{kind}` is not a type; write it as package/msg/Name"))
         };
@@ -176,6 +199,7 @@ impl ArrayMap {
             message: keys.message,
             kind: keys.r#type.map(whole).transpose()?,
             values: values.iter().map(|path| path.parse()).collect::<Result<_>>().map_err(at("values"))?,
+            names: keys.names.as_deref().map(str::parse).transpose().map_err(at("names"))?,
             ids,
             time: keys.time.map_or(Ok(MapTime::Usual), |time| time_of(&time)).map_err(at("time"))?,
             decoder: keys.decoder.as_deref().map(str::parse).transpose().map_err(at("decoder"))?,
@@ -186,6 +210,7 @@ impl ArrayMap {
             pitch_m: keys.pitch.as_deref().map(pitch).transpose().map_err(at("pitch"))?,
             missing: keys.missing,
             scale,
+            registers: keys.registers,
         })
     }
 
@@ -193,6 +218,45 @@ impl ArrayMap {
     #[must_use]
     pub fn value(&self, number: f64) -> RawValue {
         if self.missing.contains(&number) { RawValue::MISSING } else { RawValue::new(number * self.scale) }
+    }
+
+    /// The first register and the number of registers of each of its arrays.
+    ///
+    /// # Errors
+    /// A usage error: it does not name them.
+    pub(in crate::source) fn blocks(&self) -> Result<Vec<[u16; 2]>> {
+        if self.registers.is_empty() {
+            return Err(Error::usage(
+                "registers: name them, as registers = { palm = [4900, 112] }, the first and how many",
+            ));
+        }
+        let block = |path: &ArrayPath| {
+            let name = path.to_string();
+            let near = || suggestion(&name, self.registers.keys().map(String::as_str));
+            let missing = || Error::usage(format!("registers: there is no `{name}`; {}", near()));
+            self.registers.get(&name).copied().ok_or_else(missing)
+        };
+        self.values.iter().map(block).collect()
+    }
+
+    /// Pads by the names of sensors, each with so many values, one below the other.
+    pub(in crate::source) fn pads_of(&self, named: &[(String, usize)]) -> Vec<Pad> {
+        let mut used = BTreeSet::new();
+        let mut down_m = 0.0;
+        let pad = |(index, (name, count)): (usize, &(String, usize))| {
+            let stem = if name.trim().is_empty() { format!("sensor_{index}") } else { name.trim().to_owned() };
+            let others = (2..).map(|number| format!("{stem}_{number}"));
+            let name = std::iter::once(stem.clone()).chain(others).find(|name| used.insert(name.clone()));
+            let count = u32::try_from(*count).unwrap_or(u32::MAX);
+            let grid =
+                self.grid.filter(|[rows, columns]| rows.checked_mul(*columns) == Some(count)).unwrap_or([1, count]);
+            let pitch_m = self.pitch_m.unwrap_or([USUAL_PITCH_M; 2]);
+            let height_m = f64::from(grid[0]) * pitch_m[0];
+            let at_m = [0.0, -(down_m + height_m / 2.0)];
+            down_m += height_m + pitch_m[0];
+            Pad { name: name.unwrap_or(stem), grid, pitch_m, at_m }
+        };
+        named.iter().enumerate().filter(|(_, (_, count))| *count > 0).map(pad).collect()
     }
 
     /// Its paths in words.
@@ -303,6 +367,25 @@ mod tests {
         }
         let why = ArrayMap::named("dex4").unwrap_err();
         assert!(why.is_usage() && why.to_string().contains("did you mean `dex3`?"), "{why}");
+    }
+
+    #[test]
+    fn names_of_sensors_are_pads_one_below_the_other() {
+        let map = ArrayMap::parse("values = 's[*].v'\nnames = 's[*].name'\ngrid = '2x2'\npitch = '5mm'").unwrap();
+        let named = [("tip", 4), ("tip", 3), ("  ", 4), ("none", 0)].map(|(name, count)| (name.to_owned(), count));
+        let pads = map.pads_of(&named);
+        let names: Vec<(&str, [u32; 2])> = pads.iter().map(|pad| (pad.name.as_str(), pad.grid)).collect();
+        assert_eq!(names, [("tip", [2, 2]), ("tip_2", [1, 3]), ("sensor_2", [2, 2])]);
+        let downs: Vec<f64> = pads.iter().map(|pad| (pad.at_m[1] * 1e4).round() / 10.0).collect();
+        assert_eq!(downs, [-5.0, -17.5, -30.0]);
+        for (text, says) in [
+            ("values = ['a', 'b']\nnames = 'c'", "names: they go with one path"),
+            ("values = 'a'\nnames = 'c'\n[[pads]]\nname = 'p'\ngrid = '1x1'", "names: they go with one path"),
+            ("values = 'a'\nnames = 'c..d'", "names: `c..d` is not a path"),
+        ] {
+            let why = ArrayMap::parse(text).unwrap_err().to_string();
+            assert!(why.contains(says), "{why}");
+        }
     }
 
     #[test]

@@ -50,7 +50,12 @@ fn pads(map: &ArrayMap, count: usize) -> Result<(Vec<Pad>, String)> {
         0 => String::new(),
         absent => format!(", without the last {absent} of the map, for which a message has no values"),
     };
-    let words = format!("{} pads ({listed}) of {count} sensors{absent}", names.len());
+    let guess = match map.names {
+        Some(_) => "; where they lie is a guess, and `body` names a body of yours",
+        None => "",
+    };
+    let pads = if names.len() == 1 { "pad" } else { "pads" };
+    let words = format!("{} {pads} ({listed}) of {count} sensors{absent}{guess}", names.len());
     Ok((own, words))
 }
 

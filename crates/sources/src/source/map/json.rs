@@ -96,7 +96,8 @@ fn numbers(value: &Value, here: &str, decoder: Option<Decoder>, each: &mut dyn F
     }
 }
 
-/// Calls `each` with every number at `path` of `message`, in their order.
+/// Calls `each` with every number at `path` of `message`, in their order. Gives how many there are at each place that the path
+/// leads to.
 ///
 /// # Errors
 /// There is nothing at the path, or no numbers.
@@ -105,8 +106,32 @@ pub(super) fn values(
     path: &ArrayPath,
     decoder: Option<Decoder>,
     each: &mut dyn FnMut(Option<f64>),
-) -> Result<()> {
-    walk(message, path.steps(), &mut String::new(), &mut |value, here| numbers(value, here, decoder, each))
+) -> Result<Vec<usize>> {
+    let mut counts = Vec::new();
+    walk(message, path.steps(), &mut String::new(), &mut |value, here| {
+        let mut count = 0;
+        numbers(value, here, decoder, &mut |number| {
+            count += 1;
+            each(number);
+        })?;
+        counts.push(count);
+        Ok(())
+    })?;
+    Ok(counts)
+}
+
+/// The texts at `path` of `message`, in their order.
+///
+/// # Errors
+/// There is nothing at the path, or something else than texts.
+pub(super) fn texts(message: &Value, path: &ArrayPath, each: &mut dyn FnMut(&str)) -> Result<()> {
+    walk(message, path.steps(), &mut String::new(), &mut |value, here| match value {
+        Value::String(text) => {
+            each(text);
+            Ok(())
+        }
+        other => Err(failed!("`{here}` is {}, not text", word(other))),
+    })
 }
 
 /// The value at `path` of `message`, which has no items.

@@ -11,6 +11,7 @@ use super::array_map::{ArrayMap, MapTime};
 use super::json;
 use super::mapped::{Came, Messages};
 use super::path::ArrayPath;
+use super::sensor_names::named_sensors;
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_LINE_BYTES;
 use crate::signal::{FrameTime, RawValue};
@@ -37,6 +38,8 @@ pub struct JsonLines {
     map: ArrayMap,
     /// Found out from the first line, and what it is in words.
     time: Option<(Time, String)>,
+    /// The names of the last message's sensors.
+    named: Vec<(String, usize)>,
     line: Vec<u8>,
     line_number: u64,
     start: Instant,
@@ -64,6 +67,7 @@ impl JsonLines {
             read: 0,
             map: map.clone(),
             time: None,
+            named: Vec::new(),
             line: Vec::new(),
             line_number: 0,
             start: Instant::now(),
@@ -206,10 +210,20 @@ impl Messages for JsonLines {
                 let mut put = |number: Option<f64>| {
                     values.push(number.map_or(RawValue::MISSING, |number| self.map.value(number)));
                 };
-                json::values(&message, path, self.map.decoder, &mut put).map_err(|e| e.at(&place))?;
+                let counts = json::values(&message, path, self.map.decoder, &mut put).map_err(|e| e.at(&place))?;
+                if let Some(names) = &self.map.names {
+                    let mut all = Vec::new();
+                    json::texts(&message, names, &mut |name| all.push(name.to_owned()))
+                        .map_err(|e| failed!("names: {e}").at(&place))?;
+                    self.named = named_sensors(all, &counts).map_err(|e| e.at(&place))?;
+                }
             }
             return Ok(Came::Message(time));
         }
+    }
+
+    fn named(&self) -> &[(String, usize)] {
+        &self.named
     }
 
     fn name(&self) -> String {
@@ -279,6 +293,26 @@ mod tests {
         let (frames, ..) = read("{\"clock_ms\":1500,\"d\":[1]}", "values = 'd'\ntime = 'clock_ms'").unwrap();
         assert_eq!(frames[0].0, 1.5);
         assert_eq!(read("{\"d\":[1]}", "values = 'd'\ntime = 'arrival'").unwrap().0.len(), 1);
+    }
+
+    #[test]
+    fn names_of_sensors_go_with_their_arrays() {
+        let line = |names: [&str; 2]| {
+            format!(
+                "{{\"t\":0,\"s\":[{{\"name\":\"{}\",\"v\":[1,2]}},{{\"name\":\"{}\",\"v\":[3]}}]}}\n",
+                names[0], names[1]
+            )
+        };
+        let map = "values = 's[*].v'\nnames = 's[*].name'";
+        let (frames, notices, _) = read(&(line(["a", "b"]) + &line(["a", "b"])), map).unwrap();
+        assert_eq!(frames.len(), 2);
+        assert!(notices[0].contains("3 values a message of 2 sensors, a to b"), "{notices:?}");
+        let why = read(&(line(["a", "b"]) + &line(["b", "a"])), map).unwrap_err().to_string();
+        assert!(why.contains("other names than those of the first message"), "{why}");
+        let why = read(&line(["a", "b"]), "values = 's[*].v'\nnames = 's[0].name'").unwrap_err().to_string();
+        assert!(why.contains("it has 1 name, 2 arrays and 3 values"), "{why}");
+        let why = read(&line(["a", "b"]), "values = 's[*].v'\nnames = 's[*].v'").unwrap_err().to_string();
+        assert!(why.contains("names: `s[0].v` is an array, not text"), "{why}");
     }
 
     #[test]

@@ -28,6 +28,11 @@ pub trait Messages {
     /// It cannot be read, or has not what the map says.
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came>;
 
+    /// The names of the last message's sensors, with how many values each has; none where the map has no names.
+    fn named(&self) -> &[(String, usize)] {
+        &[]
+    }
+
     /// How messages call it: a file or a topic.
     fn name(&self) -> String;
 
@@ -60,6 +65,8 @@ pub struct MappedSource {
     messages: Box<dyn Messages + Send>,
     map: ArrayMap,
     ids: Vec<u32>,
+    /// The names of sensors, with how many values each has.
+    named: Vec<(String, usize)>,
     /// The first message, until it is given.
     first: Option<(FrameTime, Vec<RawValue>)>,
     values: Vec<RawValue>,
@@ -79,6 +86,7 @@ impl MappedSource {
             messages,
             map: map.clone(),
             ids: Vec::new(),
+            named: Vec::new(),
             first: None,
             values: Vec::new(),
             skipped: SkippedBad::new(skip_bad),
@@ -104,8 +112,17 @@ impl MappedSource {
             Some(ids) => ids.clone(),
             None => (0..u32::try_from(count).unwrap_or(u32::MAX)).collect(),
         };
+        source.named = source.messages.named().to_vec();
+        let of_sensors = match &source.named[..] {
+            [] => String::new(),
+            [(one, _)] => format!(" of the sensor {one}"),
+            [(first, _), .., (last, _)] => format!(" of {} sensors, {first} to {last}", source.named.len()),
+        };
+        if !source.named.is_empty() {
+            source.map.pads = map.pads_of(&source.named);
+        }
         let taken = source.messages.taken();
-        source.notices.push(format!("{taken}: {count} values a message{}", map.treatment()));
+        source.notices.push(format!("{taken}: {count} values a message{of_sensors}{}", map.treatment()));
         let own = map.notes.iter().map(|note| format!("{}: {note}", map.name));
         source.notices.extend(own);
         Ok(source)
@@ -118,8 +135,18 @@ impl MappedSource {
             let wrong = match self.messages.next(&mut self.values) {
                 Ok(Came::End) => return Ok(None),
                 Ok(Came::Damaged) => continue,
-                Ok(Came::Message(time)) if self.ids.is_empty() || self.values.len() == self.ids.len() => {
-                    return Ok(Some(time));
+                Ok(Came::Message(time)) if self.ids.is_empty() => return Ok(Some(time)),
+                Ok(Came::Message(time)) if self.values.len() == self.ids.len() => {
+                    if self.messages.named() == self.named {
+                        return Ok(Some(time));
+                    }
+                    let what = Error::failed(
+                        "its sensors have other names than those of the first message, or stand elsewhere",
+                    );
+                    (
+                        "other names of sensors",
+                        what.at(format!("{}: the message of {} s", self.messages.name(), time.s)),
+                    )
                 }
                 Ok(Came::Message(time)) => {
                     let what = failed!("it has {} values, the first one {}", self.values.len(), self.ids.len());

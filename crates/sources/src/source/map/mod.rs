@@ -7,8 +7,10 @@ mod json;
 mod json_lines;
 mod layout;
 mod mapped;
+pub(in crate::source) mod modbus;
 pub(in crate::source) mod path;
 mod presets;
+mod sensor_names;
 
 pub use self::array_map::{ArrayMap, MapTime};
 pub use self::decoder::Decoder;
@@ -16,3 +18,4 @@ pub use self::json_lines::JsonLines;
 pub use self::layout::{Dimension, Lies, order};
 pub use self::mapped::{Came, MappedSource, Messages};
 pub use self::path::{ArrayPath, Step};
+pub use self::sensor_names::named_sensors;

@@ -56,6 +56,7 @@ uint32 reserve
 const TACTILE_STATE: &str = r#"
 type = "tactile_msgs/msg/TactileState"
 values = "sensors[*].values"
+names = "sensors[*].name"
 time = "header.stamp"
 "#;
 
@@ -81,6 +82,8 @@ values = "sensordata"
 time = "time:s"
 "#;
 
+/// The names are those of the DDS messages of the maker's SDK, `inspire_hand_sdk`, and so are the registers, which it reads over Modbus TCP:
+/// addresses count bytes, so that the nine registers from 3000 on are followed by those from 3018 on.
 const INSPIRE: &str = r#"
 values = [
   "fingerone_tip_touch", "fingerone_top_touch", "fingerone_palm_touch",
@@ -109,6 +112,24 @@ pads = [
   { name = "thumb_pad", grid = "12x8", pitch = "2mm", at_mm = [-50, -15] },
   { name = "palm", grid = "14x8", pitch = "4mm", at_mm = [10, 10] },
 ]
+[registers]
+fingerone_tip_touch = [3000, 9]
+fingerone_top_touch = [3018, 96]
+fingerone_palm_touch = [3210, 80]
+fingertwo_tip_touch = [3370, 9]
+fingertwo_top_touch = [3388, 96]
+fingertwo_palm_touch = [3580, 80]
+fingerthree_tip_touch = [3740, 9]
+fingerthree_top_touch = [3758, 96]
+fingerthree_palm_touch = [3950, 80]
+fingerfour_tip_touch = [4110, 9]
+fingerfour_top_touch = [4128, 96]
+fingerfour_palm_touch = [4320, 80]
+fingerfive_tip_touch = [4480, 9]
+fingerfive_top_touch = [4498, 96]
+fingerfive_middle_touch = [4690, 9]
+fingerfive_palm_touch = [4708, 96]
+palm_touch = [4900, 112]
 "#;
 
 const PRESETS: [Preset; 4] = [

@@ -375,7 +375,7 @@ fn size_of(taxels: &[(usize, f64)]) -> Sensors {
 
 fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
     let Some(body) = &file.body else {
-        return Err(text.wrong(0..0, "`body` is missing; give a file, or hand, mat or humanoid"));
+        return Err(text.wrong(0..0, "`body` is missing; give a file, or hand, sensing-hand, mat or humanoid"));
     };
     let bundled = [("hand", bundled::HAND), ("mat", bundled::MAT), ("humanoid", bundled::HUMANOID)];
     if let Some((name, bytes)) = bundled.iter().find(|(name, _)| name == body.get_ref()) {

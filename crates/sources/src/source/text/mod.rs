@@ -137,6 +137,10 @@ impl TextSource {
         source.notices.push(source.understood());
         if let Some(map) = &source.map {
             source.notices.extend(map.notes.iter().map(|note| format!("{}: {note}", map.name)));
+            if map.names.is_some() {
+                let what = "names of sensors are not read of lines that come live; send them to --source -";
+                source.notices.push(format!("{}: {what}", map.name));
+            }
         }
         for (at, bytes) in kept {
             source.take(&bytes, at.as_secs_f64());

@@ -15,6 +15,7 @@ fn sheet(panel: &Panel) -> Sheet {
     let [x, y] = panel.offset_m;
     let mut sheet = Sheet::new(&panel.name, panel.cells.iter().map(cell).collect()).at(DVec3::new(x, 0.0, -y));
     sheet.has_places = panel.is_placed;
+    sheet.parts.clone_from(&panel.parts);
     sheet
 }
 

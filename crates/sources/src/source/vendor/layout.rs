@@ -23,6 +23,8 @@ pub struct Panel {
     pub name: String,
     /// Its cells, in the order of the frames' values.
     pub cells: Vec<Cell>,
+    /// Parts that the recording names, and the ids of their cells: fields of their own.
+    pub parts: Vec<(String, Vec<u32>)>,
     /// Whether the recording says where the cells are.
     pub is_placed: bool,
     /// Where its origin is in the body, x to the right and y up the page, m. It only says where the panel is drawn.

@@ -2,21 +2,27 @@
 
 mod body;
 mod emed;
+mod first_pass;
+mod footscan;
 mod format;
 mod insoles;
 mod layout;
 mod lines;
+mod loadsol;
 mod matrix;
 mod matrix_columns;
 mod novel_asc;
 mod novel_places;
 mod options;
 mod parser;
+mod sides;
+mod stappone;
 mod tekscan;
 mod text;
 mod time;
 mod totals;
 mod xsensor;
+mod xsensor_groups;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -26,14 +32,16 @@ pub use layout::{Cell, Layout, Panel};
 pub use options::VendorOptions;
 
 use self::emed::Emed;
+use self::footscan::Footscan;
 use self::insoles::Insoles;
 use self::layout::Grid;
 use self::lines::Lines;
+use self::loadsol::Loadsol;
 use self::matrix::Matrix;
 use self::matrix_columns::way_out;
 use self::novel_asc::NovelAsc;
-use self::novel_places::Places;
 use self::parser::{Parser, Rate};
+use self::stappone::Stappone;
 use self::tekscan::Tekscan;
 use self::text::Separator;
 use self::xsensor::Xsensor;
@@ -162,7 +170,8 @@ impl VendorSource {
                 // Only the last line may be cut short: the export was stopped, or the file was cut.
                 Err(error) if !self.lines.is_whole() || self.lines.is_at_end()? => {
                     self.ended = true;
-                    return Ok(self.cut(&error));
+                    self.cut(&error);
+                    return Ok(self.parser.rest(frame));
                 }
                 Err(error) => {
                     let error = with_way_out(&error).at(format!("line {}", self.lines.number()));
@@ -187,7 +196,8 @@ impl VendorSource {
         match self.skipped.is_on() {
             false => error,
             true => failed!(
-                "{error}; --skip-bad skips frames of one line, and those of XSENSOR and Tekscan after the first one; correct the file"
+                "{error}; --skip-bad skips frames of one line, and those of XSENSOR, Tekscan and footscan after the first one; correct the \
+                 file"
             ),
         }
     }
@@ -273,7 +283,8 @@ fn parser(
 ) -> Result<Box<dyn Parser>> {
     let VendorOptions { grid, pitch_m, unit, .. } = *options;
     let rate = Rate::new(options.rate_hz)?;
-    if format != VendorFormat::Matrix && (grid.is_some() || pitch_m.is_some()) {
+    let has_no_pitch = matches!(format, VendorFormat::Matrix | VendorFormat::Footscan);
+    if format != VendorFormat::Matrix && grid.is_some() || !has_no_pitch && pitch_m.is_some() {
         return Err(Error::usage(format!(
             "--grid and --pitch are for plain matrices; {} says itself where its sensors are",
             format.title()
@@ -286,43 +297,38 @@ fn parser(
         )));
     }
     Ok(match format {
-        VendorFormat::Xsensor => Box::new(Xsensor::new(separator, rate, unit)),
+        VendorFormat::Xsensor => {
+            let groups = first_pass::groups(path, separator, rate)?;
+            Box::new(Xsensor::new(separator, rate, unit).with_groups(groups))
+        }
+        VendorFormat::Loadsol => Box::new(Loadsol::new(separator, rate, unit)),
+        VendorFormat::Footscan => {
+            Box::new(Footscan::new(separator, rate, unit, pitch_m.map(width_and_height), first_pass::feet(path)?)?)
+        }
+        VendorFormat::Stappone => Box::new(Stappone::new(separator, rate, unit, first_pass::soles(path, separator)?)?),
         VendorFormat::Tekscan => Box::new(Tekscan::new(separator, rate, unit)),
         VendorFormat::Emed => Box::new(Emed::new(rate, unit)),
         VendorFormat::Pedar => {
             let insoles = options.layout.as_deref().map(Insoles::load).transpose()?;
             Box::new(NovelAsc::new(rate, unit, None, insoles))
         }
-        VendorFormat::Pliance => Box::new(NovelAsc::new(rate, unit, places(path)?, None)),
+        VendorFormat::Pliance => Box::new(NovelAsc::new(rate, unit, first_pass::places(path)?, None)),
         VendorFormat::Matrix => {
             let [rows, columns] = grid.ok_or_else(|| {
                 Error::usage(
                     "a plain matrix does not say how many rows and columns a frame has; give them, as with --grid 31x11",
                 )
             })?;
-            // The pitch of rows is their height.
-            let pitch_m = pitch_m.map(|[rows, columns]| [columns, rows]);
+            let pitch_m = pitch_m.map(width_and_height);
             let grid = Grid { rows, columns, pitch_m, area_m2: None };
             Box::new(Matrix::new(separator, grid, rate, unit.unwrap_or_default(), head)?)
         }
     })
 }
 
-/// Reads the file at `path` for the places of its sensors, which stand at its end.
-fn places(path: &Path) -> Result<Option<Places>> {
-    if !path.is_file() {
-        return Err(Error::failed(
-            "pliance's places of sensors follow the pressures, so the file is read twice, and a pipe cannot be; save it \
-             first",
-        ));
-    }
-    let (mut lines, mut places) = (Lines::open(path)?, Places::default());
-    while let Some(line) = lines.next()? {
-        if let Err(error) = places.line(line) {
-            return Err(error.at(format!("line {}", lines.number())));
-        }
-    }
-    Ok(places.found())
+/// Of cells whose rows and columns have this pitch: that of rows is their height.
+fn width_and_height([rows, columns]: [f64; 2]) -> [f64; 2] {
+    [columns, rows]
 }
 
 impl Source for VendorSource {
@@ -365,6 +371,7 @@ impl Source for VendorSource {
     }
 
     fn losses(&self) -> Vec<String> {
-        self.losses.iter().cloned().chain(self.skipped.losses()).map(|loss| format!("{}: {loss}", self.name)).collect()
+        let own = self.losses.iter().cloned().chain(self.parser.losses());
+        own.chain(self.skipped.losses()).map(|loss| format!("{}: {loss}", self.name)).collect()
     }
 }

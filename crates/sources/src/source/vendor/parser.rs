@@ -18,6 +18,16 @@ pub(super) trait Parser: Send {
     /// The last frame is incomplete.
     fn end(&mut self, to: &mut Frame) -> Result<bool>;
 
+    /// Where a line is cut short that ends the file: `true` if what was complete before it was still held back, and is in `to` now.
+    fn rest(&mut self, _to: &mut Frame) -> bool {
+        false
+    }
+
+    /// What of its values was not to be used, in a line.
+    fn losses(&self) -> Option<String> {
+        None
+    }
+
     /// Goes on after a line that is not what it should be, with the next frame; its own frame counts for the times that a rate
     /// gives. `false` if that is not possible, as nothing marks where the next frame begins.
     fn go_on(&mut self) -> bool {

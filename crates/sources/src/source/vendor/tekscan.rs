@@ -222,7 +222,7 @@ fn panel(name: &str, map: Grid, members: &[usize]) -> Panel {
             *point = [point[0] - offset_m[0], point[1] - offset_m[1]];
         }
     }
-    Panel { name: name.to_owned(), cells, is_placed: map.pitch_m.is_some(), offset_m }
+    Panel { name: name.to_owned(), cells, is_placed: map.pitch_m.is_some(), offset_m, ..Panel::default() }
 }
 
 impl Parser for Tekscan {

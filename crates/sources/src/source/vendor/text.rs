@@ -107,7 +107,7 @@ impl<'a> Iterator for Cells<'a> {
     fn next(&mut self) -> Option<Word<'a>> {
         let mut rest = self.rest?;
         let end = match self.separator {
-            Separator::One(mark) => rest.iter().position(|&byte| byte == mark),
+            Separator::One(mark) => end_of_cell(rest, mark),
             Separator::Blanks => {
                 rest = rest.trim_ascii_start();
                 if rest.is_empty() {
@@ -122,14 +122,28 @@ impl<'a> Iterator for Cells<'a> {
             None => (rest, None),
         };
         self.rest = rest;
-        Some(Word { bytes: unquoted(cell.trim_ascii()), decimal: self.separator.decimal() })
+        Some(match cell.trim_ascii() {
+            // A comma within quotation marks does not separate.
+            [b'"', inner @ .., b'"'] => Word { bytes: inner.trim_ascii(), decimal: b',' },
+            bare => Word { bytes: bare, decimal: self.separator.decimal() },
+        })
     }
 }
 
-fn unquoted(cell: &[u8]) -> &[u8] {
-    match cell {
-        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
-        bare => bare,
+/// Where the first cell of `rest` ends, if others follow: at the first `mark` that is not within quotation marks.
+#[inline]
+fn end_of_cell(rest: &[u8], mark: u8) -> Option<usize> {
+    let at = rest.iter().position(|&byte| byte == mark)?;
+    let blanks = rest.iter().take_while(|&&byte| byte == b' ').count();
+    if rest.get(blanks) != Some(&b'"') {
+        return Some(at);
+    }
+    match rest[blanks + 1..].iter().position(|&byte| byte == b'"') {
+        Some(closing) => {
+            let after = blanks + 1 + closing;
+            rest[after..].iter().position(|&byte| byte == mark).map(|at| after + at)
+        }
+        None => Some(at),
     }
 }
 
@@ -272,6 +286,8 @@ mod tests {
     fn cells_stand_between_separators() {
         assert_eq!(words(Separator::One(b','), "a, b ,,\"c\""), ["a", "b", "", "c"]);
         assert_eq!(words(Separator::Blanks, "  a\t b  "), ["a", "b"]);
+        assert_eq!(words(Separator::One(b','), "\"a, b\", \"c\",\"d"), ["a, b", "c", "\"d"]);
+        assert_eq!(words(Separator::One(b';'), "\"\";\"a;b\"x;c"), ["", "\"a;b\"x", "c"]);
         assert_eq!(words(Separator::Blanks, "   "), [""; 0]);
         assert_eq!(words(Separator::One(b';'), ""), [""]);
     }
@@ -303,6 +319,7 @@ mod tests {
         assert_eq!(number(Separator::One(b';'), "1,5;"), Some(1.5));
         assert_eq!(number(Separator::Blanks, " 1,5 "), Some(1.5));
         assert_eq!(number(Separator::One(b','), "1,5"), Some(1.0));
+        assert_eq!(number(Separator::One(b','), "\"1,5\",\"2,5\""), Some(1.5));
         assert_eq!(number(Separator::One(b';'), "1.234,5"), None, "which of them separates thousands is unknown");
         assert!(number(Separator::Blanks, "NaN").unwrap().is_nan());
     }

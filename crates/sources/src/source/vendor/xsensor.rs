@@ -1,4 +1,5 @@
-//! XSENSOR's `.csv`: for each frame a header and, for each sensor, keys with values and then a table of its cells.
+//! XSENSOR's `.csv`: for each frame a header and, for each sensor, keys with values and then a table of its cells. In newer layouts keys
+//! end with a colon, all is within quotation marks, and no line `SENSELS` is above a table.
 //!
 //! Cells outside a sensor's outline are printed as 0, and the file does not say which they are. It says the area of the whole
 //! sensor, and how many cells each of its groups has and their area. The area of a cell comes from these: its width
@@ -6,8 +7,10 @@
 
 use super::layout::{Grid, Layout, next_value};
 use super::parser::{AfterWrong, Parser, Rate};
+use super::sides::sides;
 use super::text::{Cells, Separator, Word, in_parentheses, metres};
 use super::time::OfDay;
+use super::xsensor_groups::Groups;
 use crate::error::{Error, Result, failed};
 use crate::signal::{Frame, RawValue, UnitOfP};
 
@@ -26,6 +29,10 @@ pub(super) struct Xsensor {
     time: OfDay,
     values: Vec<RawValue>,
     after_wrong: AfterWrong,
+    /// Its groups, while they are looked for.
+    looked_for: Option<Groups>,
+    /// Its groups, as a first pass found them.
+    groups: Option<Groups>,
 }
 
 /// A frame that is not complete yet.
@@ -76,7 +83,29 @@ impl Xsensor {
             time: OfDay::default(),
             values: Vec::new(),
             after_wrong: AfterWrong::default(),
+            looked_for: None,
+            groups: None,
         }
+    }
+
+    /// The same, which looks for groups.
+    pub(super) fn collecting(self) -> Self {
+        Self { looked_for: Some(Groups::default()), ..self }
+    }
+
+    /// The same, whose `groups` are known.
+    pub(super) fn with_groups(self, groups: Option<Groups>) -> Self {
+        Self { groups, ..self }
+    }
+
+    /// Whether any group was seen.
+    pub(super) fn has_groups(&self) -> bool {
+        self.looked_for.as_ref().is_some_and(|groups| !groups.is_empty())
+    }
+
+    /// The groups that were seen.
+    pub(super) fn into_groups(self) -> Option<Groups> {
+        self.looked_for.filter(|groups| !groups.is_empty())
     }
 
     /// Takes the row `row` of a sensor's table.
@@ -102,6 +131,13 @@ impl Xsensor {
             frame.seen[sensor] = true;
         }
         Ok(())
+    }
+
+    /// Takes a row of values of a group.
+    fn row_of_group(&mut self, cells: Cells<'_>) {
+        if let Some(groups) = &mut self.looked_for {
+            groups.values(cells);
+        }
     }
 
     /// Begins a sensor's table, whose size must be known by now.
@@ -147,19 +183,59 @@ impl Xsensor {
         Ok(())
     }
 
+    /// Takes a line that begins with a word, and has another one `beside` it.
+    fn keyword(&mut self, word: Word<'_>, beside: Option<Word<'_>>) -> Result<()> {
+        let keyword = |name: &str| is_key(word, name);
+        if keyword("SENSOR") {
+            self.sensor(&beside.map_or(String::new(), |word| word.text().into_owned()))?;
+        } else if keyword("GROUP") {
+            self.place = Place::Group;
+            if let (Some(groups), Some(number)) = (&mut self.looked_for, beside.and_then(Word::whole)) {
+                groups.begin(number);
+            }
+        } else if keyword("SENSELS") {
+            if let Place::Keys { sensor } = self.place {
+                self.table(sensor)?;
+            }
+        } else if keyword("Units") {
+            if self.unit.is_none() {
+                self.unit = beside.map(|unit| unit.text().parse()).transpose()?;
+            }
+        } else if keyword("Time") && self.place == Place::Head {
+            let text = beside.map_or(String::new(), |word| word.text().into_owned());
+            let t_s = self.time.since_first(&text)?;
+            if let Some(frame) = &mut self.frame {
+                frame.t_s = Some(t_s);
+            }
+        } else if keyword("Rows") && self.place == Place::Head && self.frame.is_some() {
+            // A recording of one sensor may leave its name out.
+            self.sensor("sensor")?;
+            self.key(word, beside)?;
+        } else if self.place == Place::Between && word.number().is_some() {
+            return Err(failed!("a row follows the last row of its sensor"));
+        } else {
+            self.key(word, beside)?;
+        }
+        Ok(())
+    }
+
     /// Takes a key of a sensor or a group, with the cells after it.
     fn key(&mut self, key: Word<'_>, beside: Option<Word<'_>>) -> Result<()> {
-        let name = key.text();
+        let text = key.text();
+        let name = text.strip_suffix(':').unwrap_or(&text);
         let wrong =
             || failed!("`{name}` is `{}`, which is not a number", beside.map_or(String::new(), |w| w.to_string()));
         let number = || beside.and_then(Word::number).filter(|x| x.is_finite()).ok_or_else(wrong);
         let count = || beside.and_then(Word::whole).ok_or_else(wrong);
-        let length = || Ok::<_, Error>(number()? * in_parentheses(&name).and_then(metres).unwrap_or(0.01));
-        let area = || Ok::<_, Error>(number()? * in_parentheses(&name).and_then(metres).unwrap_or(0.01).powi(2));
+        let length = || Ok::<_, Error>(number()? * in_parentheses(name).and_then(metres).unwrap_or(0.01));
+        let area = || Ok::<_, Error>(number()? * in_parentheses(name).and_then(metres).unwrap_or(0.01).powi(2));
         if self.unit.is_none()
-            && let Some(unit) = name.starts_with("Average Pressure").then(|| in_parentheses(&name)).flatten()
+            && let Some(unit) = name.starts_with("Average Pressure").then(|| in_parentheses(name)).flatten()
         {
             self.unit = Some(unit.parse()?);
+        }
+        if let (Place::Group, "Name", Some(groups)) = (self.place, name, &mut self.looked_for) {
+            groups.name(&beside.map_or(String::new(), |word| word.text().into_owned()));
         }
         if self.is_known {
             return Ok(());
@@ -167,7 +243,7 @@ impl Xsensor {
         match self.place {
             Place::Keys { sensor } if self.sensors[sensor].first.is_none() => {
                 let known = &mut self.sensors[sensor];
-                match &*name {
+                match name {
                     "Rows" => known.grid.rows = count()?,
                     "Columns" => known.grid.columns = count()?,
                     key if key.starts_with("Sensel Width") => known.width_m = Some(length()?),
@@ -199,6 +275,9 @@ impl Xsensor {
         if let Some(sensor) = self.sensors.iter().find(|sensor| sensor.first.is_none()) {
             return Err(failed!("sensor `{}` has no table SENSELS in the first frame", sensor.name));
         }
+        if let Some(groups) = &mut self.looked_for {
+            groups.frame(&self.values);
+        }
         self.is_known = true;
         to.clear();
         to.t_s = self.rate.time_of(frame.t_s, frame.number)?;
@@ -224,20 +303,23 @@ impl Xsensor {
 impl Parser for Xsensor {
     fn line(&mut self, line: &[u8], to: &mut Frame) -> Result<bool> {
         let mut cells = self.separator.cells(line);
-        if self.after_wrong.passes(|| cells.clone().next().is_some_and(|word| word.is("FRAME"))) {
+        if self.after_wrong.passes(|| cells.clone().next().is_some_and(|word| is_key(word, "FRAME"))) {
             return Ok(false);
         }
         // Most lines are rows of cells, and no keyword begins with a digit.
         if line.first().is_some_and(u8::is_ascii_digit) {
             match self.place {
                 Place::Table { sensor, row } => return self.row(sensor, row, cells).map(|()| false),
-                Place::Group => return Ok(false),
+                Place::Group => {
+                    self.row_of_group(cells);
+                    return Ok(false);
+                }
                 _ => {}
             }
         }
         let word = cells.clone().next();
         let Some(word) = word.filter(|_| !is_blank(line)) else { return Ok(false) };
-        let keyword = |name: &str| word.is(name);
+        let keyword = |name: &str| is_key(word, name);
         if keyword("FRAME") {
             let complete = self.finish(to);
             self.after_wrong.begin(&complete);
@@ -254,39 +336,20 @@ impl Parser for Xsensor {
             }
             return self.row(sensor, row, cells).map(|()| false);
         }
-        if self.place == Place::Group && word.number().is_some() {
-            return Ok(false);
+        match self.place {
+            Place::Group if word.number().is_some() => {
+                self.row_of_group(cells);
+                return Ok(false);
+            }
+            Place::Keys { sensor } if word.number().is_some() => {
+                self.table(sensor)?;
+                return self.row(sensor, 0, cells).map(|()| false);
+            }
+            _ => {}
         }
         cells.next();
         let beside = cells.next();
-        if keyword("SENSOR") {
-            self.sensor(&beside.map_or(String::new(), |word| word.text().into_owned()))?;
-        } else if keyword("GROUP") {
-            self.place = Place::Group;
-        } else if keyword("SENSELS") {
-            if let Place::Keys { sensor } = self.place {
-                self.table(sensor)?;
-            }
-        } else if keyword("Units:") || keyword("Units") {
-            if self.unit.is_none() {
-                self.unit = beside.map(|unit| unit.text().parse()).transpose()?;
-            }
-        } else if keyword("Time") && self.place == Place::Head {
-            let text = beside.map_or(String::new(), |word| word.text().into_owned());
-            let t_s = self.time.since_first(&text)?;
-            if let Some(frame) = &mut self.frame {
-                frame.t_s = Some(t_s);
-            }
-        } else if keyword("Rows") && self.place == Place::Head && self.frame.is_some() {
-            // A recording of one sensor may leave its name out.
-            self.sensor("sensor")?;
-            self.key(word, beside)?;
-        } else if self.place == Place::Between && word.number().is_some() {
-            return Err(failed!("a row follows the last row of its sensor"));
-        } else {
-            self.key(word, beside)?;
-        }
-        Ok(false)
+        self.keyword(word, beside).map(|()| false)
     }
 
     fn end(&mut self, to: &mut Frame) -> Result<bool> {
@@ -318,32 +381,28 @@ impl Parser for Xsensor {
         }
         let names = sides(&panels.iter().map(|panel| panel.name.as_str()).collect::<Vec<_>>());
         panels.iter_mut().zip(names).for_each(|(panel, name)| panel.name = name);
+        if let Some(groups) = &self.groups {
+            groups.parts(&mut panels);
+        }
         let mut layout = Layout { panels, unit: self.unit.unwrap_or_default() };
         layout.side_by_side();
         layout
     }
+
+    fn understood(&self) -> Option<String> {
+        let groups = self.groups.as_ref()?;
+        let mut panels = self.layout().panels;
+        panels.iter_mut().for_each(|panel| panel.parts.clear());
+        Some(groups.parts(&mut panels))
+    }
+}
+
+/// Whether `word` is the key `name`, after which newer layouts have a colon.
+fn is_key(word: Word<'_>, name: &str) -> bool {
+    word.is(name) || word.after(name).is_some_and(|rest| rest == ":")
 }
 
 /// Whether a line has nothing but separators.
 fn is_blank(line: &[u8]) -> bool {
     line.iter().all(|byte| matches!(byte, b',' | b';' | b'\t' | b' '))
-}
-
-/// The names of panels: the side of the body where a sensor's name says it, as `…-LF …`, else numbers.
-fn sides(sensors: &[&str]) -> Vec<String> {
-    let side = |name: &&str| {
-        let mut parts = name.split(|c: char| !c.is_ascii_alphabetic()).map(str::to_ascii_uppercase);
-        parts.find_map(|part| match part.as_str() {
-            "LF" | "LEFT" | "L" => Some("left"),
-            "RF" | "RIGHT" | "R" => Some("right"),
-            _ => None,
-        })
-    };
-    let found: Option<Vec<&str>> = sensors.iter().map(side).collect();
-    let is_clear = |names: &Vec<&str>| names.len() == 1 || (names.len() == 2 && names[0] != names[1]);
-    match found.filter(is_clear) {
-        Some(names) => names.into_iter().map(str::to_owned).collect(),
-        None if sensors.len() == 1 => vec!["sensor".to_owned()],
-        None => (1..=sensors.len()).map(|number| format!("sensor_{number}")).collect(),
-    }
 }

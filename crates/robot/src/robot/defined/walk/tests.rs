@@ -67,6 +67,35 @@ fn every_type_of_number_is_read() {
 }
 
 #[test]
+fn names_of_sensors_come_with_how_many_values_each_has() {
+    let text = "Pad[] pads\n====\nMSG: a/Pad\nstring name\nfloat32[] values\n";
+    let mut bytes = Bytes::default().put(&2_u32.to_le_bytes());
+    for (name, count) in [("tip", 2_u32), ("palm", 3)] {
+        bytes = bytes.text(name).put(&count.to_le_bytes());
+        for value in 0..count {
+            bytes = bytes.put(&(value as f32).to_le_bytes());
+        }
+    }
+    let taken = read("values = 'pads[*].values'\nnames = 'pads[*].name'", text, &bytes.message()).unwrap();
+    assert_eq!((taken.names, taken.counts), (vec!["tip".to_owned(), "palm".to_owned()], vec![2, 3]));
+    assert_eq!(taken.values, [[0.0, 1.0, 0.0, 1.0, 2.0]]);
+    // Names beside an array of values.
+    let beside = "string[] name\nfloat64[] position";
+    let bytes = Bytes::default().put(&2_u32.to_le_bytes()).text("a").text("b").put(&2_u32.to_le_bytes());
+    let message = bytes.put(&0.5_f64.to_le_bytes()).put(&1.5_f64.to_le_bytes()).message();
+    let taken = read("values = 'position'\nnames = 'name[*]'", beside, &message).unwrap();
+    assert_eq!((taken.names.len(), taken.counts, taken.values.concat()), (2, vec![2], vec![0.5, 1.5]));
+    for (map, text, says) in [
+        ("values = 'pads[*].values'\nnames = 'pads[*].values'", text, "names: `pads[*].values` is a number, not text"),
+        ("values = 'position'\nnames = 'name'", beside, "names: `name` is an array of texts; write name[*]"),
+        ("values = 'position'\nnames = 'nam'", beside, "names: a/B has no `nam`; did you mean `name`?"),
+    ] {
+        let why = plan(map, text).err().unwrap().to_string();
+        assert!(why.contains(says), "{map}: {why}");
+    }
+}
+
+#[test]
 fn arrays_within_messages_within_arrays_come_in_their_order() {
     let text = "string name\nPad[] pads\nint16[3] rest\nEmpty none\nuint8[<=4] few\n====\nMSG: a/Pad\nuint8 id\n\
                 float32[2] pressure\nfloat64[] more\n====\nMSG: a/Empty\n";
