@@ -340,7 +340,7 @@ fn frames_hold_what_the_engine_computed() {
     }
     let length = |name: &str| book.entries.iter().find(|entry| entry["name"] == name).unwrap()["length"].clone();
     // Head, pressures with health, and that there is no contact.
-    assert_eq!(length("nothing is touched"), 64 + 32 + 8);
+    assert_eq!(length("nothing is touched"), 72 + 32 + 8);
     let posed = &messages["posed, and what is wrong with taxels"];
     assert_eq!(posed["health"], json!([1, 3, 2, 0, 6]));
     assert!(posed["pose"].is_array() && posed["p50"].as_f64().is_some_and(|ms| (ms - 5.0).abs() < 1e-3));
