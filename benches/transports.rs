@@ -172,6 +172,7 @@ fn run(body: &Body, way: Way) -> Took {
                 pressures: &|frame, to| engine.pressures(frame, to),
                 plan: engine.plan(),
                 values_read: engine.values_read(),
+                values_sensed: engine.values_sensed(),
                 arrived: None,
                 call: Duration::ZERO,
             };

@@ -157,6 +157,7 @@ impl Run {
             taxels: &taxels,
             wiring: None,
             recorded_max: None,
+            recorded_senses: Default::default(),
         };
         let listen = Listen::new(Some("127.0.0.1:0"), &[]).expect("an address");
         let scene = PageScene::new(body, engine.plan(), &info);
@@ -196,6 +197,7 @@ impl Run {
             self.publisher.read(&PageInput {
                 frame: &frame,
                 values_read: self.engine.values_read(),
+                values_sensed: self.engine.values_sensed(),
                 plan: self.engine.plan(),
                 arrived: None,
                 call_us: call.as_secs_f32() * 1e6,

@@ -104,7 +104,7 @@ pub mod internal {
     pub use somatic_recording as recording;
     pub use somatic_robot::robot;
     pub use somatic_sinks::sink;
-    pub use somatic_skin::{body, error, field, limits, output, parallel, plain, random, renamed, signal};
+    pub use somatic_skin::{body, colours, error, field, limits, output, parallel, plain, random, renamed, signal};
     pub use somatic_sources::{board, source};
     pub use somatic_wire as wire;
 

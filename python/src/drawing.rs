@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use somatic::field::FieldSet;
 use somatic::internal::scene::choose_fields;
+use somatic::internal::signal::Receptor;
 use somatic::picture::{self, Moment, Moments, Options, Picture, Times, TouchPicture, View};
 use somatic::scene::Coordinates;
 use somatic::{BackendKind, Engine, Error, Frame, Outputs, Scene};
@@ -95,6 +96,7 @@ impl Wish<'_> {
         if let Some(read) = read {
             let touches = somatic::touch::Options::default();
             let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).coordinates(Coordinates::Anchor);
+            let scene = scene.letters(picture::letters_of(body, &set.fields, Receptor::Sustained));
             let options_of_engine = somatic::Options::default().scene(scene).backend(BackendKind::Cpu).batch(1);
             let options_of_engine = match self.calibration {
                 Some(calibration) => options_of_engine.calibration(calibration.inner.clone()),
@@ -103,13 +105,21 @@ impl Wish<'_> {
             let mut engine = Engine::new(body, options_of_engine)?;
             engine.set_channels(&read.channels)?;
             let frames = read.frames(raised);
-            let moments = Moments::compute(&mut engine, body, times, &read.name, frames)?;
+            let moments = Moments::compute(&mut engine, body, (Receptor::Sustained, times), &read.name, frames)?;
             return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));
         }
         let picture = match &self.uv {
             None if self.ids => {
-                let pressures = vec![Some(0.0); body.taxels.len()];
-                let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", touches: &[], t_s: None };
+                let values = vec![Some(0.0); body.taxels.len()];
+                let moment = Moment {
+                    letter: Receptor::Sustained,
+                    values: &values,
+                    ends: None,
+                    unit: "",
+                    shear: &[],
+                    touches: &[],
+                    t_s: None,
+                };
                 TouchPicture::new(body, &set.fields, &options, true)?.draw(&moment)?
             }
             None => picture::of_body(body, &set.fields, &options)?,

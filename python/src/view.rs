@@ -35,6 +35,7 @@ impl Page {
             taxels: channels,
             wiring: None,
             recorded_max: None,
+            recorded_senses: Default::default(),
         };
         let (server, publisher) = Server::start(listen, PageScene::new(body, engine.plan(), &info))?;
         Ok(Self { open: Mutex::new(Some(Open { publisher, server })), process: process::id() })
@@ -71,6 +72,7 @@ impl Page {
         publisher.read(&PageInput {
             frame: &frame,
             values_read: engine.values_read(),
+            values_sensed: engine.values_sensed(),
             plan: engine.plan(),
             arrived: Some(began),
             call_us: began.elapsed().as_secs_f32() * 1e6 / frames as f32,

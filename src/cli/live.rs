@@ -11,6 +11,7 @@ use super::words::{clipped, count, fitted, number, span};
 
 mod columns;
 mod on_skin;
+mod senses;
 
 use columns::{PrintedUnit, Scale};
 use on_skin::TouchTable;
@@ -197,6 +198,8 @@ impl Progress {
 
 struct FieldRow {
     name: String,
+    /// Whether being there is being touched: not of what reads a temperature.
+    is_touch: bool,
     latest: Option<Percept>,
     touched_at: Option<Instant>,
     frames_touched: u64,
@@ -224,7 +227,10 @@ impl Table {
         let ChosenBackend { name, device: what, .. } = about.engine.backend();
         let plan = about.engine.plan();
         let unit = plan.common_quantity().map_or(PrintedUnit::SI, PrintedUnit::for_quantity);
+        let is_of_pressure = |letter: usize| plan.letters()[letter].receptor.is_of_pressure();
+        let has_pressure = (0..plan.letters().len()).any(is_of_pressure);
         let row = |field: usize| FieldRow {
+            is_touch: !has_pressure || is_of_pressure(plan.letter_of(field)),
             name: plain::line(&plan.label(field)).into_owned(),
             latest: None,
             touched_at: None,
@@ -254,7 +260,7 @@ impl Table {
         for frame in 0..percepts.frames() {
             for percept in percepts.touched(frame) {
                 let row = &mut self.rows[percept.field];
-                row.frames_touched += 1;
+                row.frames_touched += u64::from(row.is_touch);
                 row.touched_at = Some(now);
                 row.latest = Some(percept);
                 self.in_world |= percept.in_world;
@@ -330,8 +336,9 @@ impl Table {
             text += &touches.summary();
         }
         let touched: Vec<&FieldRow> = self.rows.iter().filter(|row| row.frames_touched > 0).collect();
+        let fields = self.rows.iter().filter(|row| row.is_touch).count();
         if touched.is_empty() {
-            return text + &format!("none of {} was touched\n", count(self.rows.len() as u64, "field"));
+            return text + &format!("none of {} was touched\n", count(fields as u64, "field"));
         }
         let columns = usize::from(Term::stdout().size().1).saturating_sub(1);
         let longest = touched.iter().map(|row| console::measure_text_width(&row.name)).max().unwrap_or(0);
@@ -352,7 +359,7 @@ impl Table {
         if more > 0 {
             text += &format!("… and {more} more\n");
         }
-        let never = self.rows.len() - touched.len();
+        let never = fields - touched.len();
         if never > 0 {
             text += &format!("{} never touched\n", count(never as u64, "field"));
         }

@@ -25,6 +25,7 @@ Examples:
   somatic render hand -o edges.png --edges
   somatic render hand -o touch.png --source touch.csv --at 2.9s
   somatic render hand -o touch.png --source touch.csv --from 1s --to 4s    an animation
+  somatic render robot.glb -o warm.png --source touch.mcap --letter temperature
   somatic render insoles.csv -o peak.png       a pressure system's export, with its own sensors
 
 With a recording, taxels have the colours of their pressures. Each touch has one mark: its

@@ -1,5 +1,6 @@
 //! What is in a recording.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -7,7 +8,7 @@ use serde_json::{Value, json};
 use super::between_s;
 use crate::error::Result;
 use crate::recording::{Attached, Reader, Rhythm, Survey};
-use crate::signal::Frame;
+use crate::signal::{Channel, Frame};
 use crate::source::{Layout, Source};
 
 /// What a recording holds.
@@ -36,6 +37,11 @@ fn size(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |metadata| metadata.len())
 }
 
+/// How many taxels `channels` are of: those with three axes have three.
+fn taxels_of(channels: &[u32]) -> usize {
+    channels.iter().map(|&channel| Channel(channel).taxel()).collect::<BTreeSet<u32>>().len()
+}
+
 impl Contents {
     /// Of the MCAP at `path`, which `reader` reads; `progress` is told the share that was read.
     ///
@@ -46,7 +52,7 @@ impl Contents {
         Ok(Self {
             kind: "MCAP",
             bytes: size(path),
-            taxels: reader.taxels().len(),
+            taxels: taxels_of(reader.taxels()),
             attached: reader.attached().to_vec(),
             has_end: reader.has_end(),
             losses: reader.losses(),
@@ -80,7 +86,7 @@ impl Contents {
         Ok(Some(Self {
             kind,
             bytes: size(path),
-            taxels: source.taxels().len(),
+            taxels: taxels_of(source.taxels()),
             survey: Survey { rhythm, ..Survey::default() },
             attached: Vec::new(),
             has_end: losses.is_empty(),

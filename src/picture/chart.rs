@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::colour::{PAPER, linear};
-use super::labels::{self, Labels, PlacedId, half_of_id};
+use super::labels::{self, Labels, Legend, PlacedId, half_of_id};
 use super::shape::Dots;
-use super::touch::{Moment, colours_of, own_colour};
+use super::touch::{Moment, own_colour};
 use super::view::{Arrangement, View};
 use super::{FieldColours, Options, Picture, arranged, checked, counted, fan};
 use crate::backend::gpu::raster::{self, Drawing, Slice};
@@ -103,7 +103,7 @@ impl<'a> ChartPicture<'a> {
     /// # Errors
     /// As [`of_chart`].
     pub fn draw(&self, moment: &Moment<'_>) -> Result<Picture> {
-        let of_body = colours_of(moment);
+        let of_body = moment.colours();
         let colours: Vec<[u8; 3]> = self.held.iter().map(|&taxel| of_body[taxel]).collect();
         let mut touched = vec![None; self.held.len()];
         for marked in moment.touches {
@@ -120,9 +120,7 @@ impl<'a> ChartPicture<'a> {
             slices,
             |place| colours[place],
             |labels| {
-                if let Some(max) = moment.max_pressure {
-                    labels.pressures(max, moment.unit);
-                }
+                moment.legend().into_iter().for_each(|legend| labels.colours(Legend { note: String::new(), ..legend }))
             },
         )
     }

@@ -1,10 +1,11 @@
 //! Labels of a picture: title, captions, legend and scale bar.
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colour::{PAPER, linear};
-use crate::colours::pressure_colours;
+use crate::colours::COLOURS;
 use crate::error::Result;
 use crate::ink::{self, FAMILY, cannot};
 
@@ -29,6 +30,16 @@ const GAP: u32 = 24;
 /// Width reserved for the scale bar at the right of the last row.
 const BAR: u32 = 220;
 
+/// A bar of colours with its ends.
+pub(super) struct Legend {
+    pub(super) colours: [[u8; 3]; COLOURS],
+    /// In `unit`.
+    pub(super) ends: [f64; 2],
+    pub(super) unit: String,
+    /// What else is to be said, where there is room.
+    pub(super) note: String,
+}
+
 pub(super) struct Labels {
     title: String,
     /// Pixels across the picture.
@@ -40,7 +51,7 @@ pub(super) struct Labels {
     /// Where an origin with its axes goes.
     axes: Option<[f64; 2]>,
     /// The upper end of the colours of pressure, and its unit.
-    pressures: Option<(f64, String)>,
+    colours: Option<Legend>,
 }
 
 impl Labels {
@@ -52,7 +63,7 @@ impl Labels {
             captions: Vec::new(),
             scale: None,
             axes: None,
-            pressures: None,
+            colours: None,
         }
     }
 
@@ -110,9 +121,9 @@ impl Labels {
         self.scale = Some(pixels_a_metre);
     }
 
-    /// Adds the colours of pressure from 0 to `max`.
-    pub(super) fn pressures(&mut self, max: f64, unit: &str) {
-        self.pressures = Some((max, unit.to_owned()));
+    /// Adds the colours of what taxels show.
+    pub(super) fn colours(&mut self, legend: Legend) {
+        self.colours = Some(legend);
     }
 
     pub(super) fn axes(&mut self, origin: [f64; 2]) {
@@ -186,20 +197,8 @@ impl Labels {
             }
             area.draw_text(&name, &text(size, INK, HPos::Right), place(left - scaled(8), y)).map_err(cannot)?;
         }
-        if let Some((max, unit)) = &self.pressures {
-            let colours = pressure_colours();
-            let (top, low) = (scaled(14), scaled(12));
-            let ends = [("0".to_owned(), HPos::Right), (format!("{} {unit}", short(*max)), HPos::Left)];
-            let right = width - side - ink::width(&ends[1].0, size)? - scaled(8);
-            let left = right - scaled(160);
-            for x in left..right {
-                let [r, g, b] = colours[((x - left) * 255 / (right - left)) as usize];
-                let column = [place(x, top + scaled(5)), place(x + 1, top + scaled(5) + low)];
-                area.draw(&Rectangle::new(column, RGBColor(r, g, b).filled())).map_err(cannot)?;
-            }
-            for ((text_of, side), x) in ends.iter().zip([left - scaled(8), right + scaled(8)]) {
-                area.draw_text(text_of, &text(size, INK, *side), place(x, top + scaled(11))).map_err(cannot)?;
-            }
+        if let Some(legend) = &self.colours {
+            self.draw_colours(&area, legend)?;
         }
         if let Some([x, y]) = self.axes {
             let (x, y) = (x.round() as i32, y.round() as i32);
@@ -218,6 +217,35 @@ impl Labels {
             }
         }
         area.present().map_err(cannot)
+    }
+
+    /// Draws a bar of colours at the right of the title.
+    fn draw_colours<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, legend: &Legend) -> Result<()> {
+        let Legend { colours, ends: [least, most], unit, note } = legend;
+        let (side, size) = (self.scaled(SIDE), self.scaled(SIZE));
+        let text = |pixels: u32, colour: RGBColor, side: HPos| {
+            (FAMILY, pixels).into_font().color(&colour).pos(Pos::new(side, VPos::Center))
+        };
+        let place = |x: u32, y: u32| (x as i32, y as i32);
+        let (scaled, width) = (|pixels: u32| self.scaled(pixels), self.width);
+        let (top, low) = (scaled(14), scaled(12));
+        let ends = [(short(*least), HPos::Right), (format!("{} {unit}", short(*most)), HPos::Left)];
+        let right = width - side - ink::width(&ends[1].0, size)? - scaled(8);
+        let left = right - scaled(160);
+        for x in left..right {
+            let [r, g, b] = colours[((x - left) * 255 / (right - left)) as usize];
+            let column = [place(x, top + scaled(5)), place(x + 1, top + scaled(5) + low)];
+            area.draw(&Rectangle::new(column, RGBColor(r, g, b).filled())).map_err(cannot)?;
+        }
+        for ((text_of, side), x) in ends.iter().zip([left - scaled(8), right + scaled(8)]) {
+            area.draw_text(text_of, &text(size, INK, *side), place(x, top + scaled(11))).map_err(cannot)?;
+        }
+        let taken = side + ink::width(&self.title, self.title_size())? + ink::width(&ends[0].0, size)? + scaled(44);
+        if ink::width(note, size)? + taken <= left {
+            let x = left - scaled(24) - ink::width(&ends[0].0, size)?;
+            area.draw_text(note, &text(size, FAINT, HPos::Right), place(x, top + scaled(11))).map_err(cannot)?;
+        }
+        Ok(())
     }
 }
 
@@ -253,7 +281,7 @@ pub(super) fn write_ids(pixels: &mut [u8], [width, height]: [u32; 2], ids: &[Pla
 }
 
 /// A number with three digits, or all of a larger one.
-fn short(number: f64) -> String {
+pub(super) fn short(number: f64) -> String {
     let digits = (2.0 - libm::floor(libm::log10(number.abs().max(1e-9)))).clamp(0.0, 9.0) as usize;
     let text = format!("{number:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }

@@ -1,12 +1,15 @@
 //! Pictures of recorded touches: which of its frames they show, and what is drawn of each.
 
+use glam::DVec3;
+
 use super::{ChartPicture, MarkedTouch, Moment, Options, Picture, TouchPicture, View};
 use crate::body::Body;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::percept::{Touch, TouchFrame, TouchTrails};
-use crate::signal::{Frame, Quantity};
+use crate::scene::{SenseRanges, SensedTaxels, SensedValue};
+use crate::signal::{Frame, Letter, Quantity, Reading, Receptor};
 
 /// Pictures of an animation at most: each is held in memory.
 const MAX_PICTURES: usize = 1000;
@@ -55,15 +58,21 @@ impl Times {
 /// What is shown of one frame.
 struct Shown {
     t_s: f64,
-    pressures: Vec<Option<f64>>,
+    /// By taxel, whether it is pressed.
+    pressed: Vec<bool>,
+    /// By taxel, as [`Moment::values`], in SI units.
+    values: Vec<Option<f64>>,
+    shear: Vec<(usize, DVec3)>,
     touches: Vec<MarkedTouch>,
 }
 
 /// What pictures show of a recording.
 pub struct Moments {
     shown: Vec<Shown>,
-    /// The largest pressure of the whole recording; 1 where nothing is pressed.
-    max_pressure: f64,
+    letter: Receptor,
+    /// Of the colours, in SI units: up to the largest pressure of the whole recording, 1 where nothing is pressed; of other letters those
+    /// of the calibration, or all that was read.
+    ends: [f64; 2],
     quantity: Quantity,
 }
 
@@ -71,18 +80,21 @@ somatic_skin::debug_by_name!(Moments);
 
 impl Moments {
     /// Runs all `frames` of the recording called `name` through `engine`, which looks for touches of `body` ([`crate::Scene::touches`])
-    /// and leaves them in their links' frames, and keeps what is shown of `times`.
+    /// and leaves them in their links' frames, and keeps what is shown of `times`: of taxels what `letter` is made of, which the engine
+    /// reads ([`letters_of`]).
     ///
     /// # Errors
     /// What reading and computing say; there is no frame at these times, or there are too many.
     pub fn compute(
         engine: &mut Engine,
         body: &Body,
-        times: Times,
+        (letter, times): (Receptor, Times),
         name: &str,
         frames: impl Iterator<Item = Result<Frame>>,
     ) -> Result<Self> {
         times.check()?;
+        let senses = SensedTaxels::new(engine.plan(), body);
+        let (mut sensed, mut ranges) = (Vec::new(), SenseRanges::default());
         engine.keep_touch_taxels(true);
         let is_of_skin = |taxel: &usize| body.taxels[*taxel].modality.is_pressed();
         let of_skin: Vec<usize> = (0..body.taxels.len()).filter(is_of_skin).collect();
@@ -101,6 +113,8 @@ impl Moments {
             let found = engine.percepts().touches(0);
             found.iter().for_each(|found| trails.follow(frame.t_s, found));
             engine.pressures(&frame, &mut list);
+            engine.sensed(&frame, &senses, &mut sensed);
+            sensed.iter().for_each(|value| ranges.see(value));
             let sum: f64 = list.iter().map(|&(_, pressure)| pressure).sum();
             max_pressure = list.iter().map(|&(_, pressure)| pressure).fold(max_pressure, f64::max);
             if !(from_s..=to_s).contains(&frame.t_s) {
@@ -126,20 +140,24 @@ impl Moments {
                 }
                 Times::MostPressed | Times::At(_) => shown.clear(),
             }
-            let mut pressures = vec![None; body.taxels.len()];
-            for &(id, pressure) in &list {
-                if let Ok(taxel) = body.taxels.binary_search_by_key(&id, |taxel| taxel.id) {
-                    pressures[taxel] = Some(pressure);
-                }
-            }
             let touches = found.map_or_else(Vec::new, |found| marked(found, &trails, &of_skin));
-            shown.push(Shown { t_s: frame.t_s, pressures, touches });
+            shown.push(Shown { t_s: frame.t_s, touches, ..read(body, letter, &list, &sensed) });
         }
         if shown.is_empty() {
             return Err(Error::usage("the recording has no frames at that time").at(name));
         }
         let quantity = engine.plan().common_quantity().unwrap_or_default();
-        Ok(Self { shown, max_pressure: if max_pressure > 0.0 { max_pressure } else { 1.0 }, quantity })
+        let calibrated = SenseRanges::of_calibration(engine.plan());
+        let known = match letter {
+            Receptor::Temperature => calibrated.celsius.or(ranges.celsius),
+            Receptor::Proximity => calibrated.distance_m.or(ranges.distance_m).map(|[_, most]| [0.0, most]),
+            _ => Some([0.0, max_pressure]),
+        };
+        let ends = match known.unwrap_or_default() {
+            [least, most] if least < most => [least, most],
+            [least, _] => [least, least + 1.0],
+        };
+        Ok(Self { shown, letter, ends, quantity })
     }
 
     /// Draws them on `body`, by default from the two sides that face the touch most; `progress` gets the share that is done and
@@ -157,8 +175,8 @@ impl Moments {
     ) -> Result<Vec<Picture>> {
         let mut options = options.clone();
         if options.views.is_empty() {
-            let pressed = |taxel: &usize| self.shown.iter().any(|shown| shown.pressures[*taxel] > Some(0.0));
-            let normals = (0..body.taxels.len()).filter(pressed).map(|taxel| {
+            let looks = |taxel: &usize| self.shown.iter().any(|shown| shown.pressed[*taxel]);
+            let normals = (0..body.taxels.len()).filter(looks).map(|taxel| {
                 let taxel = &body.taxels[taxel];
                 body.links[taxel.link].body_from_link.transform_vector3(taxel.normal_in_link)
             });
@@ -190,18 +208,66 @@ impl Moments {
         draw: impl Fn(&Moment<'_>) -> Result<Picture>,
         mut progress: impl FnMut(f64) -> bool,
     ) -> Result<Vec<Picture>> {
-        let (factor, unit) = self.quantity.readable(self.max_pressure);
-        let max_pressure = Some(self.max_pressure * factor);
+        let (factor, unit) = match self.letter {
+            Receptor::Temperature => (1.0, "°C"),
+            Receptor::Proximity => (1e3, "mm"),
+            _ => self.quantity.readable(self.ends[1]),
+        };
+        let ends = Some(self.ends.map(|end| end * factor));
         let mut pictures = Vec::with_capacity(self.shown.len());
-        for (index, Shown { t_s, pressures, touches }) in self.shown.iter().enumerate() {
-            let pressures: Vec<Option<f64>> = pressures.iter().map(|p| p.map(|p| p * factor)).collect();
-            pictures.push(draw(&Moment { pressures: &pressures, max_pressure, unit, touches, t_s: Some(*t_s) })?);
+        for (index, Shown { t_s, values, shear, touches, .. }) in self.shown.iter().enumerate() {
+            let values: Vec<Option<f64>> = values.iter().map(|value| value.map(|value| value * factor)).collect();
+            let shear: Vec<(usize, DVec3)> = shear.iter().map(|&(taxel, force)| (taxel, force * factor)).collect();
+            let (letter, t_s) = (self.letter, Some(*t_s));
+            pictures.push(draw(&Moment { letter, values: &values, ends, unit, shear: &shear, touches, t_s })?);
             if !progress((index + 1) as f64 / self.shown.len() as f64) {
                 return Err(Error::failed("stopped before all was drawn"));
             }
         }
         Ok(pictures)
     }
+}
+
+/// The letters that an engine must read for pictures of `letter`: that one, pressures for touches, and shear for arrows, where the
+/// `fields` of `body` have such taxels.
+#[must_use]
+pub fn letters_of(body: &Body, fields: &[Field], letter: Receptor) -> Vec<Letter> {
+    let has = |receptor: Receptor| {
+        fields.iter().flat_map(|field| &field.members).any(|member| receptor.reads(body.taxels[member.taxel].modality))
+    };
+    let read = [Receptor::Sustained, Receptor::Shear, Receptor::Temperature, Receptor::Proximity];
+    let is_read = |receptor: &Receptor| match receptor {
+        Receptor::Sustained | Receptor::Shear => has(*receptor) || *receptor == letter,
+        other => *other == letter,
+    };
+    read.into_iter().filter(is_read).map(|receptor| Letter { receptor, ..Letter::default() }).collect()
+}
+
+/// What is shown of taxels in a frame: `list` has pressures by id, `sensed` all else.
+fn read(body: &Body, letter: Receptor, list: &[(u32, f64)], sensed: &[SensedValue]) -> Shown {
+    let (mut values, mut pressed) = (vec![None; body.taxels.len()], vec![false; body.taxels.len()]);
+    for &(id, pressure) in list {
+        if let Ok(taxel) = body.taxels.binary_search_by_key(&id, |taxel| taxel.id) {
+            pressed[taxel] = pressure > 0.0;
+            values[taxel] = Some(pressure).filter(|_| letter == Receptor::Sustained);
+        }
+    }
+    let mut shear = Vec::new();
+    for value in sensed {
+        if value.receptor == letter {
+            values[value.taxel] = match value.reading {
+                // Nothing is near.
+                Reading::Value(_, false) if letter == Receptor::Proximity => Some(f64::INFINITY),
+                Reading::Value(number, _) => Some(number),
+                Reading::Missing | Reading::Faulty => None,
+            };
+        }
+        if value.receptor == Receptor::Shear {
+            let [one, two] = body.taxels[value.taxel].tangents_in_link();
+            shear.push((value.taxel, value.shear[0] * one + value.shear[1] * two));
+        }
+    }
+    Shown { t_s: 0.0, pressed, values, shear, touches: Vec::new() }
 }
 
 /// The touches of a frame with their trails; `of_skin` are the taxels of the skin's nodes.

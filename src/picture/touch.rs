@@ -1,4 +1,4 @@
-//! Pictures of touches: pressures on the taxels of a body, and a mark for each touch of the whole body.
+//! Pictures of touches: what the taxels of a body read, and a mark for each touch of the whole body.
 
 use glam::DVec3;
 use plotters::prelude::*;
@@ -6,15 +6,16 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colour::{PALETTE, PAPER, RIM, linear};
 use super::edges::{Lines, seen};
-use super::labels::{INK, Labels, PlacedId, half_of_id, write_ids};
+use super::labels::{INK, Labels, Legend, PlacedId, half_of_id, short, write_ids};
 use super::{Options, Picture, Prepared, stem};
 use crate::backend::gpu::raster;
 use crate::body::Body;
-use crate::colours::pressure_colours;
+use crate::colours::{COLOURS, distance_colours, pressure_colours, temperature_colours};
 use crate::error::Result;
 use crate::field::Field;
 use crate::ink::{self, FAMILY, cannot};
 use crate::percept::Touch;
+use crate::signal::Receptor;
 
 /// A taxel that feels nothing.
 const IDLE: [u8; 3] = [0xD6, 0xD6, 0xD4];
@@ -31,6 +32,9 @@ const TRAIL_WIDTH: u32 = 3;
 const OLDEST_OPACITY: f64 = 0.15;
 /// Radius of a mark, in radii of a usual taxel.
 const MARK_RADII: f64 = 0.9;
+/// An arrow of the highest force of the scale is so many taxels' widths long; shorter ones than this, pixels, are left out.
+const WIDTHS_AT_MOST: f64 = 3.0;
+const SHORTEST_ARROW: f64 = 3.0;
 /// Marks are drawn in views that the touch faces by at least this cosine.
 const MIN_FACING: f64 = 0.15;
 
@@ -48,12 +52,17 @@ pub struct MarkedTouch {
 /// What is touched at one time.
 #[derive(Clone, Debug)]
 pub struct Moment<'a> {
-    /// By the body's taxels, P; `None` where it is unknown.
-    pub pressures: &'a [Option<f64>],
-    /// P at the upper end of the colours; without it there is no legend.
-    pub max_pressure: Option<f64>,
-    /// Unit of P.
+    /// What is shown of taxels.
+    pub letter: Receptor,
+    /// By the body's taxels what they read, P, °C or a distance; `None` where it is unknown, or not what they read. A distance is
+    /// infinite where nothing is near.
+    pub values: &'a [Option<f64>],
+    /// The ends of the colours; without them there is no legend.
+    pub ends: Option<[f64; 2]>,
+    /// The unit of all that.
     pub unit: &'a str,
+    /// Tangential forces: taxels by their index in the body, and the force in the frame of their link.
+    pub shear: &'a [(usize, DVec3)],
     /// The touches to mark.
     pub touches: &'a [MarkedTouch],
     /// Time, s.
@@ -90,7 +99,7 @@ impl<'a> TouchPicture<'a> {
     /// As [`super::of_body`].
     pub fn draw(&self, moment: &Moment<'_>) -> Result<Picture> {
         let Prepared { size, middle, arrangement, dots, views, .. } = &self.prepared;
-        let taxels = colours_of(moment);
+        let taxels = moment.colours();
         let usual = self.prepared.usual_radius();
         let mut drawing = self.prepared.drawing(linear(PAPER));
         let mut touched = vec![None; taxels.len()];
@@ -112,11 +121,10 @@ impl<'a> TouchPicture<'a> {
             labels.caption(view.word(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
         }
         labels.bar(arrangement.scale);
-        if let Some(max) = moment.max_pressure {
-            labels.pressures(max, moment.unit);
-        }
+        moment.legend().into_iter().for_each(|legend| labels.colours(legend));
         labels.draw(&mut pixels, *size)?;
         self.write_ids(&taxels, &mut pixels)?;
+        self.draw_shear(moment, &mut pixels)?;
         self.mark(moment, &mut pixels)?;
         Ok(Picture { size: *size, pixels })
     }
@@ -135,6 +143,33 @@ impl<'a> TouchPicture<'a> {
             }
         }
         write_ids(pixels, *size, &placed)
+    }
+
+    /// Draws an arrow for each tangential force, on the taxels that look towards the eye.
+    fn draw_shear(&self, moment: &Moment<'_>, pixels: &mut [u8]) -> Result<()> {
+        let Some(most) = moment.shear_ends() else { return Ok(()) };
+        let Prepared { size: [width, height], middle, arrangement, dots, views, .. } = &self.prepared;
+        let area = BitMapBackend::with_buffer(pixels, (*width, *height)).into_drawing_area();
+        for (index, view) in views.iter().enumerate() {
+            let towards = view.axes()[2];
+            let pixel = |place: DVec3| arrangement.pixel(index, place - *middle);
+            for &(taxel, force) in moment.shear {
+                let link = self.body.taxels[taxel].link;
+                let along = self.body.links[link].body_from_link.transform_vector3(force);
+                let from = dots.places[taxel];
+                let ends = [from, from + along * (2.0 * WIDTHS_AT_MOST * dots.radii[taxel] / most)].map(pixel);
+                let facing = dots.normals[taxel].dot(towards);
+                if facing < MIN_FACING || !arrangement.views[index].holds(ends[0].map(|x| x.round() as i32).into()) {
+                    continue;
+                }
+                for line in arrow(ends) {
+                    for (colour, width) in [(BLACK, 4), (WHITE, 2)] {
+                        area.draw(&PathElement::new(line.clone(), colour.stroke_width(width))).map_err(cannot)?;
+                    }
+                }
+            }
+        }
+        area.present().map_err(cannot)
     }
 
     /// Draws the marks of the touches.
@@ -187,15 +222,61 @@ fn title(body: &Body) -> String {
     stem(&body.name).to_owned()
 }
 
-/// By the body's taxels, the colours of their pressures.
-pub(super) fn colours_of(moment: &Moment<'_>) -> Vec<[u8; 3]> {
-    let colours = pressure_colours();
-    let colour = |pressure: &Option<f64>| match pressure {
-        None => UNUSED,
-        Some(p) if *p <= 0.0 => IDLE,
-        Some(p) => colours[(p / moment.max_pressure.unwrap_or(1.0) * 255.0).round().clamp(0.0, 255.0) as usize],
-    };
-    moment.pressures.iter().map(colour).collect()
+impl Moment<'_> {
+    /// The colours of what is shown.
+    fn map(&self) -> [[u8; 3]; COLOURS] {
+        match self.letter {
+            Receptor::Temperature => temperature_colours(),
+            Receptor::Proximity => distance_colours(),
+            _ => pressure_colours(),
+        }
+    }
+
+    /// By the body's taxels, the colours of what they read.
+    pub(super) fn colours(&self) -> Vec<[u8; 3]> {
+        let colours = self.map();
+        let [least, most] = self.ends.unwrap_or([0.0, 1.0]);
+        let is_temperature = self.letter == Receptor::Temperature;
+        let colour = |value: &Option<f64>| match *value {
+            // White is in the middle of temperatures.
+            None if is_temperature => IDLE,
+            None => UNUSED,
+            Some(value) if (value <= 0.0 && !is_temperature) || value.is_infinite() => IDLE,
+            Some(value) => colours[((value - least) / (most - least) * 255.0).round().clamp(0.0, 255.0) as usize],
+        };
+        self.values.iter().map(colour).collect()
+    }
+
+    /// The legend of the colours, if there is one.
+    pub(super) fn legend(&self) -> Option<Legend> {
+        let note = match (self.letter, self.shear_ends()) {
+            (_, Some(most)) => {
+                format!("arrow as long as a taxel is wide: {} {}", short(most / WIDTHS_AT_MOST), self.unit)
+            }
+            (Receptor::Proximity, _) => "grey: nothing near".to_owned(),
+            _ => String::new(),
+        };
+        Some(Legend { colours: self.map(), ends: self.ends?, unit: self.unit.to_owned(), note })
+    }
+
+    /// The force that the longest arrow stands for, if there are arrows.
+    fn shear_ends(&self) -> Option<f64> {
+        let is_force = matches!(self.letter, Receptor::Sustained | Receptor::Shear);
+        self.ends.map(|[_, most]| most).filter(|_| is_force && !self.shear.is_empty())
+    }
+}
+
+/// The lines of an arrow, pixels; none where it is too short to have a direction.
+fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<Vec<(i32, i32)>> {
+    let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+    let size = libm::hypot(dx, dy);
+    if size < SHORTEST_ARROW {
+        return Vec::new();
+    }
+    let head = (0.4 * size).min(9.0) / size;
+    let wing = |side: f64| [to[0] - head * (dx + side * dy), to[1] - head * (dy - side * dx)];
+    let point = |[x, y]: [f64; 2]| (x.round() as i32, y.round() as i32);
+    vec![vec![point(from), point(to)], [wing(0.6), to, wing(-0.6)].map(point).to_vec()]
 }
 
 /// A touch keeps its colour as long as it lasts.

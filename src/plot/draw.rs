@@ -84,6 +84,7 @@ fn for_people<'a>(column: &Column, p_unit: &'a str) -> (f64, &'a str) {
         Unit::SquareMetre => (1e4, "cm²"),
         Unit::Radian => (180.0 / std::f64::consts::PI, "°"),
         Unit::MetrePerSecond => (1e3, "mm/s"),
+        Unit::PMetre if p_unit == "N" => (1e3, "N mm"),
         unit => (1.0, if unit == Unit::One { "" } else { unit.symbol() }),
     }
 }

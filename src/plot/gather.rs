@@ -10,8 +10,8 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::field::FieldSet;
 use crate::percept::{COLUMNS, Column, Outputs, Percepts, Unit};
-use crate::scene::PlannedField;
-use crate::signal::Frame;
+use crate::scene::receptor_of;
+use crate::signal::{Frame, Receptor};
 
 /// Most fields that are gathered, and most that are shown.
 const MAX_GATHERED: usize = 64;
@@ -71,6 +71,8 @@ pub struct Gatherer {
     peaks: Vec<f64>,
     integrals: Vec<f64>,
     last: Vec<f64>,
+    /// By taxel of the body, whether it is pressed: others are on no map.
+    are_pressed: Vec<bool>,
     /// m².
     areas: Vec<f64>,
     index_of: HashMap<u32, usize>,
@@ -78,17 +80,28 @@ pub struct Gatherer {
     p_unit: String,
 }
 
-/// A field that is followed over time.
+/// A field that is followed over time, in all of its letters.
 struct Followed {
-    /// Its index in the engine's plan, and in the body's fields.
-    in_plan: usize,
+    /// Its index in the body's fields.
     in_body: usize,
+    /// Its index in the engine's plan by column, in the letter that gives that; and in that of pressures.
+    in_plan: Vec<Option<usize>>,
+    pressed: Option<usize>,
+    /// Whether any column has had a value.
+    is_read: bool,
     /// By column, a series for each component.
     series: Vec<Vec<Series>>,
     path: Path,
     most_load: f64,
     /// The integral of its load over time.
     impulse: f64,
+}
+
+impl Followed {
+    /// Whether it was touched, or read something else that is plotted.
+    fn is_shown(&self) -> bool {
+        self.most_load > 0.0 || self.is_read
+    }
 }
 
 impl Gatherer {
@@ -103,12 +116,27 @@ impl Gatherer {
         let columns: Vec<&'static Column> = COLUMNS.iter().filter(|column| shown.contains(column.output)).collect();
         let index_of_name: HashMap<&str, usize> =
             set.fields.iter().enumerate().map(|(index, field)| (field.name.as_str(), index)).collect();
-        let followed = |(in_plan, field): (usize, PlannedField<'_>)| {
-            let in_body = *index_of_name.get(field.name)?;
-            let series = columns.iter().map(|column| vec![Series::default(); column.components]).collect();
-            Some(Followed { in_plan, in_body, series, path: Path::default(), most_load: 0.0, impulse: 0.0 })
+        let plan = engine.plan();
+        let mut read_in: BTreeMap<usize, Vec<(Receptor, usize)>> = BTreeMap::new();
+        for (in_plan, field) in plan.fields().enumerate() {
+            let receptor = plan.letters()[plan.letter_of(in_plan)].receptor;
+            let in_body = index_of_name.get(field.name).copied();
+            in_body.into_iter().for_each(|in_body| read_in.entry(in_body).or_default().push((receptor, in_plan)));
+        }
+        let followed = |(in_body, letters): (usize, Vec<(Receptor, usize)>)| {
+            let in_letter = |wanted: Receptor| letters.iter().find(|(own, _)| *own == wanted).map(|&(_, field)| field);
+            Followed {
+                in_body,
+                in_plan: columns.iter().map(|column| in_letter(receptor_of(column))).collect(),
+                pressed: in_letter(Receptor::Sustained),
+                is_read: false,
+                series: columns.iter().map(|column| vec![Series::default(); column.components]).collect(),
+                path: Path::default(),
+                most_load: 0.0,
+                impulse: 0.0,
+            }
         };
-        let mut fields: Vec<Followed> = engine.plan().fields().enumerate().filter_map(followed).collect();
+        let mut fields: Vec<Followed> = read_in.into_iter().map(followed).collect();
         fields.sort_by_key(|field| (depth(&set, field.in_body), field.in_body));
         // Deeper ones only where they are the first with a chart.
         fields.retain(|field| {
@@ -129,6 +157,7 @@ impl Gatherer {
             peaks: vec![0.0; taxels],
             integrals: vec![0.0; taxels],
             last: vec![0.0; taxels],
+            are_pressed: body.taxels.iter().map(|taxel| taxel.modality.is_pressed()).collect(),
             areas: body.taxels.iter().map(|taxel| taxel.area).collect(),
             index_of: body.taxels.iter().enumerate().map(|(index, taxel)| (taxel.id, index)).collect(),
             pressures: Vec::new(),
@@ -168,15 +197,15 @@ impl Gatherer {
 
     fn see_fields(&mut self, percepts: &Percepts, frame: usize, t_s: f64, dt_s: f64) {
         for field in &mut self.fields {
-            for (column, series) in self.columns.iter().zip(&mut field.series) {
-                let value = percepts.value(frame, field.in_plan, column);
+            for ((column, series), &in_plan) in self.columns.iter().zip(&mut field.series).zip(&field.in_plan) {
+                let value = in_plan.and_then(|in_plan| percepts.value(frame, in_plan, column));
+                field.is_read |= value.is_some() && receptor_of(column) != Receptor::Sustained;
                 for (component, series) in series.iter_mut().enumerate() {
                     series.push(t_s, value.map(|value| value[component]));
                 }
             }
             let [total, centroid] = [Outputs::TOTAL, Outputs::CENTROID].map(column_of);
-            let value_of =
-                |column: Option<&Column>| column.and_then(|column| percepts.value(frame, field.in_plan, column));
+            let value_of = |column: Option<&Column>| percepts.value(frame, field.pressed?, column?);
             let load = value_of(total).map_or(0.0, |total| total[0]);
             field.most_load = field.most_load.max(load);
             field.impulse += load * dt_s;
@@ -214,6 +243,7 @@ impl Gatherer {
                 &self.peaks,
                 &self.integrals,
                 &self.areas,
+                &self.are_pressed,
             )
         });
         let above =
@@ -243,11 +273,11 @@ impl Gatherer {
         let top = level(0);
         match top[..] {
             [only] => {
-                let children = level(1).into_iter().filter(|&field| self.fields[field].most_load > 0.0).collect();
+                let children = level(1).into_iter().filter(|&field| self.fields[field].is_shown()).collect();
                 [vec![only], self.heaviest(children, MAX_LINES - 1)].concat()
             }
             _ => {
-                let is_touched = |&field: &usize| self.fields[field].most_load > 0.0;
+                let is_touched = |&field: &usize| self.fields[field].is_shown();
                 let touched: Vec<usize> = top.iter().copied().filter(is_touched).collect();
                 self.heaviest(if touched.is_empty() { top } else { touched }, MAX_LINES)
             }

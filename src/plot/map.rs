@@ -26,17 +26,17 @@ pub(super) struct MappedTaxel {
 }
 
 impl PressureMap {
-    /// The map of `field`; `peaks`, `integrals` and `areas_m2` are by taxel of the body.
+    /// The map of the taxels of `field` that are pressed; `peaks`, `integrals`, `areas_m2` and `are_pressed` are by taxel of the body.
     pub(super) fn new(
         field: &Field,
         path: Vec<Vec<(f64, f64)>>,
         peaks: &[f64],
         integrals: &[f64],
         areas_m2: &[f64],
+        are_pressed: &[bool],
     ) -> Self {
-        let taxels: Vec<MappedTaxel> = field
-            .members
-            .iter()
+        let pressed = || field.members.iter().filter(|member| are_pressed[member.taxel]);
+        let taxels: Vec<MappedTaxel> = pressed()
             .map(|member| MappedTaxel {
                 at: (member.place.x, member.place.y),
                 peak: peaks[member.taxel],
@@ -44,7 +44,7 @@ impl PressureMap {
             })
             .collect();
         let widest_m = widest_radius_m(&taxels);
-        let mut areas: Vec<f64> = field.members.iter().map(|member| areas_m2[member.taxel]).collect();
+        let mut areas: Vec<f64> = pressed().map(|member| areas_m2[member.taxel]).collect();
         areas.sort_by(f64::total_cmp);
         let own_m = (areas.get(areas.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::PI).sqrt();
         let radius_m = if own_m > 0.0 { own_m.min(widest_m) } else { widest_m };

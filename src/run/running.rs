@@ -247,6 +247,7 @@ impl Run {
             pressures: &|frame, to| engine.pressures(frame, to),
             plan: engine.plan(),
             values_read: engine.values_read(),
+            values_sensed: engine.values_sensed(),
             arrived: info.read_at.last().copied(),
             call,
         };

@@ -49,6 +49,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
         "messages.test.js",
         "parts.test.js",
         "pick.test.js",
+        "senses.test.js",
         "steps.test.js",
         "colours.test.js",
         "browser.test.js",

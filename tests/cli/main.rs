@@ -64,6 +64,8 @@ mod ros2_mapped;
 mod ros2_peer;
 mod run;
 mod self_contacts;
+#[cfg(feature = "gpu")]
+mod senses;
 #[cfg(unix)]
 mod serial;
 mod several;

@@ -56,6 +56,30 @@ fn every_taxel_comes_back_from_a_table_and_from_a_urdf() {
 }
 
 #[test]
+fn what_taxels_measure_and_their_tangents_come_back_from_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let rows = "1,pad,0,0,0,0,0,1,0.0001,force3,0,1,0\n2,pad,0.01,0,0,0,0,1,0.0001,temperature,,,\n";
+    let table = format!("id,link,x,y,z,nx,ny,nz,area,modality,tx,ty,tz\n{rows}");
+    std::fs::write(at("skin.csv"), &table).unwrap();
+    done(&["author", "--csv-skin", text_of(&at("skin.csv")), "-o", text_of(&at("skin.glb"))]);
+    let body = Body::load(&at("skin.glb")).unwrap();
+    assert_eq!(body.taxels[0].tangent_in_link, Some(glam::DVec3::Y));
+    done(&["convert", text_of(&at("skin.glb")), text_of(&at("back.csv"))]);
+    let back = std::fs::read_to_string(at("back.csv")).unwrap();
+    let numbers = |text: &str| -> Vec<String> {
+        // An area is of single precision.
+        let cell = |cell: &str| cell.parse().map_or_else(|_| cell.to_owned(), |x: f64| format!("{x:.6}"));
+        text.split([',', '\n']).map(cell).collect()
+    };
+    assert_eq!(numbers(&back), numbers(&table));
+    // Without a tangent there is no column for it.
+    done(&["convert", "hand", text_of(&at("hand.csv"))]);
+    let hand = std::fs::read_to_string(at("hand.csv")).unwrap();
+    assert!(hand.starts_with("id,link,x,y,z,nx,ny,nz,area,modality\n"), "{}", hand.lines().next().unwrap());
+}
+
+#[test]
 fn links_of_a_urdf_stand_where_those_of_the_body_do() {
     let folder = tempfile::tempdir().unwrap();
     let (urdf, back) = (folder.path().join("a.urdf"), folder.path().join("a.glb"));

@@ -67,7 +67,10 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
             vec!["error", "output", "percept", "signal", "body", "scene", "recording", "page", "robot", "dds", "limb"],
         ),
         ("ink", vec!["error"]),
-        ("picture", vec!["error", "percept", "signal", "body", "field", "backend", "engine", "ink", "colours"]),
+        (
+            "picture",
+            vec!["error", "percept", "signal", "body", "field", "scene", "backend", "engine", "ink", "colours"],
+        ),
         (
             "contents",
             vec![

@@ -71,7 +71,7 @@ test("percepts at any time are those of an uninterrupted run, to the bit", async
         const values = { field: model.welcome.fields[field].label };
         columns.forEach((column, c) => {
           const numbers = model.percepts.columns.get(c);
-          if (numbers && (model.percepts.present[k] >>> c) & 1)
+          if (numbers && (model.percepts.present[2 * k + (c >>> 5)] >>> (c & 31)) & 1)
             values[column.name] = Array.from(
               numbers.slice(k * column.components, (k + 1) * column.components),
             );

@@ -28,6 +28,7 @@ const welcome = entries.find((entry) => entry.name === "welcome").values;
 const mesh = entries.find((entry) => entry.name === "mesh").values;
 const scene = {
   taxels: mesh.taxelId.length,
+  pulled: welcome.senses?.shear.length ?? 0,
   links: welcome.links.length,
   components: welcome.columns.map((column) => column.components),
 };

@@ -6,6 +6,8 @@ import {
   decodeHistory,
   decodeMesh,
   decodePeaks,
+  IN_WORLD_BIT,
+  isPresent,
   kindOf,
   say,
 } from "../../crates/page/src/web/wire.js";
@@ -32,7 +34,7 @@ function writer(bytes) {
 
 function head(w, { sections, fields = 0, touches = 0, samples = 0, columns = 0, answers = 0 }) {
   w.u8(2);
-  w.u8(4);
+  w.u8(5);
   w.u16(sections);
   w.u32(7);
   w.u64(123456789012);
@@ -40,9 +42,10 @@ function head(w, { sections, fields = 0, touches = 0, samples = 0, columns = 0, 
   w.u32(3);
   w.f32(1.5);
   w.f32(NaN);
-  for (const value of [fields, touches, samples, 42, columns]) w.u32(value);
+  for (const value of [fields, touches, samples, 42, answers]) w.u32(value);
   w.f32(21.5);
-  w.u32(answers);
+  w.u32(0);
+  w.u64(columns);
 }
 
 /** A touch with one place in its trail, by the table of the protocol: 152 bytes, and what it lists. */
@@ -63,7 +66,7 @@ function putTouch(w, { id, frame, force, taxels, links, fields }) {
 const scene = { taxels: 3, links: 1, components: [1, 2, 3] };
 
 test("a frame with nothing but its head", () => {
-  const w = writer(64);
+  const w = writer(72);
   head(w, { sections: 0 });
   const frame = decodeFrame(w.buffer, scene);
   assert.equal(frame.seq, 7);
@@ -79,14 +82,14 @@ test("a frame with nothing but its head", () => {
 });
 
 test("a frame with all sections, each padded to 8 bytes", () => {
-  const w = writer(64 + 16 + 32 + 56 + 176 + 32);
+  const w = writer(72 + 16 + 32 + 64 + 176 + 32);
   head(w, { sections: 31, fields: 2, touches: 1, samples: 2, columns: 0b101, answers: 4 });
   for (const p of [0, 1.5, NaN]) w.f32(p);
   for (const state of [0, 4, 1]) w.u8(state);
   w.pad();
   for (const x of [1, 2, 3, 0, 0, 0, 1]) w.f32(x);
   w.pad();
-  for (const x of [5, 6, 1, 2, 0b101, 0b1]) w.u32(x);
+  for (const x of [5, 6, 1, 2, 0b101, 0, 0b1, 0x80000000]) w.u32(x);
   for (const x of [10, 20]) w.f32(x);
   for (const x of [1, 2, 3, 4, 5, 6]) w.f32(x);
   w.pad();
@@ -100,7 +103,14 @@ test("a frame with all sections, each padded to 8 bytes", () => {
   assert.deepEqual([...frame.pose], [1, 2, 3, 0, 0, 0, 1]);
   assert.deepEqual([...frame.percepts.field], [5, 6]);
   assert.deepEqual([...frame.percepts.flags], [1, 2]);
-  assert.deepEqual([...frame.percepts.present], [0b101, 0b1]);
+  assert.deepEqual([...frame.percepts.present], [0b101, 0, 0b1, 0x80000000]);
+  const present = [0, 1].map((k) =>
+    [0, 1, 2, 31, 32, IN_WORLD_BIT].map((bit) => isPresent(frame.percepts, k, bit)),
+  );
+  assert.deepEqual(present, [
+    [true, false, true, false, false, false],
+    [true, false, false, false, false, true],
+  ]);
   assert.deepEqual([...frame.percepts.columns.keys()], [0, 2]);
   assert.deepEqual([...frame.percepts.columns.get(0)], [10, 20]);
   assert.deepEqual([...frame.percepts.columns.get(2)], [1, 2, 3, 4, 5, 6]);
@@ -146,8 +156,25 @@ test("a frame with all sections, each padded to 8 bytes", () => {
   );
 });
 
+test("tangential forces come with the pressures, and columns beyond the 32nd have bits of their own", () => {
+  const w = writer(72 + 16 + 16 + 24);
+  head(w, { sections: 1 + 64 + 4, fields: 1, columns: 2 ** 33 + 1 });
+  for (const p of [1, 25.5, NaN]) w.f32(p);
+  for (const state of [0, 0, 5]) w.u8(state);
+  w.pad();
+  for (const s of [0.25, -0.5, NaN, NaN]) w.f32(s);
+  for (const x of [3, 0, 1, 2]) w.u32(x);
+  for (const x of [7, 8]) w.f32(x);
+  const wide = { taxels: 3, pulled: 2, links: 1, components: new Array(34).fill(1) };
+  const frame = decodeFrame(w.buffer, wide);
+  assert.deepEqual([...frame.shear], [0.25, -0.5, NaN, NaN]);
+  assert.deepEqual([...frame.percepts.columns.keys()], [0, 33]);
+  assert.equal(frame.percepts.columns.get(33)[0], 8);
+  assert.ok(isPresent(frame.percepts, 0, 33) && !isPresent(frame.percepts, 0, 1));
+});
+
 test("touches stand one after the other, whatever each lists", () => {
-  const w = writer(64 + 3 * 152 + 12 + 8 + 16);
+  const w = writer(72 + 3 * 152 + 12 + 8 + 16);
   head(w, { sections: 8, touches: 3 });
   putTouch(w, { id: 1, frame: 0xffffffff, force: 2, taxels: [], links: [], fields: [] });
   putTouch(w, {
@@ -175,7 +202,7 @@ test("touches stand one after the other, whatever each lists", () => {
 });
 
 test("a frame that ends too early is an error", () => {
-  const w = writer(64 + 8);
+  const w = writer(72 + 8);
   head(w, { sections: 1 });
   assert.throws(() => decodeFrame(w.buffer, scene), /ends too early/);
   assert.throws(() => decodeFrame(new ArrayBuffer(20), scene), /too short/);
@@ -192,7 +219,7 @@ test("another version is an error", () => {
 test("a mesh", () => {
   const w = writer(20 + 3 * 28 + 12 + 40 + 28);
   w.u8(1);
-  w.u8(4);
+  w.u8(5);
   w.u16(0);
   for (const count of [3, 1, 1, 1]) w.u32(count);
   for (let i = 0; i < 18; i++) w.f32(i);
@@ -216,7 +243,7 @@ test("a mesh", () => {
 test("a history", () => {
   const w = writer(32 + 16);
   w.u8(3);
-  w.u8(4);
+  w.u8(5);
   w.u16(0);
   for (const value of [5, 2, 1]) w.u32(value);
   w.f64(1);
@@ -233,7 +260,7 @@ test("a history", () => {
 test("highest pressures", () => {
   const w = writer(24 + 8);
   w.u8(4);
-  w.u8(4);
+  w.u8(5);
   w.u16(0);
   w.u32(6);
   w.f64(1);
@@ -247,7 +274,7 @@ test("highest pressures", () => {
 test("outgoing messages", () => {
   assert.deepEqual(JSON.parse(say.hello("ab", null)), {
     type: "hello",
-    version: 4,
+    version: 5,
     token: "ab",
     after_event: null,
   });

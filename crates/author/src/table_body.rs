@@ -15,8 +15,8 @@ use crate::limits::{self, MAX_TABLE_BYTES};
 /// Between links that lie side by side, m.
 const GAP_M: f64 = 0.05;
 
-/// A body of the table at `path` with the columns `id`, `x`, `y`, `z`, `nx`, `ny`, `nz`, and optionally `link`, `area` and
-/// `modality`: a link for each that is named, else one called as the file, with fields as without rules. A table does not say
+/// A body of the table at `path` with the columns `id`, `x`, `y`, `z`, `nx`, `ny`, `nz`, and optionally `link`, `area`,
+/// `modality`, `tx`, `ty`, `tz`: a link for each that is named, else one called as the file, with fields as without rules. A table does not say
 /// how links stand to each other: they lie side by side.
 ///
 /// # Errors
@@ -50,7 +50,7 @@ fn place(rows: &[TaxelRow], path: &Path) -> Result<Authored> {
             normal_in_link,
             area: row.area_m2.unwrap_or(0.0),
             modality: row.modality.unwrap_or_default(),
-            tangent_in_link: None,
+            tangent_in_link: row.tangent,
         });
     }
     let mut glb = Glb::new();

@@ -4,13 +4,17 @@ use std::sync::Arc;
 
 use super::exchange::Exchange;
 use super::log::{About, Event, EventKind};
+use crate::signal::Receptor;
 use somatic_engine::percept::{Flags, Percepts};
+use somatic_engine::scene::Plan;
 
 /// What was touched in the last frame.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Contacts {
     /// By field.
     in_contact: Vec<bool>,
+    /// By field, whether it is looked at: a field that reads a temperature is not touched by that.
+    is_pressed: Vec<bool>,
     /// Touches: their ids and links.
     touching: Vec<(u64, u32)>,
     /// Whether the next frame does not follow the last one.
@@ -18,9 +22,20 @@ pub(super) struct Contacts {
 }
 
 impl Contacts {
-    /// For `fields` fields without touches.
-    pub(super) fn new(fields: usize) -> Self {
-        Self { in_contact: vec![false; fields], touching: Vec::new(), jumped: false }
+    /// For the fields of `plan` without touches: in letters of pressure, or else of shear, which presses too.
+    pub(super) fn new(plan: &Plan) -> Self {
+        let receptor = |letter: usize| plan.letters()[letter].receptor;
+        let of_pressure = |letter: usize| receptor(letter).is_of_pressure();
+        let has_pressure = plan.fields.iter().any(|field| of_pressure(field.letter));
+        let is_pressed = |letter: usize| {
+            if has_pressure { of_pressure(letter) } else { receptor(letter) == Receptor::Shear }
+        };
+        Self {
+            in_contact: vec![false; plan.fields.len()],
+            is_pressed: plan.fields.iter().map(|field| is_pressed(field.letter)).collect(),
+            touching: Vec::new(),
+            jumped: false,
+        }
     }
 
     /// Adds what begins and ends in `percepts`.
@@ -32,7 +47,7 @@ impl Contacts {
         for (frame, flags) in percepts.flags.chunks_exact(fields).enumerate() {
             let jumped = std::mem::take(&mut self.jumped);
             for (field, flags) in flags.iter().enumerate() {
-                let touched = !flags.contains(Flags::NO_CONTACT);
+                let touched = self.is_pressed[field] && !flags.contains(Flags::NO_CONTACT);
                 if self.in_contact[field] == touched {
                     continue;
                 }

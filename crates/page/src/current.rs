@@ -5,6 +5,7 @@ use super::poses::Poses;
 use super::readings::{Reading, Readings};
 use super::scale::Scale;
 use super::scene::PageScene;
+use super::sense_scale::SenseScales;
 use super::snapshot::Snapshot;
 use super::touches::TouchPlaces;
 use somatic_engine::percept::{Column, Percept, SelfContact, TouchFrame};
@@ -27,6 +28,8 @@ pub(super) struct Current {
     /// 0 where none were ever known.
     self_contact_changes: u64,
     scale: Scale,
+    /// Where there are taxels that measure something else.
+    sense_scales: Option<SenseScales>,
     scale_changes: u64,
     counts: Counts,
     of_world: Vec<bool>,
@@ -39,7 +42,7 @@ impl Current {
         Self {
             snapshot: Box::new(Snapshot::new(&scene.plan)),
             is_read: true,
-            readings: Readings::new(scene.plan.clone(), scene.counts.taxels, &scene.value_of),
+            readings: Readings::new(scene.plan.clone(), scene.counts.taxels, &scene.value_of, scene.senses.as_ref()),
             poses: scene.poses.clone(),
             percepts: Vec::new(),
             percept_changes: 0,
@@ -49,6 +52,7 @@ impl Current {
             self_contacts_are_known: false,
             self_contact_changes: 0,
             scale: scene.scale,
+            sense_scales: scene.senses.as_ref().map(|senses| senses.scales),
             scale_changes: 0,
             counts: scene.counts.clone(),
             of_world: scene.of_world.clone(),
@@ -69,7 +73,9 @@ impl Current {
             return;
         }
         let largest = self.readings.read(&self.snapshot);
-        self.scale_changes += u64::from(self.scale.grow(largest));
+        let ranges = self.readings.sense_ranges();
+        let has_grown = self.sense_scales.as_mut().is_some_and(|scales| scales.grow(ranges));
+        self.scale_changes += u64::from(self.scale.grow(largest) | has_grown);
         self.poses.set(&self.snapshot.poses);
         if self.percepts != self.snapshot.percepts {
             self.percepts.clone_from(&self.snapshot.percepts);
@@ -119,6 +125,11 @@ impl Current {
 
     pub(super) fn scale(&self) -> Scale {
         self.scale
+    }
+
+    /// The scales of what is not pressure, if there are such taxels.
+    pub(super) fn sense_scales(&self) -> Option<&SenseScales> {
+        self.sense_scales.as_ref()
     }
 
     pub(super) fn scale_changes(&self) -> u64 {

@@ -4,9 +4,9 @@ use super::message::VERSION;
 use super::series::Trail;
 
 /// Bit of a percept's present columns: its position and normal are in the world.
-pub(super) const IN_WORLD: u32 = 1 << 31;
+pub(super) const IN_WORLD: u64 = 1 << 63;
 /// Columns that have a bit beside it: a page shows the first of these.
-pub(super) const MAX_COLUMNS: usize = 31;
+pub(super) const MAX_COLUMNS: usize = 63;
 
 /// Bits of a frame's sections.
 pub(super) mod section {
@@ -17,6 +17,8 @@ pub(super) mod section {
     pub(in super::super) const SERIES: u16 = 1 << 4;
     /// Before the series, whose number only the viewer knows.
     pub(in super::super) const SELF_CONTACTS: u16 = 1 << 5;
+    /// After the pressures, and only with them.
+    pub(in super::super) const SHEARS: u16 = 1 << 6;
 }
 
 /// In place of the number of self-contacts that are not known.
@@ -90,7 +92,7 @@ pub(super) struct FrameHead {
     pub(super) touches: u32,
     pub(super) samples: u32,
     pub(super) newest_event: u32,
-    pub(super) columns: u32,
+    pub(super) columns: u64,
     pub(super) call_us: f32,
     /// Number of `series` messages that the values of plots answer.
     pub(super) answered_series: u32,
@@ -98,7 +100,7 @@ pub(super) struct FrameHead {
 
 impl FrameHead {
     /// Bytes of a head.
-    pub(super) const BYTES: usize = 64;
+    pub(super) const BYTES: usize = 72;
 
     /// Begins a frame.
     pub(super) fn write(&self) -> Writer {
@@ -108,11 +110,12 @@ impl FrameHead {
         to.f64(self.t_s);
         to.u32(self.skipped);
         to.f32s(&self.latency_ms);
-        for number in [self.fields, self.touches, self.samples, self.newest_event, self.columns] {
+        for number in [self.fields, self.touches, self.samples, self.newest_event, self.answered_series] {
             to.u32(number);
         }
         to.f32(self.call_us);
-        to.u32(self.answered_series);
+        to.u32(0);
+        to.u64(self.columns);
         debug_assert_eq!(to.0.len(), Self::BYTES);
         to
     }

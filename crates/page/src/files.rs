@@ -25,6 +25,7 @@ macro_rules! files {
 const FILES: &[PageFile] = files![
     "address.js",
     "aim.js",
+    "arrows.js",
     "boards.js",
     "body.js",
     "box_tree.js",
@@ -70,6 +71,7 @@ const FILES: &[PageFile] = files![
     "reported.js",
     "rest.js",
     "scale_bar.js",
+    "senses.js",
     "socket.js",
     "span.js",
     "spots.js",

@@ -27,6 +27,8 @@ mod publish;
 mod readings;
 mod scale;
 mod scene;
+mod sense_scale;
+mod senses;
 mod series;
 mod serve;
 mod server;

@@ -6,7 +6,7 @@ use super::series::Series;
 use somatic_engine::percept::Column;
 
 /// The version of the protocol.
-pub(super) const VERSION: u32 = 4;
+pub(super) const VERSION: u32 = 5;
 /// The most bytes of a message.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 << 10;
 /// The most series of a viewer.
@@ -30,7 +30,7 @@ pub(super) struct Counts {
 pub(super) enum Message {
     Hello { token: String, after_event: Option<u64> },
     Drawn { seq: u32 },
-    Columns(u32),
+    Columns(u64),
     Series(Vec<Series>),
     Taxel(Option<usize>),
     Request(Request),
@@ -142,7 +142,7 @@ pub(super) fn parse(text: &str, counts: &Counts) -> Result<Message, String> {
         Raw::Drawn { seq } => Message::Drawn { seq },
         Raw::Columns { columns } => {
             let bit = |name: &String| counts.index_of(name).map(|index| 1 << index);
-            Message::Columns(columns.iter().map(bit).try_fold(0, |bits, bit| Ok::<u32, String>(bits | bit?))?)
+            Message::Columns(columns.iter().map(bit).try_fold(0, |bits, bit| Ok::<u64, String>(bits | bit?))?)
         }
         Raw::Series { series } => Message::Series(counts.series(series)?),
         Raw::Taxel { taxel } => Message::Taxel(taxel.map(|taxel| below(taxel, counts.taxels, "taxel")).transpose()?),
@@ -220,11 +220,11 @@ mod tests {
         let series = Series { field: 2, column: &COLUMNS[4], component: 1 };
         for (text, message) in [
             (
-                r#"{"type":"hello","version":4,"token":"ab","after_event":null}"#,
+                r#"{"type":"hello","version":5,"token":"ab","after_event":null}"#,
                 Message::Hello { token: "ab".to_owned(), after_event: None },
             ),
             (
-                r#"{"after_event":7,"token":"","version":4,"type":"hello"}"#,
+                r#"{"after_event":7,"token":"","version":5,"type":"hello"}"#,
                 Message::Hello { token: String::new(), after_event: Some(7) },
             ),
             (r#"{"type":"drawn","seq":5}"#, Message::Drawn { seq: 5 }),
@@ -268,8 +268,8 @@ mod tests {
             r#"{"type":"drawn","seq":-1}"#,
             r#"{"type":"drawn","seq":1,"seq":2}"#,
             r#"{"type":"drawn","seq":4294967296}"#,
-            r#"{"type":"hello","version":3,"token":"a","after_event":null}"#,
-            r#"{"type":"hello","version":4,"token":7,"after_event":null}"#,
+            r#"{"type":"hello","version":4,"token":"a","after_event":null}"#,
+            r#"{"type":"hello","version":5,"token":7,"after_event":null}"#,
             r#"{"type":"columns","columns":["principal_axis","nothing"]}"#,
             r#"{"type":"series","series":[{"field":3,"column":"total","component":0}]}"#,
             r#"{"type":"series","series":[{"field":0,"column":"total","component":1}]}"#,
@@ -291,7 +291,7 @@ mod tests {
         let one = r#"{"field":0,"column":"total","component":0}"#;
         let many = |count: usize| format!(r#"{{"type":"series","series":[{}]}}"#, vec![one; count].join(","));
         assert!(parsed(&many(16)).is_ok() && parsed(&many(17)).is_err());
-        let long = format!(r#"{{"type":"hello","version":4,"token":"{}"}}"#, "é".repeat(MAX_MESSAGE_BYTES / 2));
+        let long = format!(r#"{{"type":"hello","version":5,"token":"{}"}}"#, "é".repeat(MAX_MESSAGE_BYTES / 2));
         assert!(parsed(&long).is_err());
         assert!(parsed(&"[".repeat(60_000)).is_err());
     }

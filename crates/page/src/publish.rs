@@ -24,6 +24,8 @@ pub struct PageInput<'a> {
     pub frame: &'a Frame,
     /// The values that its percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
     pub values_read: Option<&'a [RawValue]>,
+    /// The values that its letters beside pressure are made of ([`Engine::values_sensed`](somatic_engine::Engine::values_sensed)).
+    pub values_sensed: &'a [RawValue],
     /// The engine's plan as it is after the call.
     pub plan: &'a Plan,
     /// When the frame arrived, if not just now.
@@ -47,10 +49,10 @@ pub struct Publisher {
     index_of_link: HashMap<String, u32>,
     /// Poses of the last frame that was not late with them.
     last_poses: Vec<(u32, Pose)>,
-    /// Number of fields.
-    fields: usize,
     /// Of the last frame; none where a pass over the recording logs them.
     contacts: Option<Contacts>,
+    /// Before the first frame.
+    no_contacts: Contacts,
     /// Where touches were.
     trails: TouchTrails,
     number: Option<u64>,
@@ -71,8 +73,8 @@ impl Publisher {
             value_of: scene.value_of.clone(),
             index_of_link: scene.index_of_link.clone(),
             last_poses: Vec::new(),
-            fields: scene.plan.fields.len(),
-            contacts: Some(Contacts::new(scene.plan.fields.len())),
+            contacts: Some(Contacts::new(&scene.plan)),
+            no_contacts: Contacts::new(&scene.plan),
             trails: TouchTrails::default(),
             number: None,
             published: 0,
@@ -105,6 +107,8 @@ impl Publisher {
                 _ => own,
             };
         }
+        snapshot.sensed.clear();
+        snapshot.sensed.extend_from_slice(input.values_sensed);
         snapshot.poses.clear();
         let links = input.frame.pose.iter();
         snapshot.poses.extend(links.filter_map(|(name, pose)| Some((*self.index_of_link.get(name)?, *pose))));
@@ -171,7 +175,7 @@ impl Publisher {
     /// Leaves onsets and releases to a pass over the whole recording, to which it gives what logs them.
     pub fn recording_events(&mut self) -> RecordingEvents {
         self.contacts = None;
-        RecordingEvents { exchange: Arc::clone(&self.exchange), contacts: Contacts::new(self.fields) }
+        RecordingEvents { exchange: Arc::clone(&self.exchange), contacts: self.no_contacts.clone() }
     }
 
     /// Logs an event: a message about a board or another notice.

@@ -10,13 +10,15 @@ use super::mesh::{Mesh, disc_radii_m};
 use super::message::{Counts, VERSION};
 use super::poses::Poses;
 use super::scale::Scale;
+use super::sense_scale::SenseScales;
+use super::senses::{PageSenses, sense_word};
 use super::text::Names;
 use super::touches::TouchPlaces;
 use crate::body::{Body, ChartKind};
 use crate::colours::pressure_colours;
 use crate::signal::{Quantity, Wiring};
 use somatic_engine::percept::{Column, Flags, Outputs, TouchFlags, Unit};
-use somatic_engine::scene::{Plan, PlanField};
+use somatic_engine::scene::{Plan, PlanField, SenseRanges, receptor_of};
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +51,8 @@ pub struct PageInfo<'a> {
     pub wiring: Option<&'a Wiring>,
     /// The largest pressure of the recording, if known.
     pub recorded_max: Option<f64>,
+    /// What its other taxels read, as far as that is known.
+    pub recorded_senses: SenseRanges,
 }
 
 /// What a page shows of a body and a run.
@@ -70,6 +74,8 @@ pub struct PageScene {
     pub(super) of_world: Vec<bool>,
     pub(super) touch_places: TouchPlaces,
     pub(super) scale: Scale,
+    /// Taxels that read something else than pressure, if there are any.
+    pub(super) senses: Option<PageSenses>,
 }
 
 impl PageScene {
@@ -126,15 +132,20 @@ impl PageScene {
             of_world: plan.fields.iter().map(|field| field.anchor.is_none()).collect(),
             touch_places: TouchPlaces::new(body, plan, origin),
             scale: Scale::for_plan(plan, info.recorded_max),
+            senses: PageSenses::new(body, plan, info.taxels, info.recorded_senses),
             plan: plan.clone(),
         }
     }
 
     /// The message `welcome`.
-    pub(super) fn welcome(&self, run: &str, scale: Scale) -> String {
+    pub(super) fn welcome(&self, run: &str, scale: Scale, senses: Option<&SenseScales>) -> String {
         let mut welcome = self.welcome.clone();
         welcome["run"] = run.into();
         welcome["scale"] = json!({"max": scale.max, "from": scale.from.word()});
+        welcome["senses"] = match (&self.senses, senses) {
+            (Some(own), Some(scales)) => own.welcome(scales),
+            _ => Value::Null,
+        };
         welcome.to_string()
     }
 }
@@ -152,10 +163,17 @@ fn channels(body: &Body, wiring: &Wiring) -> Vec<Option<[usize; 2]>> {
 
 fn column_json(column: &Column, plan: &Plan) -> Value {
     let unit = match (column.unit, plan.common_quantity()) {
-        (Unit::P, Some(quantity)) => quantity.symbol(),
-        (unit, _) => unit.symbol(),
+        (Unit::P, Some(quantity)) => quantity.symbol().to_owned(),
+        (Unit::PMetre, Some(quantity)) => format!("{} m", quantity.symbol()),
+        (unit, _) => unit.symbol().to_owned(),
     };
-    json!({"name": column.name, "unit": unit, "components": column.components, "help": column.help})
+    json!({
+        "name": column.name,
+        "unit": unit,
+        "components": column.components,
+        "help": column.help,
+        "sense": sense_word(receptor_of(column)),
+    })
 }
 
 /// Flags' names by their bits.
@@ -188,6 +206,7 @@ fn fields(body: &Body, plan: &Plan) -> Vec<Value> {
         json!({
             "name": field.name,
             "letter": (!letter.is_empty()).then(|| letter.join(" ")),
+            "sense": sense_word(plan.letters()[field.letter].receptor),
             "label": plan.label(index),
             "parent": parent,
             "link": field.anchor,
@@ -203,7 +222,11 @@ fn fields(body: &Body, plan: &Plan) -> Vec<Value> {
 fn chart(field: &PlanField) -> Option<Value> {
     let chart = field.chart.as_ref()?;
     let unit_m = f64::from(field.unit_m);
-    let uv: Vec<[f64; 2]> = field.places.iter().map(|place| [place.x * unit_m, place.y * unit_m]).collect();
+    let uv: Vec<[f64; 2]> = if field.places.is_empty() {
+        field.sensed_places_m().map(|place| place.to_array()).collect()
+    } else {
+        field.places.iter().map(|place| [place.x * unit_m, place.y * unit_m]).collect()
+    };
     Some(json!({
         "kind": if chart.kind == ChartKind::Geodesic { "geodesic" } else { "plane" },
         "origin": field.origin_in_anchor.to_array(),

@@ -351,7 +351,7 @@ impl Content {
             self.current.read();
             if viewer.seen_scale != self.current.scale_changes() {
                 viewer.seen_scale = self.current.scale_changes();
-                socket.push(Payload::Text(text::scale(self.current.scale())));
+                socket.push(Payload::Text(text::scale(self.current.scale(), self.current.sense_scales())));
             }
             socket.push(Payload::Binary(viewer.frame(&self.current, self.newest_event)));
         }
@@ -387,7 +387,7 @@ fn greet(connection: &mut Connection, message: &str, token: &str, run: &str, con
     viewer.seen_scale = content.current.scale_changes();
     connection.admit(viewer);
     if let Some((socket, _)) = connection.viewer() {
-        socket.push(Payload::Text(content.scene.welcome(run, content.current.scale())));
+        socket.push(Payload::Text(content.scene.welcome(run, content.current.scale(), content.current.sense_scales())));
         socket.push_shared(&content.mesh);
     }
 }

@@ -20,6 +20,8 @@ pub(super) struct Snapshot {
     pub(super) call_us: f32,
     /// By the plan's channels.
     pub(super) raw: Vec<RawValue>,
+    /// By the channels of other letters than pressure.
+    pub(super) sensed: Vec<RawValue>,
     /// How often the calibration had changed for the baselines.
     pub(super) calibration_changes: u64,
     /// By the plan's channels, the baseline and whether the taxel is left out.
@@ -47,6 +49,7 @@ impl Snapshot {
             arrived: Instant::now(),
             call_us: f32::NAN,
             raw: vec![RawValue::MISSING; plan.channels()],
+            sensed: Vec::new(),
             calibration_changes: 0,
             baselines: Vec::new(),
             poses: Vec::new(),

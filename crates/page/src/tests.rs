@@ -121,6 +121,7 @@ impl Bench {
             taxels: &ids,
             wiring: Some(&wiring),
             recorded_max: None,
+            recorded_senses: Default::default(),
         };
         let scene = PageScene::new(&body, engine.plan(), &info);
         let (_waits, waker) = Waits::new().unwrap();
@@ -141,6 +142,7 @@ impl Bench {
         self.publisher.read(&PageInput {
             frame: &frames[frames.len() - 1],
             values_read: self.engine.values_read(),
+            values_sensed: self.engine.values_sensed(),
             plan: self.engine.plan(),
             arrived: Some(self.arrived),
             call_us: 12.5,
@@ -208,7 +210,7 @@ fn book() -> Book {
     let mut bench = Bench::with_scene(scene, "[all]\np_max = 100\n[taxel.9]\nmask = true");
     let mut viewer = Viewer::new(0);
     let mut book = Book::default();
-    book.add_text(&bench.scene.welcome("00ff", bench.scene.scale).replace(env!("CARGO_PKG_VERSION"), "0.0.0"));
+    book.add_text(&bench.welcome().replace(env!("CARGO_PKG_VERSION"), "0.0.0"));
     let mesh = bench.scene.mesh.clone();
     book.add("mesh", &mesh, &decode_mesh(&mesh));
     let add_frame = |book: &mut Book, bench: &mut Bench, viewer: &mut Viewer, name: &str| {
@@ -270,7 +272,7 @@ fn book() -> Book {
     book.add("history", &message, &decode_history(&message));
     let message = PeakMap { id: 8, from_s: 0.5, to_s: 2.5, peaks: vec![0.0, 2.5, f32::NAN, 1.0, 7.0] }.message();
     book.add("peaks", &message, &decode_peaks(&message, 5));
-    book.add_text(&text::scale(Scale { max: 0.2, from: ScaleFrom::Grown }));
+    book.add_text(&text::scale(Scale { max: 0.2, from: ScaleFrom::Grown }, None));
     bench.publisher.event(EventKind::Board, 0.5, None, "tty1: unplugged".to_owned());
     bench.publisher.flush();
     let (lost, events) = bench.exchange.lock().log.after(0, 100);
@@ -324,10 +326,9 @@ fn frames_hold_what_the_engine_computed() {
     assert_eq!((&welcome["fields"][0]["link"], &welcome["fields"][4]["link"]), (&json!(null), &json!(1)));
     assert_eq!(welcome["channels"], json!([null, [5, 0], [5, 1], [6, 0], [6, 1]]));
     let at = everything["percepts"]["field"].as_array().unwrap().iter().position(|field| field == 2).unwrap();
-    let totals = &everything["percepts"]["columns"]["0"];
-    assert_eq!(totals[at], 4.0 + 2.0 * 50.0 + 0.5);
+    assert_eq!(everything["percepts"]["columns"]["0"][at], 4.0 + 2.0 * 50.0 + 0.5);
     // A field of two links answers in the world, relative to the scene's origin.
-    assert_eq!(everything["percepts"]["present"][0].as_u64().unwrap() >> 31, 1);
+    assert_eq!(everything["percepts"]["present"][1].as_u64().unwrap() >> 31, 1);
     let samples = &everything["samples"];
     assert_eq!((&samples["answers"], &samples["t"]), (&1.into(), &json!([0.02, 0.03, 0.04])));
     assert_eq!(samples["values"][0], json!([102.5, 103.5, 104.5]));
@@ -339,7 +340,7 @@ fn frames_hold_what_the_engine_computed() {
     }
     let length = |name: &str| book.entries.iter().find(|entry| entry["name"] == name).unwrap()["length"].clone();
     // Head, pressures with health, and that there is no contact.
-    assert_eq!(length("nothing is touched"), 64 + 32 + 8);
+    assert_eq!(length("nothing is touched"), 72 + 32 + 8);
     let posed = &messages["posed, and what is wrong with taxels"];
     assert_eq!(posed["health"], json!([1, 3, 2, 0, 6]));
     assert!(posed["pose"].is_array() && posed["p50"].as_f64().is_some_and(|ms| (ms - 5.0).abs() < 1e-3));
@@ -401,6 +402,7 @@ fn the_steady_state_does_not_allocate() {
     let input = PageInput {
         frame: &frame,
         values_read: bench.engine.values_read(),
+        values_sensed: bench.engine.values_sensed(),
         plan: bench.engine.plan(),
         arrived: None,
         call_us: 1.0,
@@ -434,7 +436,7 @@ fn a_viewer_owes_what_it_has_not_drawn() {
 fn a_page_gets_the_unit_of_pressure() {
     let welcome = |calibration: &str| -> Value {
         let bench = Bench::new(Outputs::TOTAL | Outputs::FORCE, &ALL_LETTERS[..1], calibration);
-        serde_json::from_str(&bench.scene.welcome("00ff", bench.scene.scale)).unwrap()
+        serde_json::from_str(&bench.welcome()).unwrap()
     };
     let units = |welcome: &Value| -> Vec<Value> {
         welcome["columns"].as_array().unwrap().iter().map(|column| column["unit"].clone()).collect()

@@ -5,10 +5,15 @@ use serde_json::{Value, json};
 use super::log::{About, Event, EventKind};
 use super::readings::Reading;
 use super::scale::Scale;
+use super::sense_scale::SenseScales;
 use crate::signal::BoardHealth;
 
-pub(super) fn scale(scale: Scale) -> String {
-    json!({"type": "scale", "max": scale.max, "from": scale.from.word()}).to_string()
+pub(super) fn scale(scale: Scale, senses: Option<&SenseScales>) -> String {
+    let mut message = json!({"type": "scale", "max": scale.max, "from": scale.from.word()});
+    if let Some(senses) = senses {
+        message["senses"] = senses.json();
+    }
+    message.to_string()
 }
 
 /// What people call what events are about.

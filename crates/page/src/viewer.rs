@@ -30,7 +30,7 @@ pub(super) struct Viewer {
     sent: Sent,
     latencies: Latencies,
     /// Bits of the columns that frames carry, by the scene's columns.
-    columns: u32,
+    columns: u64,
     series: Vec<Series>,
     /// Number of times that it has said what it plots.
     series_messages: u32,
@@ -109,7 +109,7 @@ impl Viewer {
         self.under_way.front().map(|frame| frame.sent_at)
     }
 
-    pub(super) fn set_columns(&mut self, columns: u32) {
+    pub(super) fn set_columns(&mut self, columns: u64) {
         self.columns = columns;
         // The next frame has them.
         self.sent.percepts = None;
@@ -186,6 +186,7 @@ impl Viewer {
         let touches = self.sent.touches != current.touch_changes();
         let self_contacts = self.sent.self_contacts != current.self_contact_changes();
         set(section::PRESSURES, pressures);
+        set(section::SHEARS, pressures && !current.readings().shears().is_empty());
         set(section::POSES, poses);
         set(section::PERCEPTS, percepts);
         set(section::TOUCHES, touches);
@@ -211,6 +212,7 @@ impl Viewer {
             to.f32s(current.readings().pressures());
             to.bytes(current.readings().health());
             to.pad();
+            to.f32s(current.readings().shears());
         }
         if poses {
             to.f32s(current.poses().seven().as_flattened());
@@ -248,8 +250,8 @@ impl Viewer {
         percepts.iter().for_each(|percept| to.u32(percept.flags.bits()));
         for percept in percepts {
             let bit = |(index, column): (usize, &&Column)| percept.value(column).map_or(0, |_| 1 << index);
-            let present: u32 = current.columns().iter().enumerate().map(bit).sum();
-            to.u32(present | if current.is_in_world(percept) { IN_WORLD } else { 0 });
+            let present: u64 = current.columns().iter().enumerate().map(bit).sum();
+            to.u64(present | if current.is_in_world(percept) { IN_WORLD } else { 0 });
         }
         for (index, column) in current.columns().iter().enumerate() {
             if self.columns & (1 << index) == 0 {

@@ -1,47 +1,94 @@
-//! The colours of pressure: one map for the page and for pictures.
+//! The colours of what taxels read: one map of each kind for the page and for pictures.
 //!
-//! From a dark blue over purple, rose and orange to a light yellow. Lightness rises evenly, so that people who see
+//! Pressure goes from a dark blue over purple, rose and orange to a light yellow. Lightness rises evenly, so that people who see
 //! colours differently and prints in grey show the same order; no colour of it is grey, so that it stands out from a body.
+//! Temperature goes from blue over nearly white to red: both ways it gets darker, and the two sides differ for everybody.
+//! Distance goes from a light green, where something is near, to a dark one.
 
 use std::f64::consts::PI;
 
 /// Number of colours.
 pub const COLOURS: usize = 256;
 
-/// Lightness at both ends (Oklab).
-const LIGHTNESS: [f64; 2] = [0.36, 0.94];
+/// A map in Oklab, interpolated linearly.
+struct Map {
+    /// (position, lightness).
+    lightness: &'static [(f64, f64)],
+    /// (position, chroma, hue in degrees).
+    anchors: &'static [(f64, f64, f64)],
+}
 
-/// (position, chroma, hue in degrees) in Oklab, interpolated linearly.
-const ANCHORS: [(f64, f64, f64); 6] = [
-    (0.0, 0.15, 272.0),
-    (0.25, 0.20, 305.0),
-    (0.5, 0.20, 360.0),
-    (0.75, 0.17, 405.0),
-    (0.9, 0.16, 445.0),
-    (1.0, 0.14, 465.0),
-];
+const PRESSURE: Map = Map {
+    lightness: &[(0.0, 0.36), (1.0, 0.94)],
+    anchors: &[
+        (0.0, 0.15, 272.0),
+        (0.25, 0.20, 305.0),
+        (0.5, 0.20, 360.0),
+        (0.75, 0.17, 405.0),
+        (0.9, 0.16, 445.0),
+        (1.0, 0.14, 465.0),
+    ],
+};
+
+const TEMPERATURE: Map = Map {
+    lightness: &[(0.0, 0.34), (0.5, 0.95), (1.0, 0.42)],
+    anchors: &[
+        (0.0, 0.17, 262.0),
+        (0.3, 0.13, 245.0),
+        // The hue changes in one step, where there is hardly any.
+        (0.4999, 0.02, 240.0),
+        (0.5, 0.015, 60.0),
+        (0.7, 0.13, 55.0),
+        (1.0, 0.17, 30.0),
+    ],
+};
+
+const DISTANCE: Map = Map {
+    lightness: &[(0.0, 0.95), (1.0, 0.34)],
+    anchors: &[(0.0, 0.10, 185.0), (0.3, 0.13, 175.0), (0.65, 0.11, 165.0), (1.0, 0.08, 155.0)],
+};
 
 /// The colours from no pressure to the highest of the scale, sRGB.
 #[must_use]
 pub fn pressure_colours() -> [[u8; 3]; COLOURS] {
-    std::array::from_fn(|index| colour(index as f64 / (COLOURS - 1) as f64))
+    PRESSURE.colours()
 }
 
-/// The colour at `share` of the scale.
-fn colour(share: f64) -> [u8; 3] {
-    let lightness = LIGHTNESS[0] + (LIGHTNESS[1] - LIGHTNESS[0]) * share;
-    let after = ANCHORS.iter().position(|anchor| anchor.0 >= share).unwrap_or(ANCHORS.len() - 1).max(1);
-    let (a, b) = (ANCHORS[after - 1], ANCHORS[after]);
-    let way = ((share - a.0) / (b.0 - a.0)).clamp(0.0, 1.0);
-    let hue = (a.2 + (b.2 - a.2) * way) * PI / 180.0;
-    let mut chroma = a.1 + (b.1 - a.1) * way;
-    // What a screen cannot show is made less colourful, at the same lightness.
-    loop {
-        let rgb = linear_of(lightness, chroma * hue.cos(), chroma * hue.sin());
-        if chroma <= 0.0 || rgb.iter().all(|part| (0.0..=1.0).contains(part)) {
-            return rgb.map(|part| (encoded(part.clamp(0.0, 1.0)) * 255.0).round() as u8);
+/// The colours from the coldest temperature of the scale to the warmest, sRGB.
+#[must_use]
+pub fn temperature_colours() -> [[u8; 3]; COLOURS] {
+    TEMPERATURE.colours()
+}
+
+/// The colours from no distance to the farthest of the scale, sRGB.
+#[must_use]
+pub fn distance_colours() -> [[u8; 3]; COLOURS] {
+    DISTANCE.colours()
+}
+
+impl Map {
+    fn colours(&self) -> [[u8; 3]; COLOURS] {
+        std::array::from_fn(|index| self.colour(index as f64 / (COLOURS - 1) as f64))
+    }
+
+    /// The colour at `share` of the scale.
+    fn colour(&self, share: f64) -> [u8; 3] {
+        let at = self.lightness.iter().position(|anchor| anchor.0 >= share).unwrap_or(self.lightness.len() - 1).max(1);
+        let (a, b) = (self.lightness[at - 1], self.lightness[at]);
+        let lightness = a.1 + (b.1 - a.1) * ((share - a.0) / (b.0 - a.0)).clamp(0.0, 1.0);
+        let at = self.anchors.iter().position(|anchor| anchor.0 >= share).unwrap_or(self.anchors.len() - 1).max(1);
+        let (a, b) = (self.anchors[at - 1], self.anchors[at]);
+        let way = ((share - a.0) / (b.0 - a.0)).clamp(0.0, 1.0);
+        let hue = (a.2 + (b.2 - a.2) * way) * PI / 180.0;
+        let mut chroma = a.1 + (b.1 - a.1) * way;
+        // What a screen cannot show is made less colourful, at the same lightness.
+        loop {
+            let rgb = linear_of(lightness, chroma * hue.cos(), chroma * hue.sin());
+            if chroma <= 0.0 || rgb.iter().all(|part| (0.0..=1.0).contains(part)) {
+                return rgb.map(|part| (encoded(part.clamp(0.0, 1.0)) * 255.0).round() as u8);
+            }
+            chroma -= 0.002;
         }
-        chroma -= 0.002;
     }
 }
 
@@ -109,6 +156,59 @@ mod tests {
         // A rainbow does not rise.
         let rainbow: Vec<[u8; 3]> = (0..=255).map(|i: u8| [i, 255 - i, 128]).collect();
         assert!(!rises(&rainbow, &SIGHTS[0], 4));
+    }
+
+    #[test]
+    fn temperatures_darken_both_ways_and_distances_one_way_for_every_kind_of_sight() {
+        let (temperatures, distances) = (temperature_colours(), distance_colours());
+        let backwards = |colours: &[[u8; 3]]| colours.iter().rev().copied().collect::<Vec<_>>();
+        for sight in &SIGHTS {
+            assert!(rises(&temperatures[..COLOURS / 2], sight, 4));
+            assert!(rises(&backwards(&temperatures[COLOURS / 2..]), sight, 4));
+            assert!(rises(&backwards(&distances), sight, 4));
+        }
+        let [cold, middle, warm] = [0, COLOURS / 2, COLOURS - 1].map(|at| temperatures[at]);
+        assert!(cold[2] > cold[0] + 100 && warm[0] > warm[2] + 100, "{cold:?}, {warm:?}");
+        assert!(lightness(linear(middle)) > 90.0, "{middle:?}");
+    }
+
+    /// Oklab, in which distances are about as large as they look.
+    fn oklab(rgb: [f64; 3]) -> [f64; 3] {
+        const CONES: [[f64; 3]; 3] = [
+            [0.412_221_470_8, 0.536_332_536_3, 0.051_445_992_9],
+            [0.211_903_498_2, 0.680_699_545_1, 0.107_396_956_6],
+            [0.088_302_461_9, 0.281_718_837_6, 0.629_978_700_5],
+        ];
+        const LAB: [[f64; 3]; 3] = [
+            [0.210_454_255_3, 0.793_617_785, -0.004_072_046_8],
+            [1.977_998_495_1, -2.428_592_205, 0.450_593_709_9],
+            [0.025_904_037_1, 0.782_771_766_2, -0.808_675_766],
+        ];
+        let by =
+            |matrix: [[f64; 3]; 3], of: [f64; 3]| matrix.map(|row| row.iter().zip(of).map(|(a, b)| a * b).sum::<f64>());
+        by(LAB, by(CONES, rgb).map(f64::cbrt))
+    }
+
+    fn apart(one: [u8; 3], other: [u8; 3], sight: &[[f64; 3]; 3]) -> f64 {
+        let seen = |colour: [u8; 3]| {
+            let rgb = linear(colour);
+            oklab(sight.map(|row| row.iter().zip(rgb).map(|(a, b)| a * b).sum::<f64>().clamp(0.0, 1.0)))
+        };
+        seen(one).iter().zip(seen(other)).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    }
+
+    #[test]
+    fn what_is_cold_and_what_is_warm_differ_for_every_kind_of_sight() {
+        let colours = temperature_colours();
+        // As far from the middle, on both sides: as far apart as two greys whose lightness differs by a tenth.
+        for sight in &SIGHTS {
+            for off in [32, 64, 96, 127] {
+                let distance = apart(colours[127 - off], colours[128 + off], sight);
+                assert!(distance >= 0.1, "{off}: {distance}");
+            }
+        }
+        // Green and red of one lightness would not do.
+        assert!(apart([120, 125, 40], [200, 80, 60], &SIGHTS[2]) < 0.1);
     }
 
     #[test]

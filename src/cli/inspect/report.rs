@@ -1,10 +1,12 @@
 //! A body in words and tables.
 
+use std::collections::BTreeMap;
+
 use comfy_table::ColumnConstraint;
 use console::style;
 use rstar::RTree;
 use somatic::author::Coverage;
-use somatic::body::{Body, ChartKind};
+use somatic::body::{Body, ChartKind, Modality};
 use somatic::field::{Field, WORLD};
 use somatic::internal::author::cell_spread;
 use somatic::internal::field::RestOverlap;
@@ -24,6 +26,9 @@ pub(super) fn text(seen: &Inspection) -> String {
     let surfaces = count(triangles as u64, "triangle");
     line("surfaces", format!("{} with {surfaces}", body.surfaces.len()));
     line("taxels", taxels(body));
+    if let Some(kinds) = kinds(body) {
+        line("kinds", kinds);
+    }
     if let Some(cells) = cell_spread(body.taxels.iter().map(|taxel| taxel.area)) {
         line("cells", format!("{} of the median area, 5th to 95th percentile", spread(cells)));
     }
@@ -56,6 +61,17 @@ pub(super) fn text(seen: &Inspection) -> String {
         text += &bullet(finding);
     }
     text
+}
+
+/// How many taxels of each kind there are, if any measures something else than pressure.
+fn kinds(body: &Body) -> Option<String> {
+    let mut counts: BTreeMap<u32, (String, usize)> = BTreeMap::new();
+    for taxel in &body.taxels {
+        counts.entry(taxel.modality.code()).or_insert_with(|| (taxel.modality.name(), 0)).1 += 1;
+    }
+    let has_others = body.taxels.iter().any(|taxel| taxel.modality != Modality::Pressure);
+    let kinds: Vec<String> = counts.into_values().map(|(name, count)| format!("{count} {name}")).collect();
+    has_others.then(|| kinds.join(", "))
 }
 
 /// Number of taxels, how far they lie apart, and the area they stand for.

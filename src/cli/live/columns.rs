@@ -6,6 +6,7 @@ use console::style;
 use somatic::signal::Quantity;
 use somatic::{Outputs, Percept};
 
+use super::senses::said;
 use crate::cli::words::{clipped, fitted, millimetres, number};
 
 /// Blank between columns.
@@ -145,6 +146,11 @@ impl Layout {
     pub(super) fn row(&self, name: &str, percept: Option<&Percept>, scale: Scale) -> String {
         let touched = percept.is_some_and(|percept| percept.contact);
         let mut text = fitted(name, self.name, false);
+        if let Some(said) = percept.and_then(|percept| said(percept, scale.unit.factor, scale.unit.name)) {
+            let room = self.columns.iter().map(|column| column.width + GAP).sum::<usize>() + self.flags;
+            text += &clipped(&format!("  {said}"), room);
+            return if touched { text } else { style(text).dim().to_string() };
+        }
         for column in &self.columns {
             text += &" ".repeat(GAP);
             let cell = percept.map_or(Some("·".to_owned()), |percept| (column.text)(percept, scale));

@@ -6,8 +6,8 @@ use clap::Args;
 use somatic::field::Field;
 use somatic::internal::scene_file::{hertz, seconds};
 use somatic::internal::setup::Setup;
-use somatic::internal::signal::Channel;
-use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture};
+use somatic::internal::signal::{Channel, Receptor};
+use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture, letters_of};
 use somatic::scene::Coordinates;
 use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
@@ -28,6 +28,12 @@ pub(super) struct Flags {
     /// The calibration of the sensors, a TOML file [default: the source's own, if it has one].
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+
+    /// What taxels are coloured by: pressure, shear, temperature or proximity [default: pressure].
+    ///
+    /// Taxels with three axes have arrows of their tangential forces with pressure and shear.
+    #[arg(long, value_name = "LETTER", value_parser = letter)]
+    letter: Option<Receptor>,
 
     /// The time to show, such as 2.9s [default: when most is pressed].
     ///
@@ -68,6 +74,7 @@ impl Flags {
         let sources: Vec<String> = recording.or(self.source.as_deref()).map(str::to_owned).into_iter().collect();
         let given = [
             ("--calibration", self.calibration.is_some()),
+            ("--letter", self.letter.is_some()),
             ("--at", self.at.is_some()),
             ("--from", self.from.is_some()),
             ("--to", self.to.is_some()),
@@ -110,8 +117,12 @@ impl Flags {
         let engine_options = asked.options(body, &taxels, 1)?;
         // Pictures are of the body at rest, and show touches whatever else is computed.
         let scene: Scene = engine_options.scene.clone().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor);
+        let letter = self.letter.unwrap_or_default();
+        let letters = letters_of(body, fields, letter);
+        let has_pressure = letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
         let touches = scene.touches.unwrap_or_default();
-        let scene = scene.touches(touches);
+        let scene = scene.letters(letters);
+        let scene = if has_pressure { scene.touches(touches) } else { scene };
         let mut engine = Engine::new(body, engine_options.scene(scene).backend(BackendKind::Cpu))?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
         let width = source.taxels().len();
@@ -121,7 +132,7 @@ impl Flags {
             bar.show(source.progress().unwrap_or(0.0));
             source.next_frame(&mut frame).map(|is_there| is_there.then_some(frame)).transpose()
         });
-        let moments = Moments::compute(&mut engine, body, times, &input.name, frames)?;
+        let moments = Moments::compute(&mut engine, body, (letter, times), &input.name, frames)?;
         source.notices().iter().for_each(|notice| say(notice));
         let mut bar = Bar::new("drawing");
         let progress = |share| {
@@ -136,9 +147,30 @@ impl Flags {
     }
 }
 
+/// The letter that a word names; pressure itself is called so, too.
+fn letter(word: &str) -> Result<Receptor> {
+    match word {
+        "pressure" => Ok(Receptor::Sustained),
+        word => match word.parse()? {
+            Receptor::Change => {
+                Err(Error::usage("changes are not drawn; give pressure, shear, temperature or proximity"))
+            }
+            receptor => Ok(receptor),
+        },
+    }
+}
+
 /// A PNG of `body` without a touch, its taxels labelled with their ids.
 pub(super) fn without(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u8>> {
-    let pressures = vec![Some(0.0); body.taxels.len()];
-    let moment = Moment { pressures: &pressures, max_pressure: None, unit: "", touches: &[], t_s: None };
+    let values = vec![Some(0.0); body.taxels.len()];
+    let moment = Moment {
+        letter: Receptor::Sustained,
+        values: &values,
+        ends: None,
+        unit: "",
+        shear: &[],
+        touches: &[],
+        t_s: None,
+    };
     TouchPicture::new(body, fields, options, true)?.draw(&moment)?.png()
 }

@@ -26,7 +26,7 @@ use somatic::page::{Listen, Server};
 use somatic::{BackendKind, Body, ChosenBackend, Engine, Error, Options, Result};
 
 use self::clock::Clock;
-use self::ready::Ready;
+use self::ready::{Extremes, Ready};
 use self::subject::{Subject, subject};
 use super::browser;
 use super::interrupt::stop_soon_on_signal;
@@ -199,6 +199,7 @@ impl Opening<'_> {
                 taxels: &[],
                 wiring: None,
                 recorded_max: None,
+                recorded_senses: Default::default(),
             },
         );
         let stop = stop_soon_on_signal()?;
@@ -208,6 +209,7 @@ impl Opening<'_> {
         opened.publisher.read(&PageInput {
             frame: &frame,
             values_read: None,
+            values_sensed: &[],
             plan: engine.plan(),
             arrived: None,
             call_us: f32::NAN,
@@ -234,7 +236,7 @@ impl Opening<'_> {
         let stop = stop_soon_on_signal()?;
         let Some(ready) = Ready::read(asked, &stop)? else { return Ok(DONE) };
         let clock = Clock::new(1, asked.playback_speed.unwrap_or(1.0), ready.is_bundled()).remove(0);
-        let Opened { server, publisher, _handed_over } = self.start(ready.scene(ready.largest_pressure()))?;
+        let Opened { server, publisher, _handed_over } = self.start(ready.scene(ready.extremes()))?;
         let is_lost = ready.play(server, publisher, clock, || self.is_over(&stop))?;
         Ok(if is_lost { LOST } else { DONE })
     }
@@ -244,11 +246,10 @@ impl Opening<'_> {
         let stop = stop_soon_on_signal()?;
         let Some(first) = Ready::read(asked[0], &stop)? else { return Ok(DONE) };
         let Some(second) = Ready::read(asked[1], &stop)? else { return Ok(DONE) };
-        // One colour is one pressure in both.
-        let largest = [&first, &second].map(Ready::largest_pressure);
+        // One colour is one reading in both.
         let is_same = first.quantity() == second.quantity();
-        let largest = if is_same { [largest.into_iter().flatten().reduce(f64::max); 2] } else { largest };
-        let scenes = [first.scene(largest[0]), second.scene(largest[1])];
+        let extremes = Extremes::of_both([&first, &second].map(Ready::extremes), is_same);
+        let scenes = [first.scene(extremes[0]), second.scene(extremes[1])];
         let [(server, publisher), (beside, published_beside)] = Server::start_pair(&self.listen, scenes)?;
         let _handed_over = self.announce(&server);
         let mut clocks = Clock::new(2, asked[0].playback_speed.unwrap_or(1.0), false).into_iter();

@@ -252,6 +252,7 @@ impl Player {
         self.publisher.read(&PageInput {
             frame,
             values_read: None,
+            values_sensed: self.engine.values_sensed(),
             plan: self.engine.plan(),
             arrived: Some(started),
             call_us,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use somatic::internal::page::{PageInfo, PageScene, Publisher};
+use somatic::internal::scene::SenseRanges;
 use somatic::internal::setup::{Input, Setup};
 use somatic::page::Server;
 use somatic::signal::Quantity;
@@ -30,6 +31,22 @@ pub(super) struct Ready {
     recording: Arc<Recording>,
     settled: Settled,
     engine: Engine,
+}
+
+/// How far the readings of a recording go.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Extremes {
+    pub(super) pressure: Option<f64>,
+    pub(super) senses: SenseRanges,
+}
+
+impl Extremes {
+    /// Those of both; of pressures only if these are of the same quantity.
+    pub(super) fn of_both([one, other]: [Self; 2], is_same: bool) -> [Self; 2] {
+        let senses = one.senses.union(other.senses);
+        let both = [one.pressure, other.pressure].into_iter().flatten().reduce(f64::max);
+        [one, other].map(|own| Self { pressure: if is_same { both } else { own.pressure }, senses })
+    }
 }
 
 impl Ready {
@@ -61,9 +78,12 @@ impl Ready {
         self.input.is_bundled()
     }
 
-    /// The largest pressure, unless finding it takes long.
-    pub(super) fn largest_pressure(&self) -> Option<f64> {
-        self.recording.largest_pressure(&self.engine)
+    /// The largest pressure and what else taxels read, unless finding it takes long.
+    pub(super) fn extremes(&self) -> Extremes {
+        Extremes {
+            pressure: self.recording.largest_pressure(&self.engine),
+            senses: self.recording.sense_ranges(&self.engine, &self.body),
+        }
     }
 
     /// What pressures are of, if all are of the same.
@@ -71,8 +91,8 @@ impl Ready {
         self.engine.plan().common_quantity()
     }
 
-    /// What a page shows of it, in colours up to `recorded_max` where nothing else says how far.
-    pub(super) fn scene(&self, recorded_max: Option<f64>) -> PageScene {
+    /// What a page shows of it, in colours up to `extremes` where nothing else says how far.
+    pub(super) fn scene(&self, extremes: Extremes) -> PageScene {
         let ChosenBackend { name, device, reason, .. } = self.engine.backend();
         PageScene::new(
             &self.body,
@@ -83,7 +103,8 @@ impl Ready {
                 backend: [name, &device, self.settled.why.as_deref().unwrap_or(reason)],
                 taxels: &self.recording.taxels,
                 wiring: None,
-                recorded_max,
+                recorded_max: extremes.pressure,
+                recorded_senses: extremes.senses,
             },
         )
     }

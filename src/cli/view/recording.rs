@@ -4,8 +4,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use somatic::internal::page::Mode;
+use somatic::internal::scene::{SenseRanges, SensedTaxels};
 use somatic::source::Source;
-use somatic::{Engine, Error, Frame, Result};
+use somatic::{Body, Engine, Error, Frame, RawValue, Result};
 
 use super::super::stdio::say;
 
@@ -102,6 +103,23 @@ impl Recording {
             pressures.iter().map(|&(_, pressure)| pressure).fold(0.0, f64::max)
         });
         Some(largest.fold(0.0, f64::max)).filter(|&largest| largest > 0.0)
+    }
+
+    /// The temperatures and distances that taxels of `body` read, unless finding them takes long.
+    pub(super) fn sense_ranges(&self, engine: &Engine, body: &Body) -> SenseRanges {
+        let mut ranges = SenseRanges::default();
+        let sensed = SensedTaxels::new(engine.plan(), body);
+        if self.frames.len() * sensed.channels().len() > MAX_SEARCHED {
+            return ranges;
+        }
+        let at: Vec<Option<usize>> =
+            sensed.channels().iter().map(|channel| self.taxels.iter().position(|own| own == channel)).collect();
+        for frame in &self.frames {
+            let values: Vec<RawValue> =
+                at.iter().map(|at| at.map_or(RawValue::MISSING, |at| frame.values[at])).collect();
+            sensed.read(engine.plan(), &[], &values).for_each(|value| ranges.see(&value));
+        }
+        ranges
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 use somatic::internal::page::RecordingEvents;
 use somatic::internal::parallel;
-use somatic::{Percepts, Result};
+use somatic::{Engine, Letter, Result};
 
 use super::super::stdio::say;
 use super::recorded::Recorded;
@@ -50,7 +50,10 @@ impl Timeline {
     }
 
     /// Adds the percepts of a call.
-    fn add(&self, percepts: &Percepts, recording: &Recording, first: usize) {
+    fn add(&self, engine: &Engine, recording: &Recording, first: usize) {
+        let (percepts, letters) = (engine.percepts(), engine.plan().letters());
+        let is_of_pressure = |letter: &Letter| letter.receptor.is_of_pressure();
+        let is_shown = |letter: usize| is_of_pressure(&letters[letter]) || !letters.iter().any(is_of_pressure);
         let mut known = self.known();
         for frame in 0..percepts.frames() {
             known.until_s = known.until_s.max(percepts.t_s(frame));
@@ -58,7 +61,8 @@ impl Timeline {
                 Some(found) => found.touches.iter().map(|touch| touch.peak).reduce(f64::max),
                 // Without the output `peak`, that something is touched.
                 None => {
-                    let peaks = percepts.touched(frame).map(|percept| percept.peak.or(percept.total).unwrap_or(1.0));
+                    let shown = percepts.touched(frame).filter(|percept| is_shown(percept.letter));
+                    let peaks = shown.map(|percept| percept.peak.or(percept.total).unwrap_or(1.0));
                     peaks.reduce(f64::max)
                 }
             };
@@ -118,8 +122,9 @@ fn pass(
     let mut state_at_s = timeline.start_s;
     let mut sent_at = Instant::now();
     for frames in recording.frames.chunks(CHUNK) {
-        let percepts = engine.process(frames)?;
-        timeline.add(percepts, recording, done);
+        engine.process(frames)?;
+        timeline.add(&engine, recording, done);
+        let percepts = engine.percepts();
         events.see(percepts);
         if let Some(recorded) = &mut recorded {
             timeline.add_differing(&recorded.compare(percepts, recording, done, differences)?, recording, done);

@@ -14,7 +14,8 @@ use super::post::{Post, flag_stale, flag_stale_poses};
 use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
-use crate::signal::{Axis, Channel, RawValue};
+use crate::scene::{SensedTaxels, SensedValue};
+use crate::signal::{Axis, Channel, Frame, RawValue};
 
 /// Frames until `go_on` is asked first.
 const FIRST_PART: usize = 256;
@@ -22,6 +23,29 @@ const FIRST_PART: usize = 256;
 const PART: Duration = Duration::from_millis(100);
 
 impl Engine {
+    /// Puts into `to`, in place of what it holds, what `sensed` read in `frame`, which must be the last one: to look at, as
+    /// [`Engine::pressures`].
+    pub fn sensed(&self, frame: &Frame, sensed: &SensedTaxels, to: &mut Vec<SensedValue>) {
+        to.clear();
+        if sensed.channels().is_empty() {
+            return;
+        }
+        let mut raw = vec![RawValue::MISSING; self.plan.channels()];
+        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+            if let Some(channel) = self.channel_of_taxel[taxel] {
+                raw[channel as usize] = self.intake.read(taxel, value);
+            }
+        }
+        to.extend(sensed.read(&self.plan, &raw, self.values_sensed()));
+    }
+
+    /// The values that the last frame's letters beside pressure were made of, by
+    /// [`SensedTaxels::channels`](crate::scene::SensedTaxels::channels); empty before the first frame.
+    #[must_use]
+    pub fn values_sensed(&self) -> &[RawValue] {
+        &self.sensed[self.sensed.len().saturating_sub(self.plan.senses.channels.len())..]
+    }
+
     /// All of `input`, epoch by epoch where there is drift compensation; with `check`, on the reference too. `false` if `go_on` said so.
     pub(super) fn advance(
         &mut self,

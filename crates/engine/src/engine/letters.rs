@@ -341,11 +341,9 @@ impl Cell<'_> {
     }
 }
 
-/// P for a raw unit of a tangential value of the body's taxel `taxel`. One of its own is in the file's unit, as the normal one was
-/// before that came into N or Pa.
+/// P for a raw unit of a tangential value of the body's taxel `taxel`.
 pub(super) fn tangential_gain(by: &ShearCalibration, taxel: usize, calibration: &TaxelCalibration) -> f64 {
-    let own = by.own_gains.get(&taxel).copied().or(by.gain);
-    own.map_or(calibration.gain.abs(), |gain| gain * calibration.unit_factor)
+    by.gain_of(taxel, calibration.gain, calibration.unit_factor)
 }
 
 /// The tangential forces of the body's taxel `taxel` along t and n × t, where it is pressed by `pressure` and reads `raw`.
@@ -361,7 +359,5 @@ pub(super) fn tangential(
         let is_missing = raw.iter().any(|raw| raw.is_missing());
         return Err(if is_missing { Flags::INCOMPLETE } else { Flags::FAULTY_INPUT });
     };
-    let [u_rest, v_rest] = by.own_baselines.get(&taxel).copied().unwrap_or(by.baselines);
-    let felt = DVec3::new(pressure, gain * (u - u_rest), gain * (v - v_rest));
-    Ok(by.cross_axis.map(|shares| DVec3::from_array(shares).dot(felt)))
+    Ok(by.forces(taxel, gain, pressure, [u, v]))
 }

@@ -11,6 +11,7 @@ mod left_out;
 mod members;
 mod onset;
 mod plan;
+mod sensed_taxels;
 mod senses;
 mod slots;
 mod stages;
@@ -22,6 +23,8 @@ pub use filter::MotionFilter;
 pub use knobs::{Arithmetic, Cadence, Charts, Coordinates, Coverage, Knobs, OrientationBy};
 pub(crate) use layer::{Around, REACH};
 pub use plan::{Plan, PlanField, PlannedField};
+pub use sensed_taxels::{SenseRanges, SensedTaxels, SensedValue};
+pub use senses::receptor_of;
 pub(crate) use senses::{SensedMember, outputs_of};
 pub(crate) use stages::Stages;
 

@@ -5,7 +5,7 @@ mod make;
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::Knobs;
 use super::curves::Curves;
@@ -158,6 +158,11 @@ impl PlanField {
         self.count + self.sensed.len()
     }
 
+    /// Of a letter that the host makes, its taxels' (u, v) in the field's chart, m.
+    pub fn sensed_places_m(&self) -> impl Iterator<Item = DVec2> + '_ {
+        self.sensed.iter().map(|member| member.place_m)
+    }
+
     /// Whether it has enough members for the CPU to take sixteen of them side by side.
     pub(crate) fn is_wide(&self) -> bool {
         self.count >= layout::MANY
@@ -279,6 +284,15 @@ impl Plan {
     #[must_use]
     pub fn letters(&self) -> &[Letter] {
         &self.letters
+    }
+
+    /// Which of the letters field `field` is of.
+    ///
+    /// # Panics
+    /// There is no such field.
+    #[must_use]
+    pub fn letter_of(&self, field: usize) -> usize {
+        self.fields[field].letter
     }
 
     /// By field, which of the letters it is of; empty where all are of one.

@@ -9,7 +9,7 @@ use super::Scene;
 use crate::body::{Body, Taxel, listed};
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
-use crate::percept::{Outputs, TouchOutputs};
+use crate::percept::{Column, Outputs, TouchOutputs};
 use crate::signal::{Axis, Calibration, Channel, Letter, Receptor, SenseCalibration, ShearCalibration};
 
 /// What the host reads of raw values for a plan's letters.
@@ -43,6 +43,13 @@ pub(crate) struct SensedMember {
     pub(crate) tangents_in_anchor: [DVec3; 2],
     /// Its tangents along u and v of the field's chart.
     pub(crate) tangents_in_chart: [DVec2; 2],
+}
+
+/// What reads what `column` is made of: shear, temperature or proximity, or else pressure.
+#[must_use]
+pub fn receptor_of(column: &Column) -> Receptor {
+    let others = [Receptor::Shear, Receptor::Temperature, Receptor::Proximity];
+    others.into_iter().find(|&receptor| outputs_of(receptor).contains(column.output)).unwrap_or(Receptor::Sustained)
 }
 
 /// What the letter of `receptor` gives, if the host makes it; else nothing.

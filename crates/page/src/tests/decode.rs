@@ -4,6 +4,12 @@ use serde_json::{Value, json};
 
 use super::super::scene::PageScene;
 
+impl super::Bench {
+    pub(super) fn welcome(&self) -> String {
+        self.scene.welcome("00ff", self.scene.scale, self.scene.senses.as_ref().map(|senses| &senses.scales))
+    }
+}
+
 /// Reads what a page reads, by the protocol's tables.
 struct Reader<'a>(&'a [u8], usize);
 
@@ -48,7 +54,7 @@ impl Reader<'_> {
 
 pub(super) fn decode_mesh(bytes: &[u8]) -> Value {
     let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [1, 4, 0, 0]);
+    assert_eq!(from.bytes(), [1, 5, 0, 0]);
     let [v, t, n, l] = [0; 4].map(|_| from.u32());
     let mesh = json!({
         "position": from.f32s(3 * v), "normal": from.f32s(3 * v), "link": from.u32s(v), "corners": from.u32s(3 * t),
@@ -63,18 +69,19 @@ pub(super) fn decode_mesh(bytes: &[u8]) -> Value {
 pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
     let mut from = Reader(bytes, 0);
     let [kind, version, sections, zero] = from.bytes();
-    assert_eq!((kind, version, zero), (2, 4, 0));
+    assert_eq!((kind, version, zero), (2, 5, 0));
     let mut frame = json!({"seq": from.u32()});
     frame["frame"] = u64::from_le_bytes(from.bytes()).into();
     frame["t"] = from.f64().into();
     frame["skipped"] = from.u32().into();
     frame["p50"] = from.f32();
     frame["p99"] = from.f32();
-    let [fields, touches, samples, newest, columns] = [0; 5].map(|_| from.u32());
+    let [fields, touches, samples, newest, answers] = [0; 5].map(|_| from.u32());
     frame["newestEvent"] = newest.into();
     frame["engineMicroseconds"] = from.f32();
-    let answers = from.u32();
-    for part in ["pressure", "health", "pose", "percepts", "touches", "selfContacts", "samples"] {
+    assert_eq!(from.u32(), 0);
+    let columns = u64::from_le_bytes(from.bytes());
+    for part in ["pressure", "health", "shear", "pose", "percepts", "touches", "selfContacts", "samples"] {
         frame[part] = Value::Null;
     }
     let taxels = scene.counts.taxels as u32;
@@ -83,12 +90,17 @@ pub(super) fn decode_frame(bytes: &[u8], scene: &PageScene) -> Value {
         frame["health"] = (0..taxels).map(|_| from.bytes::<1>()[0]).collect::<Vec<_>>().into();
         from.pad();
     }
+    if sections & 64 != 0 {
+        let pulled = scene.senses.iter().flat_map(|senses| senses.taxels.all());
+        let pulled = pulled.filter(|&(_, receptor, _)| receptor == crate::signal::Receptor::Shear).count();
+        frame["shear"] = from.f32s(2 * pulled as u32).into();
+    }
     if sections & 2 != 0 {
         frame["pose"] = from.f32s(7 * scene.poses.seven().len() as u32).into();
         from.pad();
     }
     if sections & 4 != 0 {
-        let mut percepts = json!({"field": from.u32s(fields), "flags": from.u32s(fields), "present": from.u32s(fields), "columns": {}});
+        let mut percepts = json!({"field": from.u32s(fields), "flags": from.u32s(fields), "present": from.u32s(2 * fields), "columns": {}});
         for (index, column) in scene.counts.columns.iter().enumerate().filter(|(index, _)| columns >> index & 1 != 0) {
             percepts["columns"][index.to_string()] = from.f32s(fields * column.components as u32).into();
         }
@@ -145,7 +157,7 @@ fn touch(from: &mut Reader<'_>) -> Value {
 
 pub(super) fn decode_peaks(bytes: &[u8], taxels: u32) -> Value {
     let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [4, 4, 0, 0]);
+    assert_eq!(from.bytes(), [4, 5, 0, 0]);
     let (id, begin, end) = (from.u32(), from.f64(), from.f64());
     let peaks = from.f32s(taxels);
     from.ends();
@@ -154,7 +166,7 @@ pub(super) fn decode_peaks(bytes: &[u8], taxels: u32) -> Value {
 
 pub(super) fn decode_history(bytes: &[u8]) -> Value {
     let mut from = Reader(bytes, 0);
-    assert_eq!(from.bytes(), [3, 4, 0, 0]);
+    assert_eq!(from.bytes(), [3, 5, 0, 0]);
     let [id, bins, series] = [0; 3].map(|_| from.u32());
     let (begin, end) = (from.f64(), from.f64());
     let ends: Vec<[Vec<Value>; 2]> = (0..series).map(|_| [from.f32s(bins), from.f32s(bins)]).collect();

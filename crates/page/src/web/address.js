@@ -21,7 +21,7 @@ export class Address {
   /**
    * @param {{model: import("./model.js").Model, camera: import("./camera.js").Camera,
    *   choices: import("./choices.js").Choices, connection: import("./socket.js").Connection,
-   *   fields: import("./fields.js").Fields, plots: import("./plots.js").Plots, peaks: import("./peaks.js").Peaks, span: import("./span.js").Span,
+   *   plots: import("./plots.js").Plots, peaks: import("./peaks.js").Peaks, span: import("./span.js").Span,
    *   timeline: import("./timeline.js").Timeline, isTurned: () => boolean, onCamera: () => void}} parts
    */
   constructor(parts) {
@@ -118,7 +118,7 @@ export class Address {
    */
   show(fragment) {
     const state = fromFragment(fragment);
-    const { model, camera, choices, connection, fields, peaks, plots, span, timeline, onCamera } = this.parts;
+    const { model, camera, choices, connection, peaks, plots, span, timeline, onCamera } = this.parts;
     const { welcome } = model;
     if (!welcome) return;
     if (state.camera) {
@@ -142,8 +142,7 @@ export class Address {
     const marks = choices.offered.find((name) => name === state.marks);
     if (marks) choices.marks = marks;
     if (state.letter && welcome.fields.some((field) => field.letter === state.letter)) {
-      choices.letter = state.letter;
-      fields.build();
+      choices.chooseLetter(state.letter);
     }
     const indexOf = (/** @type {string} */ name) =>
       welcome.fields.findIndex((field) => field.name === name && field.letter === choices.letter);

@@ -75,6 +75,18 @@ export class Choices extends Observed {
     this.tell("field");
   }
 
+  /**
+   * Shows another letter.
+   * @param {string | null} letter
+   */
+  chooseLetter(letter) {
+    this.letter = letter;
+    this.followed = null;
+    this.choose(null);
+    this.tell("letter");
+    this.tell("look");
+  }
+
   /** @param {number | null} id */
   chooseTouch(id) {
     this.touch = id;
@@ -121,8 +133,8 @@ export class Choices extends Observed {
     let most = -Infinity;
     let best = this.followed;
     for (const field of whole.length ? whole : touched)
-      if (model.load(field) > most) [most, best] = [model.load(field), field];
-    if (stays !== null && most <= MUCH_HARDER * model.load(stays)) return;
+      if (model.strength(field) > most) [most, best] = [model.strength(field), field];
+    if (stays !== null && most <= MUCH_HARDER * model.strength(stays)) return;
     if (best === null) best = fields.findIndex((field) => field.chart && field.letter === this.letter);
     if (best === this.followed || best < 0) return;
     this.followed = best;
@@ -151,7 +163,7 @@ export class Choices extends Observed {
     const touched = [...model.inContact.keys()].filter((f) => fields[f]?.letter === this.letter);
     const above = new Set(touched.map((f) => fields[f].parent));
     const smallest = touched.filter((f) => !above.has(f));
-    return smallest.sort((a, b) => model.load(b) - model.load(a) || a - b);
+    return smallest.sort((a, b) => model.strength(b) - model.strength(a) || a - b);
   }
 
   /**

@@ -2,6 +2,7 @@
 
 import { byId, make, setText } from "./dom.js";
 import { ABSENT, scaleFor, seconds, short, vectorWithUnit, withUnit } from "./format.js";
+import { readingRows } from "./inspect.js";
 import { say } from "./wire.js";
 
 export class PerceptPanel {
@@ -82,7 +83,8 @@ export class PerceptPanel {
     for (const column of welcome.columns) {
       const row = this.rows.get(column.name);
       if (!row) continue;
-      row.row.hidden = column.name === "total" && force !== null && Number.isFinite(force[0]);
+      const isTold = column.name === "total" && force !== null && Number.isFinite(force[0]);
+      row.row.hidden = isTold || column.sense !== about.sense;
       const value = model.forPeople(field, column.name);
       const text = value
         ? vectorWithUnit(value, column.unit, model.quantity)
@@ -140,8 +142,11 @@ export class PerceptPanel {
       }
       values.append(row);
     }
+    const { sense = "pressure" } = welcome.fields[explanation.field] ?? {};
+    const isPressure = sense === "pressure";
     const members = make("table", "explain-members");
-    members.append(line("th", ["taxel", "raw", "→", quantity === "N" ? "force" : "pressure"]));
+    const what = sense === "proximity" ? "distance" : sense;
+    members.append(line("th", ["taxel", "raw", "→", isPressure && quantity === "N" ? "force" : what]));
     const sorted = [...explanation.members].sort((a, b) => (b.pressure ?? -1) - (a.pressure ?? -1));
     const pressed = sorted.filter((member) => (member.pressure ?? 0) > 0).length;
     const shown = sorted.slice(0, Math.max(4, Math.min(pressed, 40)));
@@ -151,13 +156,17 @@ export class PerceptPanel {
           String(mesh.taxelId[member.taxel]),
           member.raw === null ? ABSENT : short(member.raw),
           "→",
-          withUnit(member.pressure, "P", quantity),
+          isPressure
+            ? withUnit(member.pressure, "P", quantity)
+            : (readingRows(this.model, member.taxel).at(-1)?.[1] ?? ABSENT),
         ]),
       );
     const rest = sorted.length - shown.length;
     this.result.replaceChildren(head, members);
     if (rest > 0)
-      this.result.append(make("p", "note", `and ${rest} more taxels, pressed less or not at all`));
+      this.result.append(
+        make("p", "note", `and ${rest} more taxels${isPressure ? ", pressed less or not at all" : ""}`),
+      );
     this.result.append(values);
     this.button.scrollIntoView({ block: "start" });
   }

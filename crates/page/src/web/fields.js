@@ -2,6 +2,7 @@
 
 import { byId, make, paletteColour, setText } from "./dom.js";
 import { withUnit } from "./format.js";
+import { letterName } from "./senses.js";
 
 /** @typedef {{row: HTMLElement, bar: HTMLElement, dot: HTMLElement, value: HTMLElement, caret: HTMLElement, depth: number, open: boolean,
  *   text: string, width: number, key: string}} Row */
@@ -35,6 +36,7 @@ export class Fields {
     /** The colours that the rows have. */
     this.coloured = { of: model.fieldColours, count: 0 };
     model.on("scene", () => this.build());
+    choices.on("letter", () => this.build());
     choices.on("field", () => this.mark());
     this.search.addEventListener("input", () => this.filter());
     this.search.addEventListener("keydown", (event) => {
@@ -59,18 +61,13 @@ export class Fields {
     const fields = this.model.welcome?.fields ?? [];
     const letters = [...new Set(fields.map((field) => field.letter))];
     if (!letters.includes(this.choices.letter)) this.choices.letter = letters[0] ?? null;
+    this.model.setLetter(this.choices.letter);
     this.letters.hidden = letters.length < 2;
     this.letters.replaceChildren(
       ...letters.map((letter) => {
-        const button = make("button", "", letter ?? "pressure");
+        const button = make("button", "", letterName(letter, fields));
         button.setAttribute("aria-pressed", String(letter === this.choices.letter));
-        button.addEventListener("click", () => {
-          this.choices.letter = letter;
-          this.choices.followed = null;
-          this.choices.choose(null);
-          this.choices.tell("look");
-          this.build();
-        });
+        button.addEventListener("click", () => this.choices.chooseLetter(letter));
         return button;
       }),
     );

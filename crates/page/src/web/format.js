@@ -40,6 +40,8 @@ export function scaleFor(unit, size, quantity) {
       return size >= 1e3 ? { factor: 1e-3, unit: "kPa" } : { factor: 1, unit: "Pa" };
     case "N":
       return size > 0 && size < 0.1 ? { factor: 1e3, unit: "mN" } : { factor: 1, unit: "N" };
+    case "N m":
+      return { factor: 1e3, unit: "mN m" };
     case "count":
       return { factor: 1, unit: "counts" };
     case "1":

@@ -212,9 +212,9 @@ export class Inspector {
       ],
       ...(welcome.touches ? [["touch", touch ? `#${touch.id}` : ABSENT]] : []),
       ["raw", value && value.raw !== null ? short(value.raw) : ABSENT],
-      [welcome.quantity === "N" ? "force" : "pressure", withUnit(model.pressure[taxel], "P", model.quantity)],
+      ...readingRows(model, taxel),
       ...(model.peaks ? [["highest", withUnit(model.peaks.peaks[taxel], "P", model.quantity)]] : []),
-      ["state", value?.health ?? HEALTH[model.health[taxel]]],
+      ["state", value?.health ?? HEALTH[(model.senses?.health ?? model.health)[taxel]]],
     ];
     this.tip.replaceChildren(make("b", "", `Taxel ${mesh.taxelId[taxel]}`), table(rows));
     this.place();
@@ -231,6 +231,25 @@ export class Inspector {
     const left = x + 18 + w > stage.clientWidth ? x - 18 - w : x + 18;
     tip.style.transform = `translate(${Math.max(4, left)}px, ${Math.max(4, Math.min(stage.clientHeight - h - 4, y - 20))}px)`;
   }
+}
+
+/**
+ * What a taxel reads.
+ * @param {import("./model.js").Model} model
+ * @param {number} taxel
+ */
+export function readingRows({ senses, pressure, quantity }, taxel) {
+  const value = (senses?.values ?? pressure)[taxel];
+  const sense = senses?.of[taxel] ?? "pressure";
+  if (sense === "temperature") return [[sense, withUnit(value, "°C", "")]];
+  if (sense === "proximity") return [["distance", withUnit(value, "m", "")]];
+  const shear = senses?.shearOf(taxel);
+  return [
+    [quantity === "N" ? "force" : "pressure", withUnit(value, "P", quantity)],
+    ...(senses?.pulled.has(taxel)
+      ? [["shear", shear ? withUnit(Math.hypot(...shear), "P", quantity) : ABSENT]]
+      : []),
+  ];
 }
 
 /**

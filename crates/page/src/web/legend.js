@@ -1,7 +1,9 @@
-/** The legend: colours of pressure with units, and how states of taxels look. */
+/** The legend: colours of what is shown of taxels, with units, and how their states look. */
 
+import { hasArrows, WIDTHS_AT_MOST } from "./arrows.js";
 import { make, setText } from "./dom.js";
-import { clock, scaleFor, seconds, short, tickText, ticks } from "./format.js";
+import { clock, scaleFor, seconds, short, tickText, ticks, withUnit } from "./format.js";
+import { letterName } from "./senses.js";
 import { HEALTH } from "./wire.js";
 
 /** Ticks closer to the end of the bar than this part of it would lie under the number there. */
@@ -19,14 +21,40 @@ export function endedTicks(most) {
   return [...round.map((place) => ({ part: place / most, text: tickText(place, places) })), end];
 }
 
+/**
+ * The ticks of a bar between two values: round ones, and both ends with their numbers.
+ * @param {number} least
+ * @param {number} most
+ */
+export function ticksBetween(least, most) {
+  const part = (/** @type {number} */ x) => (x - least) / (most - least);
+  const places = ticks(least, most, 4);
+  const within = places.filter((x) => part(x) > NEAR_END && part(x) < 1 - NEAR_END);
+  const text = (/** @type {number} */ x) => {
+    const isRound = places.some((place) => Math.abs(place - x) < 1e-6 * (most - least));
+    return isRound ? tickText(x, places) : short(x);
+  };
+  return [least, ...within, most].map((x) => ({ part: part(x), text: text(x) }));
+}
+
+/** What is shown of taxels in senses that have scales of their own. */
+const OWN = {
+  temperature: { title: "Temperature", unit: "°C", factor: 1 },
+  proximity: { title: "Distance", unit: "mm", factor: 1e3 },
+};
+
 export class Legend {
   /**
    * @param {HTMLElement} root
    * @param {import("./model.js").Model} model
+   * @param {import("./choices.js").Choices} choices
    */
-  constructor(root, model) {
+  constructor(root, model, choices) {
     this.root = root;
     this.model = model;
+    this.choices = choices;
+    this.letters = make("div", "segments legend-letters");
+    this.arrow = make("div", "legend-arrow");
     this.title = make("div", "legend-title");
     this.canvas = make("canvas", "legend-bar");
     this.canvas.width = 256;
@@ -39,20 +67,42 @@ export class Legend {
     this.states = make("div", "legend-states");
     const head = make("div", "legend-head");
     head.append(this.title, this.auto);
-    const zero = make("span", "legend-zero");
-    zero.append(make("i"), "0");
-    zero.title = "A taxel that feels nothing";
+    this.zero = make("span", "legend-zero");
+    this.zeroText = make("span", "", "0");
+    this.zero.append(make("i"), this.zeroText);
+    this.zero.title = "A taxel that feels nothing";
     const foot = make("div", "legend-foot");
-    foot.append(this.source, zero);
-    root.append(head, this.canvas, this.ticks, foot, this.states);
+    foot.append(this.source, this.zero);
+    root.append(this.letters, head, this.canvas, this.ticks, foot, this.arrow, this.states);
     this.since = "";
     this.shown = "";
     this.counts = "";
     this.maximum = NaN;
     model.on("scene scale", () => this.update());
+    model.on("scene", () => this.showLetters());
+    choices.on("letter", () => this.showLetters());
+  }
+
+  /** What taxels can be coloured by, where that is more than one sense. */
+  showLetters() {
+    const fields = this.model.welcome?.fields ?? [];
+    const letters = [...new Set(fields.map((field) => field.letter))];
+    this.letters.hidden = !this.model.senses || letters.length < 2;
+    const { letter: chosen } = this.choices;
+    const shown = letters.includes(chosen) ? chosen : letters[0];
+    this.letters.replaceChildren(
+      ...letters.map((letter) => {
+        const button = make("button", "small", letterName(letter, fields));
+        button.title = `Colour taxels by ${button.textContent}`;
+        button.setAttribute("aria-pressed", String(letter === shown));
+        button.addEventListener("click", () => this.choices.chooseLetter(letter));
+        return button;
+      }),
+    );
   }
 
   toggle() {
+    if (this.model.sense === "temperature" || this.model.sense === "proximity") return;
     this.since = clock(new Date());
     this.model.setAutoscale(this.model.autoscale === null);
   }
@@ -61,21 +111,33 @@ export class Legend {
     const { model } = this;
     const { welcome } = model;
     if (!welcome) return;
+    const { sense } = model;
+    const own = sense === "temperature" || sense === "proximity";
+    this.auto.hidden = own;
+    this.zero.hidden = sense === "temperature";
+    setText(this.zeroText, sense === "proximity" ? "nothing near" : "0");
+    this.paint(welcome.colours);
+    this.arrow.hidden = !hasArrows(model);
+    const width = model.scaleMax / WIDTHS_AT_MOST;
+    setText(this.arrow, `arrow a taxel wide: ${withUnit(width, "P", model.quantity)}`);
+    if (own) {
+      const { title, unit, factor } = OWN[sense];
+      const ends = model.senses?.ends(sense);
+      setText(this.title, `${title}, ${unit}`);
+      this.showTicks(ends ? ticksBetween(factor * ends.least, factor * ends.most) : []);
+      setText(this.source, ends ? this.sourceText(ends.from, sense) : "nothing is read yet");
+      this.root.classList.remove("auto");
+      return;
+    }
     const most = model.scaleMax;
     this.maximum = most;
     const by = scaleFor("P", most, model.quantity);
-    const what =
+    const ofPressure =
       model.quantity === "N" ? "Force of a taxel" : model.quantity === "Pa" ? "Pressure" : "Raw value";
+    const what = sense === "shear" ? "Shear of a taxel" : ofPressure;
     const { peaks } = model;
     setText(this.title, `${peaks ? `Highest ${what.toLowerCase()}` : what}, ${by.unit}`);
-    this.paint(welcome.colours);
-    this.ticks.replaceChildren(
-      ...endedTicks(most * by.factor).map(({ part, text }) => {
-        const tick = make("span", "", text);
-        tick.style.left = `${100 * part}%`;
-        return tick;
-      }),
-    );
+    this.showTicks(endedTicks(most * by.factor));
     const auto = model.autoscale !== null;
     if (peaks) setText(this.source, `from ${seconds(peaks.from)} to ${seconds(peaks.to)}`);
     else setText(this.source, auto ? `autoscale since ${this.since}` : this.sourceText(model.scale.from));
@@ -83,15 +145,31 @@ export class Legend {
     setText(this.auto, auto ? "Fixed scale" : "Autoscale");
   }
 
-  /** @param {string} from */
-  sourceText(from) {
+  /** @param {{part: number, text: string}[]} places */
+  showTicks(places) {
+    this.ticks.replaceChildren(
+      ...places.map(({ part, text }) => {
+        const tick = make("span", "", text);
+        tick.style.left = `${100 * part}%`;
+        return tick;
+      }),
+    );
+  }
+
+  /**
+   * @param {string} from
+   * @param {import("./senses.js").Sense} [sense]
+   */
+  sourceText(from, sense = "pressure") {
     switch (from) {
       case "calibration":
         return "fixed by the calibration";
       case "raw range":
-        return "fixed to the raw range";
+        return sense === "proximity" ? "fixed to the range" : "fixed to the raw range";
       case "recording":
-        return "fixed to the recording’s maximum";
+        return sense === "temperature"
+          ? "fixed to the recording’s range"
+          : "fixed to the recording’s maximum";
       case "grown":
         return "grown with the data so far";
       default:
@@ -116,7 +194,9 @@ export class Legend {
     if (model.autoscale !== null && model.scaleMax !== this.maximum) this.update();
     if (!model.frame) return;
     const counts = new Array(HEALTH.length).fill(0);
-    for (const state of model.health) counts[state]++;
+    model.health.forEach((state, taxel) => {
+      if (model.senses?.reads(taxel, model.sense) ?? true) counts[state]++;
+    });
     if (model.isAtRest) counts.fill(0);
     this.root.hidden = model.isAtRest;
     const key = counts.slice(1).join();

@@ -59,7 +59,7 @@ const marks = new Marks(
 );
 const scaleBar = new ScaleBar(byId("scale-bar", HTMLCanvasElement), camera);
 const photo = new Photo(view, model, [marks.canvas, scaleBar.canvas]);
-const legend = new Legend(byId("legend", HTMLElement), model);
+const legend = new Legend(byId("legend", HTMLElement), model, choices);
 const span = new Span();
 const plots = new Plots(model, connection, span);
 const peaks = new Peaks(model, span, connection);
@@ -162,6 +162,13 @@ model.on("scale", () => {
   view.request();
   updatePanels();
 });
+choices.on("letter", () => {
+  peaks.show(false);
+  choices.follow(model);
+  plots.follow(choices.smallestTouched(model));
+  marks.drawn = true;
+  updatePlots();
+});
 choices.on("look field hover touch", () => {
   view.ringsChanged = true;
   view.request();
@@ -204,7 +211,6 @@ const address = new Address({
   camera,
   choices,
   connection,
-  fields,
   peaks,
   plots,
   span,

@@ -5,6 +5,7 @@ import { smallestFields } from "./field_tree.js";
 import { withUnit } from "./format.js";
 import { poseToRows } from "./math.js";
 import { Reported } from "./reported.js";
+import { Senses } from "./senses.js";
 import { HEALTH } from "./wire.js";
 
 /** @typedef {import("./wire.js").Welcome} Welcome */
@@ -23,10 +24,16 @@ export class Model extends Reported {
     this.rows = new Float32Array(0);
     /** Counts changes of poses. */
     this.poseVersion = 0;
-    /** @type {Float32Array} */
+    /** Pressures; in other senses what taxels are coloured by, on their scale. @type {Float32Array} */
     this.pressure = new Float32Array(0);
     /** @type {Uint8Array} */
     this.health = new Uint8Array(0);
+    /** Where there are taxels that read something else. @type {Senses | null} */
+    this.senses = null;
+    /** The letter that is shown. @type {string | null} */
+    this.letter = null;
+    /** Colours of pressures. @type {number[][]} */
+    this.pressureColours = [];
     /** Touches of the whole body, the oldest first. @type {import("./wire.js").Touch[]} */
     this.touches = [];
     /** Colours of touches, by their ids: one keeps its own from onset to release. @type {Map<number, number>} */
@@ -75,14 +82,17 @@ export class Model extends Reported {
 
   /** Pressure at the upper end of the colours. */
   get scaleMax() {
+    // Shares of a scale of their own.
+    if (this.sense === "temperature" || this.sense === "proximity") return 1;
     return this.autoscale ?? this.scale.max;
   }
 
   /** Whether a body without a source is shown. */
   get isAtRest() {
-    if (this.restOf !== this.health) {
-      this.restOf = this.health;
-      this.rest = this.health.length > 0 && this.health.every((state) => state === NOT_SENT);
+    const health = this.senses?.health ?? this.health;
+    if (this.restOf !== health) {
+      this.restOf = health;
+      this.rest = health.length > 0 && health.every((state) => state === NOT_SENT);
     }
     return this.frame !== null && this.rest;
   }
@@ -95,7 +105,11 @@ export class Model extends Reported {
   colourAtRest(taxel) {
     if (!this.isAtRest) return null;
     if (!this.smallestFields) {
-      const { smallest, leaves } = smallestFields(this.welcome?.fields ?? [], this.health.length);
+      const { smallest, leaves } = smallestFields(
+        this.welcome?.fields ?? [],
+        this.health.length,
+        this.letter,
+      );
       // Colours in the tree's order, so that neighbours differ.
       for (const leaf of leaves) this.fieldColour(leaf);
       this.smallestFields = smallest;
@@ -111,6 +125,10 @@ export class Model extends Reported {
     this.smallestFields = null;
     this.describe(welcome);
     this.scale = welcome.scale;
+    this.pressureColours = welcome.colours;
+    this.senses = null;
+    this.letter = null;
+    this.sense = "pressure";
     this.setTouches([]);
     this.selfContacts = noSelfContacts();
     this.frame = null;
@@ -135,6 +153,7 @@ export class Model extends Reported {
     const taxels = mesh.taxelId.length;
     this.pressure = new Float32Array(taxels).fill(NaN);
     this.health = new Uint8Array(taxels).fill(HEALTH.indexOf("missing"));
+    if (this.welcome?.senses) this.senses = new Senses(this.welcome.senses, taxels);
     this.rows = new Float32Array((mesh.restPose.length / 7) * 12);
     this.pose(mesh.restPose);
     this.tell("scene");
@@ -152,6 +171,8 @@ export class Model extends Reported {
     if (frame.pressure && frame.health) {
       this.pressure = frame.pressure;
       this.health = frame.health;
+      this.senses?.take(frame);
+      this.showSense();
       if (this.autoscale !== null) this.autoscale = Math.max(this.autoscale, this.largestPressure());
     }
     if (frame.pose) this.pose(frame.pose);
@@ -168,6 +189,38 @@ export class Model extends Reported {
       this.tell("samples");
     }
     this.tell("frame");
+  }
+
+  /**
+   * Shows fields in a letter, and taxels in what that reads.
+   * @param {string | null} letter
+   */
+  setLetter(letter) {
+    const { welcome } = this;
+    if (!welcome) return;
+    const sense = welcome.fields.find((field) => field.letter === letter)?.sense ?? "pressure";
+    if (letter !== this.letter) this.smallestFields = null;
+    this.letter = letter;
+    if (sense === this.sense) return;
+    this.sense = sense;
+    if (sense !== "pressure" && sense !== "shear") this.autoscale = null;
+    const { senses } = welcome;
+    if (senses)
+      welcome.colours =
+        sense === "temperature"
+          ? senses.temperature_colours
+          : sense === "proximity"
+            ? senses.distance_colours
+            : this.pressureColours;
+    this.showSense();
+    this.tell("scale");
+  }
+
+  /** Colours taxels by what is shown of them. */
+  showSense() {
+    if (!this.senses) return;
+    const { values, health } = this.senses.shown(this.sense);
+    [this.pressure, this.health] = [values, health];
   }
 
   /** @param {import("./wire.js").Touch[]} touches */
@@ -256,6 +309,8 @@ export class Model extends Reported {
     switch (message.type) {
       case "scale":
         this.scale = { max: message.max, from: message.from };
+        if (this.senses && message.senses) this.senses.scales = message.senses;
+        this.showSense();
         break;
       case "status":
         this.status = message;

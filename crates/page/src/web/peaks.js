@@ -37,7 +37,7 @@ export class Peaks extends Observed {
 
   /** @param {boolean} isOn */
   show(isOn) {
-    if (isOn === this.isOn) return;
+    if (isOn === this.isOn || (isOn && this.model.sense !== "pressure")) return;
     this.isOn = isOn;
     if (!isOn) this.model.showPeaks(null);
     this.ask();

@@ -1,5 +1,6 @@
 /** Marks over the picture: of touches their place, id, load, normal, axis, motion and trail; of fields; of self-contacts. */
 
+import { drawArrows, hasArrows } from "./arrows.js";
 import { cssColour, fitCanvas, paletteColour } from "./dom.js";
 import { add, dot, scale, subtract, toWorld } from "./math.js";
 import { axisEllipse, motionArrow, onPlane, orientationLine, tangentPlane, touchInWorld } from "./places.js";
@@ -43,7 +44,8 @@ export class Marks {
     const selfContacts = choices.marks === "none" ? [] : model.selfContacts.list;
     this.places = [];
     const { length: measured } = this.measure.places;
-    const drawn = choices.ids || marked.length + touches.length + selfContacts.length + measured > 0;
+    const drawn =
+      choices.ids || hasArrows(model) || marked.length + touches.length + selfContacts.length + measured > 0;
     if (!drawn && !this.drawn) return;
     this.drawn = drawn;
     const fitted = fitCanvas(this.canvas);
@@ -54,6 +56,7 @@ export class Marks {
     /** @type {Label[]} */
     const labels = [];
     if (choices.ids) this.ids.draw(context, () => this.draw());
+    if (choices.taxels) drawArrows(context, model, camera);
     for (const touch of touches) this.touch(context, touch, labels);
     for (const field of marked) {
       const plane = tangentPlane(model, field);

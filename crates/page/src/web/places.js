@@ -1,7 +1,7 @@
 /** Where percepts and taxels are, in the world and in charts. */
 
 import { add, cross, dot, scale, subtract, toWorld, unit } from "./math.js";
-import { IN_WORLD_BIT, NO_LINK } from "./wire.js";
+import { NO_LINK } from "./wire.js";
 
 /** @typedef {import("./model.js").Model} Model */
 /** @typedef {import("./math.js").Vec3} Vec3 */
@@ -49,10 +49,7 @@ export function touchInWorld(model, touch) {
  * @param {ArrayLike<number>} position
  */
 export function positionInWorld(model, field, position) {
-  const k = model.inContact.get(field);
-  const present = k === undefined ? 0 : (model.percepts?.present[k] ?? 0);
-  const inWorld = (present >>> IN_WORLD_BIT) & 1;
-  const link = inWorld ? NO_LINK : (model.welcome?.fields[field].link ?? NO_LINK);
+  const link = model.isInWorld(field) ? NO_LINK : (model.welcome?.fields[field].link ?? NO_LINK);
   return toWorld(model.rows, link, position, 1);
 }
 
@@ -66,7 +63,7 @@ export function tangentPlane(model, field) {
   const about = model.welcome?.fields[field];
   if (!position || !about) return null;
   const point = positionInWorld(model, field, position);
-  const inWorld = ((model.percepts?.present[model.inContact.get(field) ?? 0] ?? 0) >>> IN_WORLD_BIT) & 1;
+  const inWorld = model.isInWorld(field);
   const measured = model.value(field, "normal");
   const { chart } = about;
   const normal = measured

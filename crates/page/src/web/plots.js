@@ -44,6 +44,8 @@ export class Plots {
     this.series = [];
     /** Whether the fields that are touched are plotted: until somebody chooses what is. */
     this.follows = true;
+    /** The column of which these are plotted. */
+    this.followed = "";
     /** How hard each of the plotted fields was pressed at most. @type {Map<number, number>} */
     this.mostLoads = new Map();
     /** Series by the number of the `series` message that asked for them. @type {Series[][]} */
@@ -111,10 +113,12 @@ export class Plots {
     const { model } = this;
     const column = model.plottedColumn;
     if (!this.follows || !column) return;
+    if (this.followed !== column) this.mostLoads.clear();
+    this.followed = column;
     const components = model.welcome?.columns.find((c) => c.name === column)?.components ?? 1;
     const before = [...this.mostLoads.keys()].join();
     for (const field of touched.slice(0, FOLLOWED_MAX)) {
-      const load = model.load(field);
+      const load = model.strength(field);
       const most = this.mostLoads.get(field);
       if (most !== undefined) this.mostLoads.set(field, Math.max(most, load));
       else if (this.mostLoads.size < FOLLOWED_MAX) this.mostLoads.set(field, load);
@@ -322,7 +326,7 @@ export class Plots {
     close.title = "Take this line away";
     close.addEventListener("click", () => this.remove(s));
     chip.title = field?.name ?? "";
-    chip.append(swatch, make("span", "", `${field?.label ?? ""}${this.labelOf(s)}`), close);
+    chip.append(swatch, make("span", "", `${field?.name ?? ""}${this.labelOf(s)}`), close);
     return chip;
   }
 

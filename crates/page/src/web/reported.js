@@ -3,7 +3,7 @@
 import { Observed } from "./dom.js";
 import { withUnit } from "./format.js";
 import { REASONS } from "./reasons.js";
-import { IN_WORLD_BIT } from "./wire.js";
+import { IN_WORLD_BIT, isPresent } from "./wire.js";
 
 export class Reported extends Observed {
   constructor() {
@@ -18,6 +18,8 @@ export class Reported extends Observed {
     this.inContact = new Map();
     /** Whether the area of any taxel is known. */
     this.hasAreas = true;
+    /** What is shown of taxels and fields. @type {import("./senses.js").Sense} */
+    this.sense = "pressure";
   }
 
   /**
@@ -51,7 +53,7 @@ export class Reported extends Observed {
     const index = this.columnIndex.get(column);
     if (k === undefined || index === undefined || !this.percepts || !this.welcome) return null;
     const values = this.percepts.columns.get(index);
-    if (!values || !((this.percepts.present[k] >>> index) & 1)) return null;
+    if (!values || !isPresent(this.percepts, k, index)) return null;
     const components = this.welcome.columns[index].components;
     return values.subarray(k * components, (k + 1) * components);
   }
@@ -63,16 +65,29 @@ export class Reported extends Observed {
    */
   forPeople(field, column) {
     const value = this.value(field, column);
-    const present = this.percepts?.present[this.inContact.get(field) ?? 0] ?? 0;
-    if (!value || column !== "position" || !((present >>> IN_WORLD_BIT) & 1)) return value;
+    if (!value || column !== "position" || !this.isInWorld(field)) return value;
     return value.map((x, i) => x + (this.welcome?.origin[i] ?? 0));
   }
 
   /**
+   * Whether a field in contact has its places in the world.
+   * @param {number} field
+   */
+  isInWorld(field) {
+    const k = this.inContact.get(field);
+    return k !== undefined && !!this.percepts && isPresent(this.percepts, k, IN_WORLD_BIT);
+  }
+
+  /**
    * The column that says how hard a field is pressed: its force where that is computed and can be known, else the sum of its pressures, else the
-   * highest of them; null where the run computes none of these.
+   * highest of them; null where the run computes none of these. Of another sense what it reads first: the tangential force, the mean
+   * temperature, the least distance.
    */
   get loadColumn() {
+    if (this.sense !== "pressure") {
+      const first = { shear: "shear_vector", temperature: "temperature", proximity: "nearest" }[this.sense];
+      return this.columnIndex.has(first) ? first : null;
+    }
     // Counts have no unit, and pressures without areas make no force.
     const isKnown = this.quantity === "Pa" ? this.hasAreas : this.quantity !== "count";
     if (this.columnIndex.has("force") && isKnown) return "force";
@@ -81,20 +96,34 @@ export class Reported extends Observed {
 
   /** Its unit. */
   get loadUnit() {
+    if (this.sense === "temperature") return "°C";
+    if (this.sense === "proximity") return "m";
     return this.loadColumn === "force" ? "N" : "P";
   }
 
   /** The column that is plotted first: how hard fields are pressed, or where that is not computed the run's first output. */
   get plottedColumn() {
+    if (this.sense === "shear" && this.columnIndex.has("friction")) return "friction";
     return this.loadColumn ?? this.welcome?.columns[0]?.name ?? null;
   }
 
   /**
-   * How hard a field is pressed; 0 where that is absent.
+   * How hard a field is pressed, or what else it reads; 0 where that is absent.
    * @param {number} field
    */
   load(field) {
-    return (this.loadColumn && this.value(field, this.loadColumn)?.[0]) || 0;
+    const value = this.loadColumn && this.value(field, this.loadColumn);
+    if (!value) return 0;
+    return (value.length > 1 ? Math.hypot(...value) : value[0]) || 0;
+  }
+
+  /**
+   * How much a field says: its load, or of distances how near something is.
+   * @param {number} field
+   */
+  strength(field) {
+    const load = this.load(field);
+    return this.sense === "proximity" && load > 0 ? 1 / load : load;
   }
 
   /**
@@ -104,7 +133,7 @@ export class Reported extends Observed {
   loadText(field) {
     if (!this.loadColumn) return "touched";
     const value = this.value(field, this.loadColumn);
-    return value ? withUnit(value[0], this.loadUnit, this.quantity) : "–";
+    return value ? withUnit(this.load(field), this.loadUnit, this.quantity) : "–";
   }
 
   /**

@@ -37,7 +37,7 @@ export class RestPanel {
     setText(this.count, `${mesh.taxelId.length} taxels`);
     const rows = [
       ["links", String(welcome.links.length)],
-      ["fields", String(welcome.fields.length)],
+      ["fields", String(new Set(welcome.fields.map((field) => field.name)).size)],
       ["spacing", `median ${withUnit(middle, "m", "")}, least ${withUnit(spacing[0], "m", "")}`],
     ];
     const findings = model.events.filter((event) => event.kind === "notice").map((event) => event.text);

@@ -41,7 +41,7 @@ export class Connection {
     this.toDraw = [];
     /** Called after `welcome` and the mesh. */
     this.onScene = () => {};
-    this.scene = { taxels: 0, links: 0, components: /** @type {number[]} */ ([]) };
+    this.scene = { taxels: 0, pulled: 0, links: 0, components: /** @type {number[]} */ ([]) };
     this.heard = performance.now();
     this.saidAfter = /** @type {number | null} */ (null);
     this.timer = 0;
@@ -155,6 +155,7 @@ export class Connection {
         const mesh = decodeMesh(buffer);
         this.scene = {
           taxels: mesh.taxelId.length,
+          pulled: model.welcome?.senses?.shear.length ?? 0,
           links: mesh.restPose.length / 7,
           components: model.welcome?.columns.map((column) => column.components) ?? [],
         };

@@ -3,11 +3,11 @@
  * Nothing here touches the document, so it runs under node too.
  */
 
-export const VERSION = 4;
+export const VERSION = 5;
 /** Index of "no link": the world. */
 export const NO_LINK = 0xffffffff;
 /** Bit of a percept's `present`: its position is in the world, not in the frame of a link. */
-export const IN_WORLD_BIT = 31;
+export const IN_WORLD_BIT = 63;
 /** States of a board: those of `BoardState` in Rust, in its order and words. */
 export const BOARD_STATES = ["awaited", "speaking", "silent", "unplugged"];
 /** The state of a board that sends frames. */
@@ -26,20 +26,21 @@ export const HEALTH = [
 
 /**
  * @typedef {{kind: "plane" | "geodesic", origin: number[], u: number[], v: number[], normal: number[], uv: number[][]}} Chart
- * @typedef {{name: string, letter: string | null, label: string, parent: number | null, link: number, members: number[],
+ * @typedef {{name: string, letter: string | null, sense: import("./senses.js").Sense, label: string, parent: number | null, link: number, members: number[],
  *   weights: number[] | null, chart: Chart | null, no_chart: string | null}} Field
- * @typedef {{name: string, unit: string, components: number, help: string}} Column
+ * @typedef {{name: string, unit: string, components: number, help: string, sense: import("./senses.js").Sense}} Column
  * @typedef {{max: number, from: string}} Scale
  * @typedef {{type: "welcome", version: number, somatic: string, run: string, mode: "recording" | "live", body: string,
  *   source: string, backend: {name: string, device: string, why: string}, quantity: string, scale: Scale,
  *   time: {start_s: number, end_s: number, frames: number} | null, origin: number[],
  *   links: {name: string, parent: number | null}[], channels: ([string | number, number] | null)[] | null, fields: Field[],
  *   columns: Column[], flags: (string | null)[], touches: boolean, touch_flags: (string | null)[], self_contacts: boolean,
- *   colours: number[][]}} Welcome
+ *   colours: number[][], senses: import("./senses.js").SensesOfWelcome | null}} Welcome
  * @typedef {{position: Float32Array, normal: Float32Array, link: Uint32Array, corners: Uint32Array, taxelId: Uint32Array,
  *   taxelLink: Uint32Array, taxelPosition: Float32Array, taxelNormal: Float32Array, taxelRadius: Float32Array,
  *   taxelArea: Float32Array, restPose: Float32Array}} Mesh
  * @typedef {{field: Uint32Array, flags: Uint32Array, present: Uint32Array, columns: Map<number, Float32Array>}} Percepts
+ *   `present` has two words a percept, the lower bits first
  * @typedef {{index: number, share: number}} Share
  * @typedef {{ago: number, frame: number, position: number[]}} TrailPoint
  * @typedef {{id: number, link: number, frame: number, flags: number, active: number, age: number, total: number, force: number,
@@ -51,7 +52,7 @@ export const HEALTH = [
  * @typedef {{known: boolean, list: SelfContact[]}} SelfContacts
  * @typedef {{answers: number, t: Float64Array, values: Float32Array[]}} Samples
  * @typedef {{seq: number, frame: number, t: number, skipped: number, p50: number, p99: number, newestEvent: number,
- *   engineMicroseconds: number, pressure: Float32Array | null, health: Uint8Array | null, pose: Float32Array | null,
+ *   engineMicroseconds: number, pressure: Float32Array | null, health: Uint8Array | null, shear: Float32Array | null, pose: Float32Array | null,
  *   percepts: Percepts | null, touches: Touch[] | null, selfContacts: SelfContacts | null, samples: Samples | null}} Frame
  * @typedef {{id: number, from: number, to: number, bins: number, least: Float32Array[], most: Float32Array[]}} History
  * @typedef {{id: number, from: number, to: number, peaks: Float32Array}} PeakMap
@@ -153,17 +154,21 @@ const PERCEPTS = 4;
 const TOUCHES = 8;
 const SERIES = 16;
 const SELF_CONTACTS = 32;
+const SHEARS = 64;
+/** Bytes of a frame's head. */
+const HEAD_BYTES = 72;
 /** In place of the number of self-contacts that are not known. */
 const UNKNOWN = 0xffffffff;
 
 /**
  * @param {ArrayBuffer} buffer
- * @param {{taxels: number, links: number, components: number[]}} scene numbers of taxels and links, components by column
+ * @param {{taxels: number, pulled?: number, links: number, components: number[]}} scene numbers of taxels, of those with three axes,
+ *   and of links; components by column
  * @returns {Frame}
  */
 export function decodeFrame(buffer, scene) {
   const view = new DataView(buffer);
-  if (view.byteLength < 64) throw new Error("The frame is too short.");
+  if (view.byteLength < HEAD_BYTES) throw new Error("The frame is too short.");
   const sections = view.getUint16(2, true);
   const [fields, touches, samples] = [36, 40, 44].map((at) => view.getUint32(at, true));
   /** @type {Frame} */
@@ -178,18 +183,20 @@ export function decodeFrame(buffer, scene) {
     engineMicroseconds: view.getFloat32(56, true),
     pressure: null,
     health: null,
+    shear: null,
     pose: null,
     percepts: null,
     touches: null,
     selfContacts: null,
     samples: null,
   };
-  const from = new Reader(buffer, 64);
+  const from = new Reader(buffer, HEAD_BYTES);
   if (sections & PRESSURE) {
     frame.pressure = from.f32(scene.taxels);
     frame.health = from.u8(scene.taxels);
     from.pad();
   }
+  if (sections & SHEARS) frame.shear = from.f32(2 * (scene.pulled ?? 0));
   if (sections & POSE) {
     frame.pose = from.f32(7 * scene.links);
     from.pad();
@@ -198,12 +205,13 @@ export function decodeFrame(buffer, scene) {
     frame.percepts = {
       field: from.u32(fields),
       flags: from.u32(fields),
-      present: from.u32(fields),
+      present: from.u32(2 * fields),
       columns: new Map(),
     };
-    const carried = view.getUint32(52, true);
+    const carried = [64, 68].map((at) => view.getUint32(at, true));
     scene.components.forEach((components, column) => {
-      if ((carried >>> column) & 1) frame.percepts?.columns.set(column, from.f32(components * fields));
+      if ((carried[column >>> 5] >>> (column & 31)) & 1)
+        frame.percepts?.columns.set(column, from.f32(components * fields));
     });
     from.pad();
   }
@@ -225,9 +233,19 @@ export function decodeFrame(buffer, scene) {
     // The last section: as many series as fit, but padding of one f32 may look like one more sample.
     const count = samples ? Math.floor((buffer.byteLength - from.offset) / (4 * samples)) : 0;
     for (let i = 0; i < count; i++) values.push(from.f32(samples));
-    frame.samples = { answers: view.getUint32(60, true), t, values };
+    frame.samples = { answers: view.getUint32(52, true), t, values };
   }
   return frame;
+}
+
+/**
+ * Whether a bit of a percept's `present` is set: that of a column, or `IN_WORLD_BIT`.
+ * @param {Percepts} percepts
+ * @param {number} k which of them
+ * @param {number} bit
+ */
+export function isPresent({ present }, k, bit) {
+  return ((present[2 * k + (bit >>> 5)] >>> (bit & 31)) & 1) === 1;
 }
 
 /**

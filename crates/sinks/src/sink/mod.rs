@@ -199,6 +199,8 @@ pub struct InputFrames<'a> {
     pub plan: &'a Plan,
     /// The values that the last frame's percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
     pub values_read: Option<&'a [RawValue]>,
+    /// The values that its letters beside pressure are made of ([`Engine::values_sensed`](somatic_engine::Engine::values_sensed)).
+    pub values_sensed: &'a [RawValue],
     /// When the last frame arrived, if known.
     pub arrived: Option<Instant>,
     /// How long the engine's call took.

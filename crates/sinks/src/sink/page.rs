@@ -34,6 +34,7 @@ impl PageSink {
             taxels: session.taxels,
             wiring: session.wiring,
             recorded_max: None,
+            recorded_senses: Default::default(),
         };
         let (server, publisher) = Server::start(listen, PageScene::new(body, plan, &info))?;
         plain::announce(&server.announcement());
@@ -53,6 +54,7 @@ impl Sink for PageSink {
             self.publisher.read(&PageInput {
                 frame,
                 values_read: input.values_read,
+                values_sensed: input.values_sensed,
                 plan: input.plan,
                 arrived: input.arrived,
                 call_us: input.call.as_secs_f32() * 1e6 / input.frames.len() as f32,

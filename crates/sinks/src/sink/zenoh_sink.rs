@@ -228,6 +228,7 @@ mod tests {
             pressures: &|_, _| (),
             plan: engine.plan(),
             values_read: None,
+            values_sensed: &[],
             arrived: None,
             call: Duration::ZERO,
         };

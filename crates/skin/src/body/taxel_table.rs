@@ -11,8 +11,12 @@ use super::model::{Body, Modality};
 use crate::error::{Error, Result, failed};
 use crate::limits::MAX_TAXELS;
 
-/// The columns that a table may have, in the order in which they are written.
-const COLUMNS: [&str; 10] = ["id", "link", "x", "y", "z", "nx", "ny", "nz", "area", "modality"];
+/// The columns that a table may have, in the order in which they are written; the last three only where a taxel has a tangent.
+const COLUMNS: [&str; 13] =
+    ["id", "link", "x", "y", "z", "nx", "ny", "nz", "area", "modality", TANGENT[0], TANGENT[1], TANGENT[2]];
+
+/// The columns of a taxel's tangent.
+const TANGENT: [&str; 3] = ["tx", "ty", "tz"];
 
 /// Maximum area of a taxel, m²; larger ones are in another unit.
 const MAX_TAXEL_AREA_M2: f64 = 1.0;
@@ -34,10 +38,12 @@ pub struct TaxelRow {
     pub area_m2: Option<f64>,
     /// What it measures, if given.
     pub modality: Option<Modality>,
+    /// The unit direction along which the second value of a taxel with three axes is, if given.
+    pub tangent: Option<DVec3>,
 }
 
-/// Reads a table with the columns `id`, `x`, `y` and `z`, and optionally `link`, `nx`, `ny`, `nz`, `area` and `modality`; a
-/// `flat` one may leave out `z`. Ids are unique for each link if `flat`, else in all of the table.
+/// Reads a table with the columns `id`, `x`, `y` and `z`, and optionally `link`, `nx`, `ny`, `nz`, `area`, `modality`, `tx`, `ty`
+/// and `tz`; a `flat` one may leave out `z`. Ids are unique for each link if `flat`, else in all of the table.
 ///
 /// # Errors
 /// It is not such a table; with the line.
@@ -81,6 +87,7 @@ struct Columns {
     link: Option<usize>,
     area: Option<usize>,
     modality: Option<usize>,
+    tangent: Option<[usize; 3]>,
 }
 
 impl Columns {
@@ -100,15 +107,16 @@ impl Columns {
             })
         };
         let z = if flat { column("z") } else { Some(needed("z")?) };
-        let normal = match [column("nx"), column("ny"), column("nz")] {
-            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
-            [None, None, None] => None,
-            _ => return Err(Error::failed("a normal has three columns, nx, ny and nz; add those that are missing")),
+        let direction = |what: &str, names: [&str; 3]| match names.map(column) {
+            [Some(x), Some(y), Some(z)] => Ok(Some([x, y, z])),
+            [None, None, None] => Ok(None),
+            _ => Err(failed!("a {what} has three columns, {}; add those that are missing", names.join(", "))),
         };
         Ok(Self {
             id: needed("id")?,
             place: [Some(needed("x")?), Some(needed("y")?), z],
-            normal,
+            normal: direction("normal", ["nx", "ny", "nz"])?,
+            tangent: direction("tangent", TANGENT)?,
             link: column("link"),
             area: column("area"),
             modality: column("modality"),
@@ -127,24 +135,30 @@ impl Columns {
             failed!("`{}` is not an id; ids are whole numbers from 0 to {MAX_TAXEL_ID}", cell(self.id))
         })?;
         let [x, y, z] = self.place.map(|column| column.map_or(Ok(0.0), number));
-        let normal = match self.normal {
+        let direction = |what: &str, columns: Option<[usize; 3]>| match columns {
             Some([x, y, z]) if [x, y, z].iter().any(|&column| !cell(column).is_empty()) => {
-                let normal = DVec3::new(number(x)?, number(y)?, number(z)?);
+                let direction = DVec3::new(number(x)?, number(y)?, number(z)?);
                 // What is a unit vector to the digits of single precision stays as it is written.
-                let is_unit = (normal.length_squared() - 1.0).abs() < 1e-6;
-                let unit = if is_unit { Some(normal) } else { normal.try_normalize() };
-                Some(unit.ok_or_else(|| Error::failed("its normal is zero; give a direction, or leave it blank"))?)
+                let is_unit = (direction.length_squared() - 1.0).abs() < 1e-6;
+                let unit = if is_unit { Some(direction) } else { direction.try_normalize() };
+                unit.map(Some).ok_or_else(|| failed!("its {what} is zero; give a direction, or leave it blank"))
             }
-            _ => None,
+            _ => Ok(None),
         };
+        let modality = given(self.modality).map(modality_of).transpose()?;
+        let tangent = direction("tangent", self.tangent)?;
+        if let Some(known) = modality.filter(|&known| tangent.is_some() && known != Modality::Force3) {
+            return Err(failed!("it measures {} and has a tangent; leave that blank, or write force3", known.name()));
+        }
         Ok(TaxelRow {
             line,
             id,
             link: given(self.link).map(str::to_owned),
             position: DVec3::new(x?, y?, z?),
-            normal,
+            normal: direction("normal", self.normal)?,
             area_m2: given(self.area).map(area_of).transpose()?,
-            modality: given(self.modality).map(modality_of).transpose()?,
+            modality,
+            tangent,
         })
     }
 }
@@ -156,14 +170,20 @@ fn area_of(text: &str) -> Result<f64> {
 
 fn modality_of(text: &str) -> Result<Modality> {
     let other = text.strip_prefix("modality ").and_then(|code| code.parse().ok()).map(Modality::from_code);
-    let known = (0..3).map(Modality::from_code).find(|known| known.name().eq_ignore_ascii_case(text));
-    known.or(other).ok_or_else(|| failed!("there is no modality `{text}`; write pressure, temperature or proximity"))
+    let known = (0..4).map(Modality::from_code).find(|known| known.name().eq_ignore_ascii_case(text));
+    known.or(other).ok_or_else(|| {
+        let names: Vec<&str> = Modality::names().collect();
+        failed!("there is no modality `{text}`; write one of {}", names.join(", "))
+    })
 }
 
-/// The taxels of `body` as a table with all columns: places and normals in the frames of their links, an unknown area blank.
+/// The taxels of `body` as a table with all columns: places, normals and tangents in the frames of their links, an unknown area
+/// blank. Tangents have columns where a taxel has one.
 #[must_use]
 pub fn taxel_table(body: &Body) -> String {
-    let mut text = COLUMNS.join(",") + "\n";
+    let has_tangents = body.taxels.iter().any(|taxel| taxel.tangent_in_link.is_some());
+    let shown = if has_tangents { COLUMNS.len() } else { COLUMNS.len() - TANGENT.len() };
+    let mut text = COLUMNS[..shown].join(",") + "\n";
     for taxel in &body.taxels {
         let link = quoted(&body.links[taxel.link].name);
         let _ = write!(text, "{},{link}", taxel.id);
@@ -172,7 +192,16 @@ pub fn taxel_table(body: &Body) -> String {
             let _ = write!(text, ",{}", x + 0.0);
         }
         let area = if taxel.area > 0.0 { taxel.area.to_string() } else { String::new() };
-        let _ = writeln!(text, ",{area},{}", taxel.modality.name());
+        let _ = write!(text, ",{area},{}", taxel.modality.name());
+        if has_tangents {
+            match taxel.tangent_in_link {
+                Some(tangent) => tangent.to_array().into_iter().for_each(|x| {
+                    let _ = write!(text, ",{}", x + 0.0);
+                }),
+                None => text.push_str(",,,"),
+            }
+        }
+        text.push('\n');
     }
     text
 }
@@ -199,6 +228,11 @@ mod tests {
         let rows = read("id,x,y,z,nx,ny,nz,modality,link\n1,0,0,0,0,0,2,proximity,\"a, b\"\n").unwrap();
         let known = (rows[0].normal, rows[0].modality, rows[0].link.as_deref());
         assert_eq!(known, (Some(DVec3::Z), Some(Modality::Proximity), Some("a, b")));
+        let rows = read("id,x,y,z,modality,tx,ty,tz\n1,0,0,0,force3,0,2,0\n2,0,0,0,pressure,,,\n").unwrap();
+        assert_eq!(
+            (rows[0].modality, rows[0].tangent, rows[1].tangent),
+            (Some(Modality::Force3), Some(DVec3::Y), None)
+        );
         let flat = read_taxel_table("id,x,y,link\n1,0,0,left\n1,0,0,right\n".as_bytes(), true).unwrap();
         assert_eq!((flat.len(), flat[1].position), (2, DVec3::ZERO));
     }
@@ -214,6 +248,10 @@ mod tests {
         assert!(why("id,x,y,z,area\n1,0,0,0,25\n").contains("line 2: `25` is not an area"));
         assert!(why("id,x,y,z,nx,ny,nz\n1,0,0,0,0,0,0\n").contains("its normal is zero"));
         assert!(why("id,x,y,z,modality\n1,0,0,0,taste\n").contains("no modality `taste`"));
+        assert!(why("id,x,y,z,tx\n1,0,0,0,1\n").contains("a tangent has three columns, tx, ty"));
+        let tangent = "id,x,y,z,tx,ty,tz,modality\n1,0,0,0";
+        assert!(why(&format!("{tangent},0,0,0,force3\n")).contains("its tangent is zero"));
+        assert!(why(&format!("{tangent},0,1,0,temperature\n")).contains("it measures temperature and has a tangent"));
         assert!(why("id,x,y,z\n").contains("no rows"));
     }
 }

@@ -182,6 +182,26 @@ impl Default for ShearCalibration {
     }
 }
 
+impl ShearCalibration {
+    /// P for each raw unit of the tangential forces of the body's taxel `taxel`, whose normal force has a `gain` and is in a unit of
+    /// which P has `unit_factor`.
+    #[must_use]
+    pub fn gain_of(&self, taxel: usize, gain: f64, unit_factor: f64) -> f64 {
+        // A gain of its own is in the file's unit, as the normal one was before it came into N or Pa.
+        let own = self.own_gains.get(&taxel).copied().or(self.gain);
+        own.map_or(gain.abs(), |own| own * unit_factor)
+    }
+
+    /// The forces along t and n × t, in the unit of P, that the body's taxel `taxel` feels under `pressure` with the raw values
+    /// `tangential`, each with `gain` ([`ShearCalibration::gain_of`]).
+    #[must_use]
+    pub fn forces(&self, taxel: usize, gain: f64, pressure: f64, tangential: [f64; 2]) -> [f64; 2] {
+        let rest = self.own_baselines.get(&taxel).copied().unwrap_or(self.baselines);
+        let [u, v] = [0, 1].map(|axis| gain * (tangential[axis] - rest[axis]));
+        self.cross_axis.map(|[of_p, of_u, of_v]| of_p * pressure + of_u * u + of_v * v)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,0 +1,32 @@
+//! What the live table says of fields that are not read as pressures.
+
+use somatic::Percept;
+
+use crate::cli::words::{millimetres, number};
+
+/// What `percept` says in a letter of temperature, proximity or shear; `None` in one of pressure. Forces are times `factor` in `unit`.
+pub(super) fn said(percept: &Percept, factor: f64, unit: &str) -> Option<String> {
+    let parts = if let Some(celsius) = percept.temperature {
+        let range = percept.coldest.zip(percept.warmest);
+        vec![
+            Some(format!("{celsius:.1} °C")),
+            range.map(|(coldest, warmest)| format!("from {coldest:.1} to {warmest:.1}")),
+            percept.temperature_rate.map(|rate| format!("{rate:+.2} K/s")),
+        ]
+    } else if let Some(nearest) = percept.nearest {
+        vec![
+            Some(format!("{} mm away", millimetres(nearest))),
+            percept.covered.map(|covered| format!("near {covered}")),
+            percept.approach_speed.map(|speed| format!("{:+.0} mm/s nearer", (speed * 1e3).round() + 0.0)),
+        ]
+    } else {
+        let force = percept.shear_vector.map(|force| force.iter().map(|x| x * x).sum::<f64>().sqrt());
+        vec![
+            force.map(|force| format!("shear {} {unit}", number(force * factor)).trim_end().to_owned()),
+            percept.shear_direction.map(|direction| format!("at {:.0}°", direction.to_degrees())),
+            percept.friction.map(|friction| format!("friction {friction:.2}")),
+        ]
+    };
+    let said: Vec<String> = parts.into_iter().flatten().collect();
+    (!said.is_empty()).then(|| said.join("  "))
+}
