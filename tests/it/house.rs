@@ -92,7 +92,19 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("plot", vec!["error", "percept", "signal", "body", "field", "scene", "engine", "ink", "colours"]),
         (
             "run",
-            vec!["error", "percept", "signal", "body", "engine", "source", "sink", "output", "scene_file", "setup"],
+            vec![
+                "error",
+                "percept",
+                "signal",
+                "body",
+                "engine",
+                "recording",
+                "source",
+                "sink",
+                "output",
+                "scene_file",
+                "setup",
+            ],
         ),
         (
             "setup",

@@ -5,6 +5,7 @@
 //! have is named once, and its values are skipped and counted. Lines are parsed directly into the frame.
 
 mod key;
+mod value;
 
 use std::collections::HashMap;
 use std::fmt;
@@ -16,6 +17,7 @@ use glam::{DQuat, DVec3};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use self::key::{EXAMPLE, Key, KeyVisitor};
+use self::value::{Given, ValueVisitor};
 use super::Source;
 use super::csv::is_csv_row;
 use super::skipped_bad::SkippedBad;
@@ -277,7 +279,7 @@ impl<'de> Visitor<'de> for ValuesVisitor<'_> {
             if std::mem::replace(&mut self.taxels.last_line[index], self.line) == self.line {
                 return Err(A::Error::custom(format!("taxel {} appears twice; give each taxel once", Channel(id))));
             }
-            match map.next_value_seed(Parse(ValueVisitor { id }))? {
+            match map.next_value_seed(ValueVisitor { id })? {
                 Given::One(value) => self.frame.values[index] = value,
                 Given::Three(values) => self.take_three(id, values).map_err(A::Error::custom)?,
             }
@@ -307,13 +309,6 @@ impl ValuesVisitor<'_> {
     }
 }
 
-/// What a taxel has in a line.
-enum Given {
-    One(RawValue),
-    /// Along the normal, t and n × t.
-    Three([RawValue; 3]),
-}
-
 struct IdVisitor;
 
 impl Visitor<'_> for IdVisitor {
@@ -327,60 +322,6 @@ impl Visitor<'_> for IdVisitor {
         Channel::named(key).map(|channel| channel.0).ok_or_else(|| {
             E::custom(format!("`{key}` is not a taxel id; ids are whole numbers in quotes, as in {EXAMPLE}"))
         })
-    }
-}
-
-struct ValueVisitor {
-    id: u32,
-}
-
-impl<'de> Visitor<'de> for ValueVisitor {
-    type Value = Given;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a number, null, \"nan\" or \"inf\" for taxel {}", Channel(self.id))
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<Given, E> {
-        Ok(Given::One(RawValue::new(value)))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<Given, E> {
-        Ok(Given::One(RawValue::new(value as f64)))
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<Given, E> {
-        Ok(Given::One(RawValue::new(value as f64)))
-    }
-
-    fn visit_unit<E>(self) -> Result<Given, E> {
-        Ok(Given::One(RawValue::MISSING))
-    }
-
-    fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Given, E> {
-        let unsigned = word.strip_prefix('-').unwrap_or(word);
-        if unsigned.eq_ignore_ascii_case("nan") || unsigned.eq_ignore_ascii_case("inf") {
-            return Ok(Given::One(RawValue::FAULTY));
-        }
-        Err(E::custom(format!(
-            "taxel {} is `{word}`; give a number without quotes, null where it is missing, \"nan\" where it is faulty",
-            Channel(self.id)
-        )))
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Given, A::Error> {
-        let wrong = || {
-            let name = Channel(self.id);
-            A::Error::custom(format!("taxel {name} has an array; give one number, or three: along its normal, u and v"))
-        };
-        let mut values = [RawValue::MISSING; 3];
-        for value in &mut values {
-            let Some(Given::One(own)) = seq.next_element_seed(Parse(ValueVisitor { id: self.id }))? else {
-                return Err(wrong());
-            };
-            *value = own;
-        }
-        if seq.next_element::<IgnoredAny>()?.is_some() { Err(wrong()) } else { Ok(Given::Three(values)) }
     }
 }
 
