@@ -116,7 +116,7 @@ pub struct SceneFile {
     pub overwrite: bool,
 
     /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
-    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and those of other taxels].
+    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and letters of other taxels].
     #[serde(deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub letters: Vec<Receptor>,

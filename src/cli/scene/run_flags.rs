@@ -84,7 +84,7 @@ pub(in crate::cli) struct RunFlags {
     pub(in crate::cli) overwrite: bool,
 
     /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
-    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and those of other taxels].
+    /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and letters of other taxels].
     #[arg(long, help_heading = COMPUTED, value_name = "LETTER,...", value_delimiter = ',',
         value_parser = one_of::<Receptor>(&["sustained", "change", "shear", "temperature", "proximity"]))]
     pub(in crate::cli) letters: Vec<Receptor>,

@@ -317,7 +317,7 @@ mod tests {
         let source = read(apart, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
         assert_eq!(source.taxels(), ["9.u", "4.u", "9.v", "4.v", "9", "4"].map(named));
         let why = read("values = 'a'\naxes = 'uvn'", &[1.0; 5]).unwrap_err().to_string();
-        assert!(why.contains("given: axes: 5 values are not three for each taxel"), "{why}");
+        assert!(why.contains("axes: 5 values are not three for each taxel"), "{why}");
         let pressure =
             read("values = 'a'\naxes = 'uvn'", &[1.0; 6]).unwrap().for_body(&[4, 9]).unwrap_err().to_string();
         assert!(pressure.contains("a message has 2 taxels with three axes, and the body 0 taxels"), "{pressure}");

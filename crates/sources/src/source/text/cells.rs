@@ -286,6 +286,7 @@ mod tests {
         let mut found = Vec::new();
         let line = r#"{"1":{"model":"ABCD","data":"7FFF,8001"}}"#;
         json(line, Some(&decoded), &mut |path, cell| found.push(format!("{path}={cell:?}"))).unwrap();
+        found.sort();
         assert_eq!(found, ["1.data[0]=Number(32767.0)", "1.data[1]=Number(32769.0)", "1.model=Word(\"ABCD\")"]);
     }
 }
