@@ -326,6 +326,7 @@ pub(crate) fn calibrate(
 
 #[pyfunction]
 #[pyo3(name = "_gains")]
+#[expect(clippy::too_many_arguments, reason = "each is a keyword of Python")]
 pub(crate) fn gains(
     py: Python<'_>,
     body: &PyBody,

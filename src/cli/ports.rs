@@ -3,12 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use somatic::Result;
 use somatic::internal::scene_file::hertz;
 use somatic::scene::file::LineKeys;
-use somatic::source::SourceSpec;
-
-use super::scene::in_flags;
 
 /// How boards on serial lines are read.
 #[derive(Args, Clone, Debug, Default)]
@@ -33,12 +29,6 @@ pub(super) struct LineFlags {
 }
 
 impl LineFlags {
-    /// The lines that `sources` name, each with its speed in baud where one is given; none where they are not serial lines.
-    pub(super) fn lines(&self, sources: &[String]) -> Result<Vec<(String, Option<u32>)>> {
-        let sources = sources.iter().map(|text| text.parse()).collect::<Result<Vec<SourceSpec>>>()?;
-        self.keys().lines(&sources).map_err(in_flags)
-    }
-
     /// What a scene would say of them.
     pub(super) fn keys(&self) -> LineKeys {
         let mut keys = LineKeys::default();

@@ -14,12 +14,14 @@ use somatic::internal::setup::bodies::load_body;
 use somatic::internal::signal::{Axis, Channel};
 use somatic::internal::survey::tuning::{MAX_ROUNDS, Tuned, Tuning};
 use somatic::signal::{FsrCircuit, Wiring};
+use somatic::source::SourceSpec;
 use somatic::{Error, Result};
 
 use self::session::{PhaseEnd, PhaseLimit, TuningSession};
 use super::calibrate::name_of;
 use super::interrupt::stop_on_signal;
 use super::ports::LineFlags;
+use super::scene::in_flags;
 use super::stdio::{DONE, FAILED, print, say};
 
 const EXAMPLES: &str = "\
@@ -97,7 +99,8 @@ pub(super) fn tune(arguments: &Arguments) -> Result<u8> {
     let (Some(Some(rest)), None | Some(Some(_))) = (rest, press) else {
         return Err(Error::usage("--rest and --press must be over 0; give times such as 5s"));
     };
-    let ports = arguments.lines.lines(&arguments.sources)?;
+    let sources = arguments.sources.iter().map(|text| text.parse()).collect::<Result<Vec<SourceSpec>>>()?;
+    let ports = arguments.lines.keys().lines(&sources).map_err(in_flags)?;
     if ports.is_empty() {
         return Err(Error::usage("only boards on serial lines have potentiometers; give --source serial:PORT"));
     }

@@ -120,7 +120,7 @@ impl<'a> ChartPicture<'a> {
             slices,
             |place| colours[place],
             |labels| {
-                moment.legend().into_iter().for_each(|legend| labels.colours(Legend { note: String::new(), ..legend }))
+                moment.legend().into_iter().for_each(|legend| labels.colours(Legend { note: String::new(), ..legend }));
             },
         )
     }

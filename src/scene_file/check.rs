@@ -23,7 +23,8 @@ impl SceneFile {
             use SourceSpec::{Mcap, Modbus, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
             matches!(source, Mcap(_) | Modbus(_) | Ndjson(_) | Ros2 { .. } | Ros2Mcap(_) | Stdin | Text(_))
         };
-        if self.map.is_some() && !(!self.sources.is_empty() && self.sources.iter().all(has_messages)) {
+        let fits_none = self.sources.is_empty() || !self.sources.iter().all(has_messages);
+        if self.map.is_some() && fits_none {
             return Err(Error::usage(
                 "`map` is for ROS 2 bags and topics, NDJSON, lines of JSON, or Modbus; add `source = \"ros2-mcap:BAG\"`, or leave it out",
             ));

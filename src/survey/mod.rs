@@ -9,8 +9,8 @@
 //! chance explains: the steps from value to value tell how far chance goes, as what moves a sensor takes many values over
 //! its way.
 
-mod apart;
 mod at_rest;
+mod beside_pressure;
 pub mod crosstalk;
 mod figure;
 mod file;

@@ -63,7 +63,7 @@ fn what_taxels_measure_and_their_tangents_come_back_from_a_table() {
     let table = format!("id,link,x,y,z,nx,ny,nz,area,modality,tx,ty,tz\n{rows}");
     std::fs::write(at("skin.csv"), &table).unwrap();
     done(&["author", "--csv-skin", text_of(&at("skin.csv")), "-o", text_of(&at("skin.glb"))]);
-    let body = Body::load(&at("skin.glb")).unwrap();
+    let body = Body::load(at("skin.glb")).unwrap();
     assert_eq!(body.taxels[0].tangent_in_link, Some(glam::DVec3::Y));
     done(&["convert", text_of(&at("skin.glb")), text_of(&at("back.csv"))]);
     let back = std::fs::read_to_string(at("back.csv")).unwrap();

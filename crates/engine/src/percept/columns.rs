@@ -316,7 +316,7 @@ columns! {
     FRICTION 44 friction: f64, One, Number, shear, parts [] host [Friction];
     #[doc = "The standard deviation of the friction by the sensors' noise; only on request."]
     FRICTION_SIGMA 45 friction_sigma: f64, One, Number, shear, parts [] host [FrictionSigma];
-    #[doc = "Friction over that at which it slips ([shear] slips_at of the calibration): a slip begins at 0.95."]
+    #[doc = "Friction over that at which it slips, slips_at of the calibration: a slip begins at 0.95."]
     SLIP_RATIO 62 slip_ratio: f64, One, Number, shear, parts [] host [SlipRatio];
     #[doc = "Weighted mean of the temperatures, °C; of letter `temperature`, as the outputs down to temperature_rate."]
     TEMPERATURE 46 temperature: f64, Celsius, Number, temperature, parts [] host [Temperature];
@@ -334,7 +334,7 @@ columns! {
     COLDEST_POSITION 52 coldest_position: [f64; 3], Metre, Vector, temperature, parts [] host [ColdestPosition];
     #[doc = "How the temperature rises along u and v, by a plane of least squares, K/m."]
     TEMPERATURE_GRADIENT 53 temperature_gradient: [f64; 2], KelvinPerMetre, Vector, temperature, parts [] host [TemperatureGradient];
-    #[doc = "How fast the mean rises, by a line of least squares over [temperature] window_s, K/s."]
+    #[doc = "How fast the mean rises, by a line of least squares over window_s of the calibration, K/s."]
     TEMPERATURE_RATE 54 temperature_rate: f64, KelvinPerSecond, Number, temperature, parts [] host [TemperatureRate];
     #[doc = "The least distance, m; of letter `proximity`, as the outputs down to proximity_centroid."]
     NEAREST 55 nearest: f64, Metre, Number, proximity, parts [] host [Nearest];
@@ -344,7 +344,7 @@ columns! {
     NEAREST_POSITION 57 nearest_position: [f64; 3], Metre, Vector, proximity, parts [] host [NearestPosition];
     #[doc = "The outward unit normal there."]
     NEAREST_NORMAL 58 nearest_normal: [f64; 3], One, Vector, proximity, parts [] host [NearestNormal];
-    #[doc = "How fast the least distance falls, by a line of least squares over [proximity] window_s, m/s."]
+    #[doc = "How fast the least distance falls, by a line of least squares over window_s of the calibration, m/s."]
     APPROACH_SPEED 59 approach_speed: f64, MetrePerSecond, Number, proximity, parts [] host [ApproachSpeed];
     #[doc = "Number of taxels with something in range."]
     COVERED 60 covered: u32, One, Number, proximity, parts [] host [Covered];

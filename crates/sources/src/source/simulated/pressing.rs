@@ -19,8 +19,8 @@ use crate::error::Result;
 
 /// A touch of one link, or of the whole body.
 pub(super) enum Pressing {
-    Link(LinkTouch),
-    Body(TouchOfBody),
+    Link(Box<LinkTouch>),
+    Body(Box<TouchOfBody>),
 }
 
 /// What becomes of a touch that the body has no place for.
@@ -55,7 +55,7 @@ impl Touches {
                 let make = || BodySkin::new(body, layer, of.pressed, covers);
                 match (setup.body_touch(index, keys.get_ref(), layer, &mut body_skin, make), wrong) {
                     (Err(_), WrongTouch::LeaveOut) => {}
-                    (touch, _) => all.push(Pressing::Body(TouchOfBody::new(touch?))),
+                    (touch, _) => all.push(Pressing::Body(Box::new(TouchOfBody::new(touch?)))),
                 }
                 continue;
             }
@@ -67,7 +67,7 @@ impl Touches {
             let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
             let link = body.links[touch.link].name.clone();
             let beside = setup.beside(keys.get_ref(), layer)?;
-            all.push(Pressing::Link(LinkTouch { touch, beside, link, places }));
+            all.push(Pressing::Link(Box::new(LinkTouch { touch, beside, link, places })));
         }
         Ok(Self { all, body_skin })
     }

@@ -117,7 +117,10 @@ mod tests {
                 }
             }
             let said = source.notices().join("\n");
-            assert!(said.contains("are a 4 × 4 grid") && said.contains("a message has nothing that the map names"), "{said}");
+            assert!(
+                said.contains("are a 4 × 4 grid") && said.contains("a message has nothing that the map names"),
+                "{said}"
+            );
             assert!(source.losses().is_empty(), "{:?}", source.losses());
             drop(source);
             server.join().unwrap();

@@ -55,7 +55,7 @@ fn head(line: &[u8]) -> Head {
         let (start, rest) = line.split_at_checked(side.len()).unwrap_or_default();
         start.eq_ignore_ascii_case(side.as_bytes()) && rest.trim_ascii().eq_ignore_ascii_case(b"foot data")
     };
-    match SIDES.iter().position(|side| is_side(&side)) {
+    match SIDES.iter().position(is_side) {
         Some(side) => Head::Side(side),
         None if line.starts_with(b"Frame ") => Head::Frame,
         None => Head::Other,
