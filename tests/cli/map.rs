@@ -224,7 +224,7 @@ fn what_a_map_does_not_fit_is_refused_in_a_line() {
     let why = refused(2, &["run", "--source", &source, "--map", "dex4", "--sink", "-"]);
     assert!(why.contains("did you mean `dex3`?"), "{why}");
     let why = refused(2, &["run", "--source", "csv:a.csv", "--map", "dex3", "--sink", "-"]);
-    assert!(why.contains("--map is for one ROS 2 bag or topic, NDJSON, lines of JSON, or Modbus"), "{why}");
+    assert!(why.contains("--map is for ROS 2 bags and topics, NDJSON, lines of JSON, or Modbus"), "{why}");
     // A message that is cut short is left out and counted.
     let mut cut = messages();
     cut[1].3.truncate(200);
@@ -287,7 +287,7 @@ fn what_a_map_reads_is_calibrated_as_a_table_is() {
     assert!(why.contains("name the robot as --body"), "{why}");
     let why =
         refused(2, &["calibrate", "--source", text_of(&table), "--map", "dex3", "-o", text_of(&by_map), "--force"]);
-    assert!(why.contains("--map is for one ROS 2 bag"), "{why}");
+    assert!(why.contains("--map is for ROS 2 bags"), "{why}");
     let why =
         refused(2, &["calibrate", "--map", text_of(&map), "--source", text_of(&lines), "-o", text_of(&map), "--force"]);
     assert!(why.contains("this is the input"), "{why}");
@@ -506,7 +506,7 @@ fn sensors_with_three_axes_come_from_bags_by_their_names() {
     write_db3(&path("xela.db3"), &sent);
     for (bag, map, says, taxels, last) in [
         ("pillars.mcap", "contactile", "3 × 3 sensors", 9, ["-8", "0.5", "8"]),
-        ("xela.db3", "xela-ros2", "1 pads (sensor_1)", 16, ["15", "1", "30"]),
+        ("xela.db3", "xela-ros2", "1 pad (sensor_1)", 16, ["15", "1", "30"]),
     ] {
         let (table, bag) = (path(&format!("{map}.csv")), path(bag));
         let source = format!("ros2-mcap:{}", bag.display());

@@ -533,6 +533,7 @@ const NO_FILES: &[&str] = &[
     "LENGTH",
     "LENGTH,ANGLE",
     "LENGTH[,LENGTH",
+    "LETTER",
     "LETTER,...",
     "LINK",
     "LOW..HIGH",

@@ -16,7 +16,7 @@ use tungstenite::{Message, WebSocket};
 use super::{code_of, fails, somatic};
 
 /// The version of the protocol of the page.
-const VERSION: u8 = 4;
+const VERSION: u8 = 5;
 
 /// A run with a page.
 pub(super) struct Run {
@@ -198,7 +198,7 @@ fn a_page_gets_the_scene_and_then_every_frame_that_it_draws() {
         samples += u32_at(&frame, 44);
         // Six bytes a taxel, and what is in contact and plotted; of a touch its values, taxels, shares and trail.
         let of_touch = 132 + 4 * taxels + 8 * (links + 13) + 20 * 34;
-        let most = 64 + 6 * taxels + 56 * u32_at(&frame, 36) as usize + of_touch * u32_at(&frame, 40) as usize;
+        let most = 72 + 6 * taxels + 60 * u32_at(&frame, 36) as usize + of_touch * u32_at(&frame, 40) as usize;
         assert!(frame.len() <= most + 24 * u32_at(&frame, 44) as usize + 32, "{}", frame.len());
         if last > 20 && contacts > 0 && samples > 0 && viewer.text("events").is_some() {
             assert!(f32_at(&frame, 28) > 0.0 && f32_at(&frame, 32) >= f32_at(&frame, 28));

@@ -7,6 +7,7 @@ use somatic::internal::convert::SkinFormat;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::attached;
 use somatic::internal::setup::bodies::load_body;
+use somatic::internal::setup::open_mapped;
 use somatic::source::{SourceSpec, VendorOptions, VendorSource};
 use somatic::{Body, Error, Result};
 
@@ -55,6 +56,11 @@ pub(super) fn of_recording(
         SourceSpec::Mcap(path) => attached::body(path)?.ok_or_else(|| {
             Error::failed("it has no body; record it with one: somatic run --body BODY").at(path.display())
         })?,
+        mapped if options.map.is_some() => {
+            let source = open_mapped(mapped, options)?;
+            say(&source.about_body());
+            (name.clone(), source.body()?)
+        }
         _ => return Err(Error::failed("it has no body; make one: somatic author --help").at(name)),
     };
     let body = Body::from_bytes(&name, &bytes)?;
