@@ -196,7 +196,9 @@ fn the_cut_into_batches_changes_nothing() {
 #[test]
 fn what_makes_no_sense_is_wrong_usage() {
     assert!(fails(2, &["run", "--outputs", "centriod"]).contains("did you mean `centroid`?"));
-    assert!(fails(2, &["run", "--outputs", "banana"]).contains("it is one of active, anisotropy, area, centroid"));
+    assert!(
+        fails(2, &["run", "--outputs", "banana"]).contains("it is one of active, anisotropy, approach_speed, area")
+    );
     assert!(fails(2, &["run", "--nonsense"]).contains("--nonsense"));
     assert!(fails(2, &["run", "--backend", "gpo"]).contains("'gpu'"));
     assert!(fails(2, &["run", "--body", "mat"]).contains("needs a --source"));

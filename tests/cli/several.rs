@@ -83,7 +83,10 @@ fn recordings_with_bodies_of_their_own_are_one_table_where_these_are_alike() {
 
     let mat = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/exports/mat.asf");
     let why = fails(1, &[&asked[..], &["--force", "--source", INSOLES, "--source", mat]].concat());
-    assert!(why.contains("mat.asf: its sensors or their fields are not those of") && why.contains("--body"), "{why}");
+    assert!(
+        why.contains("mat.asf: its sensors or their fields are not those of") && why.contains("give one `body`"),
+        "{why}"
+    );
     // The same sensors in another unit.
     let body = folder.path().join("body.glb");
     let counts = folder.path().join("counts.csv");
@@ -113,7 +116,7 @@ fn what_several_recordings_cannot_do_is_refused_before_anything_is_read() {
     let missing = refused(1, &["--sink", &table, "--source", "no-such.csv"]);
     assert!(missing.contains("no-such.csv"), "{missing}");
     // An output is none of the recordings.
-    let over = refused(1, &["--force", "--sink", &format!("csv:{second}")]);
+    let over = refused(2, &["--force", "--sink", &format!("csv:{second}")]);
     assert!(over.contains("second, again.csv"), "{over}");
     // Elsewhere one is run.
     let plan = fails(2, &["plan", "--source", first, "--source", second]);

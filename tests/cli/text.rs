@@ -219,7 +219,7 @@ fn flags_say_what_is_not_found_out() {
         (&["--frame-end", "zzz"], 1, "no line ends a frame"),
         (&["--unit", "kPa"], 2, "--unit is for recordings"),
         (&["--rate", "50"], 2, "lines have their own times"),
-        (&["--body", "hand"], 1, "a frame has 3 sensors, and the body"),
+        (&["--body", "hand"], 1, "a message has 3 values, and the body"),
     ] {
         let output = fed(&rows, flags);
         let said = stderr(&output);

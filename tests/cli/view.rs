@@ -44,9 +44,9 @@ fn totals(frame: &[u8], taxels: usize) -> Vec<(u32, f32)> {
     let sections = u16::from_le_bytes([frame[2], frame[3]]);
     let count = u32_at(frame, 36) as usize;
     let padded = |bytes: usize| bytes.next_multiple_of(8);
-    let at = 64 + if sections & 1 == 1 { padded(5 * taxels) } else { 0 };
+    let at = 72 + if sections & 1 == 1 { padded(5 * taxels) } else { 0 };
     assert!(sections & 0b110 == 0b100 || count == 0, "percepts, and no poses: {sections:b}");
-    (0..count).map(|k| (u32_at(frame, at + 4 * k), f32_at(frame, at + 4 * (3 * count + k)))).collect()
+    (0..count).map(|k| (u32_at(frame, at + 4 * k), f32_at(frame, at + 4 * (4 * count + k)))).collect()
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn a_percept_is_explained_and_its_history_sent() {
         (24..bytes.len()).step_by(4).map(|at| f32_at(&bytes, at)).collect::<Vec<f32>>()
     };
     let now = peaks(2.9, 2.9);
-    let pressures: Vec<f32> = (0..now.len()).map(|taxel| f32_at(&shown, 64 + 4 * taxel)).collect();
+    let pressures: Vec<f32> = (0..now.len()).map(|taxel| f32_at(&shown, 72 + 4 * taxel)).collect();
     assert!(now == pressures && pressures.iter().any(|&pressure| pressure > 0.0), "{now:?} {pressures:?}");
     let highest = run.iter().flat_map(|frame| frame["fields"].as_array().unwrap().clone());
     let highest = highest.filter_map(|percept| percept["peak"].as_f64()).fold(0.0, f64::max);

@@ -98,6 +98,10 @@ struct Bench {
 }
 
 impl Bench {
+    fn welcome(&self) -> String {
+        self.scene.welcome("00ff", self.scene.scale, self.scene.senses.as_ref().map(|senses| &senses.scales))
+    }
+
     /// Without touches of the whole body.
     fn new(outputs: Outputs, letters: &[Receptor], calibration: &str) -> Self {
         Self::with_scene(Scene::default().outputs(outputs).letters(Letter::all_of(letters, &[])), calibration)

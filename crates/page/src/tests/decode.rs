@@ -4,12 +4,6 @@ use serde_json::{Value, json};
 
 use super::super::scene::PageScene;
 
-impl super::Bench {
-    pub(super) fn welcome(&self) -> String {
-        self.scene.welcome("00ff", self.scene.scale, self.scene.senses.as_ref().map(|senses| &senses.scales))
-    }
-}
-
 /// Reads what a page reads, by the protocol's tables.
 struct Reader<'a>(&'a [u8], usize);
 
