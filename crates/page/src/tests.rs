@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 
-use self::decode::{decode_frame, decode_history, decode_mesh, decode_peaks};
+use self::decode::{decode_frame, decode_history, decode_mesh, decode_peaks, welcome};
 use super::current::Current;
 use super::encode::{History, PeakMap};
 use super::exchange::Exchange;
@@ -98,10 +98,6 @@ struct Bench {
 }
 
 impl Bench {
-    fn welcome(&self) -> String {
-        self.scene.welcome("00ff", self.scene.scale, self.scene.senses.as_ref().map(|senses| &senses.scales))
-    }
-
     /// Without touches of the whole body.
     fn new(outputs: Outputs, letters: &[Receptor], calibration: &str) -> Self {
         Self::with_scene(Scene::default().outputs(outputs).letters(Letter::all_of(letters, &[])), calibration)
@@ -214,7 +210,7 @@ fn book() -> Book {
     let mut bench = Bench::with_scene(scene, "[all]\np_max = 100\n[taxel.9]\nmask = true");
     let mut viewer = Viewer::new(0);
     let mut book = Book::default();
-    book.add_text(&bench.welcome().replace(env!("CARGO_PKG_VERSION"), "0.0.0"));
+    book.add_text(&welcome(&bench.scene).replace(env!("CARGO_PKG_VERSION"), "0.0.0"));
     let mesh = bench.scene.mesh.clone();
     book.add("mesh", &mesh, &decode_mesh(&mesh));
     let add_frame = |book: &mut Book, bench: &mut Bench, viewer: &mut Viewer, name: &str| {
@@ -440,7 +436,7 @@ fn a_viewer_owes_what_it_has_not_drawn() {
 fn a_page_gets_the_unit_of_pressure() {
     let welcome = |calibration: &str| -> Value {
         let bench = Bench::new(Outputs::TOTAL | Outputs::FORCE, &ALL_LETTERS[..1], calibration);
-        serde_json::from_str(&bench.welcome()).unwrap()
+        serde_json::from_str(&welcome(&bench.scene)).unwrap()
     };
     let units = |welcome: &Value| -> Vec<Value> {
         welcome["columns"].as_array().unwrap().iter().map(|column| column["unit"].clone()).collect()

@@ -4,6 +4,11 @@ use serde_json::{Value, json};
 
 use super::super::scene::PageScene;
 
+/// What a viewer is told first of `scene`.
+pub(super) fn welcome(scene: &PageScene) -> String {
+    scene.welcome("00ff", scene.scale, scene.senses.as_ref().map(|senses| &senses.scales))
+}
+
 /// Reads what a page reads, by the protocol's tables.
 struct Reader<'a>(&'a [u8], usize);
 

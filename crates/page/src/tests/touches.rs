@@ -33,7 +33,7 @@ fn texts(bench: &mut Bench) -> Vec<String> {
 #[test]
 fn a_touch_is_sent_with_its_values_taxels_and_shares() {
     let (mut bench, mut viewer) = (bench(), Viewer::new(0));
-    let welcome: Value = serde_json::from_str(&bench.welcome()).unwrap();
+    let welcome: Value = serde_json::from_str(&welcome(&bench.scene)).unwrap();
     assert_eq!(welcome["touches"], true);
     assert_eq!(welcome["touch_flags"][0], "one_taxel");
     // On the arm two taxels beside each other; on the hand one.
@@ -153,7 +153,7 @@ fn events_are_of_touches_where_these_are_looked_for_and_else_of_fields() {
     let said = texts(&mut without);
     assert!(said.contains(&"onset: all/arm is touched".to_owned()), "{said:?}");
     assert!(said.contains(&"release: all/arm is released".to_owned()), "{said:?}");
-    let welcome: Value = serde_json::from_str(&without.welcome()).unwrap();
+    let welcome: Value = serde_json::from_str(&welcome(&without.scene)).unwrap();
     assert_eq!(welcome["touches"], false);
     assert_eq!(sent(&mut without, &mut Viewer::new(0))["touches"], Value::Null);
 }
