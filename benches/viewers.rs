@@ -259,7 +259,7 @@ fn view(port: &str, token: &str) {
     let stream = TcpStream::connect(&host).expect("the server listens");
     let (mut socket, _) = tungstenite::client(request.body(()).expect("a request"), stream).expect("it lets us in");
     let say = |socket: &mut WebSocket<TcpStream>, message: Value| socket.send(Message::text(message.to_string()));
-    let hello = json!({"type": "hello", "version": 4, "token": token, "after_event": null});
+    let hello = json!({"type": "hello", "version": 5, "token": token, "after_event": null});
     say(&mut socket, hello).expect("the server reads");
     let (mut frames, mut bytes, mut last_read, mut after_pause) = (0_u64, 0, Instant::now(), Vec::new());
     while let Ok(message) = socket.read() {

@@ -11,6 +11,8 @@ _COMPONENTS = {"position": "xyz", "normal": "xyz", "place": "xyz", "velocity": "
     "force": "xyz",
     "torque": "xyz",
     "principal_axis": "xyz",
+    "shear": "xyz",
+    "shear_uv": "uv",
     "uv": "uv",
     "velocity_uv": "uv",
 }
@@ -18,7 +20,7 @@ _COMPONENTS = {"position": "xyz", "normal": "xyz", "place": "xyz", "velocity": "
 
 def _columns(name: str) -> list[str]:
     """The columns of the vector called `name`."""
-    stem = {"uv": "", "velocity_uv": "velocity_"}.get(name, f"{name}_")
+    stem = {"uv": "", "velocity_uv": "velocity_", "shear_uv": "shear_"}.get(name, f"{name}_")
     return [stem + component for component in _COMPONENTS[name]]
 
 

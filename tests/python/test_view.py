@@ -38,7 +38,7 @@ class Browser:
         assert b" 101 " in self.heard.readline()
         while self.heard.readline() != b"\r\n":
             pass
-        self.say(type="hello", version=4, token=token, after_event=None)
+        self.say(type="hello", version=5, token=token, after_event=None)
 
     def say(self, **message: object) -> None:
         text = json.dumps(message).encode()
