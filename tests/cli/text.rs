@@ -401,7 +401,8 @@ fn latency_at_a_thousand_frames_a_second() {
         (frame["fields"][0]["total"].as_f64().unwrap_or_else(|| panic!("{line}")) - rest).round() as usize
     };
     let indices: Vec<usize> = heard.iter().map(|(_, line)| index_of(line)).collect();
-    let all: Vec<usize> = (0..sent.len()).collect();
+    // The first line may be the end of a longer one, and is left out.
+    let all: Vec<usize> = (1..sent.len()).collect();
     let lost = all.len() - indices.len();
     // Lines of the first second wait until it is known how they are written.
     let timed = heard.iter().zip(&indices).filter(|(_, index)| **index > 3000);
