@@ -132,3 +132,28 @@ fn what_cannot_be_converted_is_reported() {
     assert_eq!(files_in(folder.path()), ["hand.csv"]);
     assert!(Path::new(&table).exists());
 }
+
+#[test]
+fn taxels_of_every_kind_are_in_a_field_of_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // 40 by 5 pressure taxels, 5 mm apart, and a thermometer beside each tenth one.
+    let mut table = "id,link,x,y,z,nx,ny,nz,area,modality\n".to_owned();
+    let place = |i: u32| [0.005 * f64::from(i % 40), 0.005 * f64::from(i / 40)];
+    for i in 0..200_u32 {
+        let [x, y] = place(i);
+        table += &format!("{i},skin,{x},{y},0,0,0,1,2.5e-5,pressure\n");
+        if i % 10 == 0 {
+            table += &format!("{},skin,{},{y},0,0,0,1,2.5e-5,temperature\n", 1000 + i, x + 0.001);
+        }
+    }
+    std::fs::write(at("skin.csv"), table).unwrap();
+    done(&["author", "--csv-skin", text_of(&at("skin.csv")), "-o", text_of(&at("skin.glb"))]);
+    let body = Body::load(at("skin.glb")).unwrap();
+    let patches: Vec<_> = body.fields.iter().filter(|field| !field.members.is_empty()).collect();
+    assert!(patches.len() > 10, "{}", patches.len());
+    for i in (0..200).step_by(10) {
+        let holds = |id: u32| patches.iter().position(|patch| patch.members.contains_key(&id));
+        assert!(holds(1000 + i).is_some() && holds(1000 + i) == holds(i), "thermometer {} is not beside {i}", 1000 + i);
+    }
+}
