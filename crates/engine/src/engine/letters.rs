@@ -41,6 +41,23 @@ pub(super) struct Cell<'a> {
     pub(super) sensed: SensedValues<'a>,
 }
 
+/// Which channels nothing presses in a frame: found when the first field asks, as fields share taxels.
+#[derive(Default)]
+pub(super) struct Quiet(Vec<bool>);
+
+impl Quiet {
+    fn of(&mut self, cell: &Cell<'_>) -> &[bool] {
+        if self.0.is_empty() {
+            let plan = cell.plan;
+            let row = cell.frames.raw.rows.row(cell.frames.offset);
+            let is_quiet =
+                |(channel, raw)| calibrate::is_quiet(raw, &plan.calibrations[channel], plan.curve_of(channel));
+            self.0.extend(row.enumerate().map(is_quiet));
+        }
+        &self.0
+    }
+}
+
 /// A direction or place in space, and whether that is in the world.
 enum Frame {
     World,
@@ -68,8 +85,14 @@ impl Made<'_> {
 }
 
 impl Cell<'_> {
-    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `window` has what the letter measured before.
-    pub(super) fn make(&self, cell: usize, percepts: &mut Percepts, now: &mut Now, window: &mut Window) {
+    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `quiet` have what fields of a frame share. `window` has what the letter measured before.
+    pub(super) fn make(
+        &self,
+        cell: usize,
+        percepts: &mut Percepts,
+        (now, quiet): (&mut Now, &mut Quiet),
+        window: &mut Window,
+    ) {
         percepts.set_present(cell, Outputs::empty());
         let mut made = Made { percepts, cell, flags: Flags::empty(), is_there: false };
         if self.step.restarts() {
@@ -78,7 +101,7 @@ impl Cell<'_> {
         let senses = &self.plan.senses;
         match self.plan.letters()[self.field.letter].receptor {
             Receptor::Sustained | Receptor::Change => {}
-            Receptor::Shear => senses.shear.iter().for_each(|shear| self.shear(shear, now, &mut made)),
+            Receptor::Shear => senses.shear.iter().for_each(|shear| self.shear(shear, quiet.of(self), now, &mut made)),
             Receptor::Temperature => {
                 senses.temperature.iter().for_each(|by| self.temperature(by, now, &mut made, window));
             }
@@ -241,13 +264,18 @@ impl Cell<'_> {
         }
     }
 
-    /// The taxels that are pressed and whose tangential forces are known, and the quantity that they measure.
-    fn pulled(&self, by: &ShearCalibration, made: &mut Made<'_>) -> (Vec<usize>, Vec<Pulled>, Option<Quantity>) {
+    /// The taxels that are pressed and whose tangential forces are known; `quiet` says by channel which need no look; and the quantity that they measure.
+    fn pulled(
+        &self,
+        by: &ShearCalibration,
+        quiet: &[bool],
+        made: &mut Made<'_>,
+    ) -> (Vec<usize>, Vec<Pulled>, Option<Quantity>) {
         let (plan, row) = (self.plan, self.sensed.row(self.frame));
         let (mut members, mut pulled) = (Vec::new(), Vec::new());
         let mut quantity = None;
         for (index, member) in self.field.sensed.iter().enumerate() {
-            let Ok(channel) = plan.body_taxels.binary_search(&member.taxel) else { continue };
+            let Some(channel) = member.channel.filter(|&channel| !quiet[channel]) else { continue };
             let (calibration, curve) = (&plan.calibrations[channel], plan.curve_of(channel));
             let raw = self.frames.raw.rows.value(self.frames.offset, channel);
             let own = calibrate::reference(raw, calibration, curve);
@@ -284,8 +312,8 @@ impl Cell<'_> {
         (members, pulled, quantity)
     }
 
-    fn shear(&self, by: &ShearCalibration, now: &mut Now, made: &mut Made<'_>) {
-        let (members, mut pulled, quantity) = self.pulled(by, made);
+    fn shear(&self, by: &ShearCalibration, quiet: &[bool], now: &mut Now, made: &mut Made<'_>) {
+        let (members, mut pulled, quantity) = self.pulled(by, quiet, made);
         if pulled.is_empty() {
             return;
         }

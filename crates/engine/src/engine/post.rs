@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::cadence::{self, OnChange};
-use super::letters::{Cell, SensedValues};
+use super::letters::{Cell, Quiet, SensedValues};
 use super::links::Links;
 use super::place;
 use super::spread::{Frames, Now};
@@ -141,13 +141,13 @@ impl Post<'_> {
         if !own && self.cadence.is_none() {
             return;
         }
-        let (alone, mut now) = (std::slice::from_ref(frame), Now::default());
+        let (alone, mut now, mut quiet) = (std::slice::from_ref(frame), Now::default(), Quiet::default());
         for (number, field) in self.plan.fields.iter().enumerate() {
             let cell = index * self.plan.fields.len() + number;
             if !field.sensed.is_empty() {
                 let frames = self.frames(alone, raw, offset, &state.raw_before);
                 let of = Cell { plan: self.plan, field, frames, frame: index, step, sensed: self.sensed };
-                of.make(cell, percepts, &mut now, &mut state.fields[number].window);
+                of.make(cell, percepts, (&mut now, &mut quiet), &mut state.fields[number].window);
                 continue;
             }
             if let Some(cadence) = self.cadence {

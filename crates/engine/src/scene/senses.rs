@@ -28,6 +28,8 @@ pub(crate) struct SensedMember {
     /// Its place in the body.
     pub(crate) taxel: usize,
     pub(crate) id: u32,
+    /// Which of the plan's channels has its pressure, if it is pressed.
+    pub(crate) channel: Option<usize>,
     /// Which of [`Senses::channels`] its value is; of one with three axes, those of its tangential values.
     pub(crate) values: [usize; 2],
     pub(crate) weight: f64,
@@ -170,7 +172,13 @@ impl Senses {
     }
 
     /// The members of `field` that `receptor` reads.
-    pub(super) fn members(&self, body: &Body, field: &Field, receptor: Receptor) -> Arc<[SensedMember]> {
+    pub(super) fn members(
+        &self,
+        body: &Body,
+        body_taxels: &[usize],
+        field: &Field,
+        receptor: Receptor,
+    ) -> Arc<[SensedMember]> {
         let all = Channel::all_of(body);
         let value = |taxel: &Taxel, axis: Axis| {
             let channel = all.binary_search(&Channel::of_taxel(taxel.id, axis).0).expect("it is a channel of the body");
@@ -196,6 +204,7 @@ impl Senses {
             SensedMember {
                 taxel: member.taxel,
                 id: taxel.id,
+                channel: body_taxels.binary_search(&member.taxel).ok(),
                 values: match receptor {
                     Receptor::Shear => [Axis::U, Axis::V].map(|axis| value(taxel, axis)),
                     _ => [value(taxel, Axis::Normal); 2],

@@ -135,6 +135,14 @@ fn value_and_response(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>)
     (here.abs() <= HUGE).then_some((value, here))
 }
 
+/// Whether [`reference`] gives P = 0 and nothing to say, as for most taxels most of the time.
+pub(crate) fn is_quiet(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> bool {
+    let Ok(value) = usable(raw, taxel) else { return false };
+    let here = response(value, taxel, curve);
+    let [low, high] = taxel.raw_range.map(f64::from);
+    here <= taxel.dead_band && (low..=high).contains(&value) && here.abs() <= HUGE && !is_tiny(value) && !is_tiny(here)
+}
+
 fn over_dead_band(pressure: f64, taxel: &TaxelCalibration) -> f64 {
     if !is_tiny(pressure) && pressure > taxel.dead_band { pressure } else { 0.0 }
 }
@@ -257,6 +265,30 @@ pub(crate) const TINY: f64 = 1.0 / HUGE;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_quiet_has_no_pressure_and_nothing_to_say() {
+        let plain = TaxelCalibration {
+            baseline: 10.0,
+            gain: 0.5,
+            dead_band: 2.0,
+            raw_range: [0.0, 100.0],
+            ..Default::default()
+        };
+        let masked = TaxelCalibration { mask: true, ..plain };
+        let numbers = (-400..400).map(|i| RawValue::new(f64::from(i) * 0.3));
+        let odd = [RawValue::MISSING, RawValue::FAULTY, RawValue::new(1e-30), RawValue::new(1e30), RawValue::new(10.0)];
+        let mut seen = [0; 2];
+        for raw in numbers.chain(odd) {
+            for taxel in [plain, masked, TaxelCalibration { gain: -0.5, ..plain }] {
+                let quiet = is_quiet(raw, &taxel, Table::default());
+                let right = reference(raw, &taxel, Table::default());
+                assert_eq!(quiet, right.value == 0.0 && right.status == 0, "{raw:?} {right:?}");
+                seen[usize::from(quiet)] += 1;
+            }
+        }
+        assert!(seen.iter().all(|&count| count > 50), "{seen:?}");
+    }
 
     #[test]
     fn the_thresholds_bits_are_their_values() {

@@ -210,7 +210,7 @@ impl FieldsMade {
         for (letter, &first_slot) in from.first_slots.iter().enumerate() {
             let receptor = plan.letters[letter].receptor;
             if !receptor.is_of_pressure() {
-                let sensed = plan.senses.members(from.body, field, receptor);
+                let sensed = plan.senses.members(from.body, &plan.body_taxels, field, receptor);
                 if !sensed.is_empty() {
                     self.fields.push(in_first.clone().of_senses(letter, self.members.len(), receptor, sensed));
                 }
