@@ -111,15 +111,7 @@ impl Wish<'_> {
         let picture = match &self.uv {
             None if self.ids => {
                 let values = vec![Some(0.0); body.taxels.len()];
-                let moment = Moment {
-                    letter: Receptor::Sustained,
-                    values: &values,
-                    ends: None,
-                    unit: "",
-                    shear: &[],
-                    touches: &[],
-                    t_s: None,
-                };
+                let moment = Moment::of_pressures(&values);
                 TouchPicture::new(body, &set.fields, &options, true)?.draw(&moment)?
             }
             None => picture::of_body(body, &set.fields, &options)?,

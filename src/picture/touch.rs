@@ -69,6 +69,14 @@ pub struct Moment<'a> {
     pub t_s: Option<f64>,
 }
 
+impl<'a> Moment<'a> {
+    /// Pressures without touches, colours and time.
+    #[must_use]
+    pub fn of_pressures(values: &'a [Option<f64>]) -> Self {
+        Self { letter: Receptor::Sustained, values, ends: None, unit: "", shear: &[], touches: &[], t_s: None }
+    }
+}
+
 /// A body and its views, ready to draw touches on.
 pub struct TouchPicture<'a> {
     body: &'a Body,

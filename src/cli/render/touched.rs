@@ -163,14 +163,6 @@ fn letter(word: &str) -> Result<Receptor> {
 /// A PNG of `body` without a touch, its taxels labelled with their ids.
 pub(super) fn without(body: &Body, fields: &[Field], options: &Options) -> Result<Vec<u8>> {
     let values = vec![Some(0.0); body.taxels.len()];
-    let moment = Moment {
-        letter: Receptor::Sustained,
-        values: &values,
-        ends: None,
-        unit: "",
-        shear: &[],
-        touches: &[],
-        t_s: None,
-    };
+    let moment = Moment::of_pressures(&values);
     TouchPicture::new(body, fields, options, true)?.draw(&moment)?.png()
 }

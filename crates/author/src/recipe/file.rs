@@ -241,7 +241,7 @@ fn place(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Pat
     let modality = match &keys.modality {
         None => Modality::Pressure,
         Some(name) => {
-            let known = [Modality::Pressure, Modality::Temperature, Modality::Proximity];
+            let known = [Modality::Pressure, Modality::Temperature, Modality::Proximity, Modality::Force3];
             let names = known.map(Modality::name);
             let found = known.into_iter().find(|modality| modality.name() == *name.get_ref());
             found.ok_or_else(|| text.unknown(name, "modality", names.iter().map(String::as_str)))?

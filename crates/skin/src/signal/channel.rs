@@ -55,7 +55,7 @@ impl Channel {
             Some((taxel, "v")) => (taxel, Axis::V),
             _ => (name, Axis::Normal),
         };
-        let taxel = taxel.parse().ok().filter(|&id: &u32| axis == Axis::Normal || id <= crate::body::MAX_TAXEL_ID)?;
+        let taxel = taxel.parse().ok().filter(|&id: &u32| id < 1 << AXIS_SHIFT)?;
         Some(Self::of_taxel(taxel, axis))
     }
 
@@ -125,7 +125,7 @@ mod tests {
         }
         let [own, u, v] = [Axis::Normal, Axis::U, Axis::V].map(|axis| Channel::of_taxel(MAX_TAXEL_ID, axis));
         assert!(own < Channel::of_taxel(0, Axis::U) && u < Channel::of_taxel(0, Axis::V) && u < v);
-        for name in ["", "u", ".u", "4.w", "4.u.v", "x.u", "16777217.u", "-1"] {
+        for name in ["", "u", ".u", "4.w", "4.u.v", "x.u", "33554432", "33554436.u", "-1"] {
             assert_eq!(Channel::named(name), None, "{name}");
         }
         let run = |first, last| {
