@@ -1,32 +1,12 @@
 //! Shear, temperature and proximity against a definition of their own in Python, on random bodies, calibrations and frames.
 
-use std::path::Path;
-use std::process::Command;
-
 use serde_json::Value;
-use somatic_testing::skip;
 
-use crate::python::python_with;
-use crate::{stderr, text_of};
+use super::touches_oracle;
 
 /// What `tests/letters/oracle.py` finds, `None` without Python, which is said.
 fn found(flags: &[&str]) -> Option<Value> {
-    let python = match python_with("touches", "import numpy") {
-        Ok(python) => python,
-        Err(why) => {
-            skip("PYTHON", why);
-            return None;
-        }
-    };
-    let folder = tempfile::tempdir().unwrap();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/letters/oracle.py");
-    let arguments = [text_of(&script), env!("CARGO_BIN_EXE_somatic"), text_of(folder.path())];
-    let threads = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"].map(|name| (name, "1"));
-    let output = Command::new(python).args(arguments).args(flags).envs(threads).output().unwrap();
-    assert!(output.status.success(), "{}", stderr(&output));
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    eprintln!("{}{text}", stderr(&output));
-    Some(serde_json::from_str(&text).unwrap())
+    touches_oracle::found("letters/oracle.py", &[], flags)
 }
 
 fn assert_right(found: &Value, cells: u64) {

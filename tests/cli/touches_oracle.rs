@@ -11,6 +11,12 @@ use somatic_testing::skip;
 
 /// What `tests/touches/oracle.py` finds on random recordings, `None` without Python, which is said.
 fn random(flags: &[&str]) -> Option<Value> {
+    found("touches/oracle.py", &["random"], flags)
+}
+
+/// What a script in `tests/` finds of the command in a folder of its own: it gets the words `first`, the command, the folder and `flags`,
+/// and prints JSON. `None` without Python, which is said.
+pub(super) fn found(script: &str, first: &[&str], flags: &[&str]) -> Option<Value> {
     let python = match python_with("touches", "import numpy") {
         Ok(python) => python,
         Err(why) => {
@@ -19,11 +25,11 @@ fn random(flags: &[&str]) -> Option<Value> {
         }
     };
     let folder = tempfile::tempdir().unwrap();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/touches/oracle.py");
-    let arguments = [text_of(&script), "random", env!("CARGO_BIN_EXE_somatic"), text_of(folder.path())];
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(script);
+    let own = [env!("CARGO_BIN_EXE_somatic"), text_of(folder.path())];
     // Matrices are small: threads cost more than they bring.
     let threads = ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"].map(|name| (name, "1"));
-    let output = Command::new(python).args(arguments).args(flags).envs(threads).output().unwrap();
+    let output = Command::new(python).arg(script).args(first).args(own).args(flags).envs(threads).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     eprintln!("{}{text}", stderr(&output));

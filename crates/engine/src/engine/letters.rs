@@ -9,7 +9,7 @@ use super::spread::{Frames, Now};
 use crate::backend::Step;
 use crate::percept::{Flags, Host, Outputs, Percepts};
 use crate::scene::{Plan, PlanField, SensedMember};
-use crate::signal::{Quantity, RawValue, Reading, Receptor, SenseCalibration, ShearCalibration, TaxelCalibration};
+use crate::signal::{RawValue, Reading, Receptor, SenseCalibration, ShearCalibration, TaxelCalibration};
 use crate::stage::proximity::{LEAST_M, Near};
 use crate::stage::shear::Pulled;
 use crate::stage::temperature::Warm;
@@ -58,7 +58,7 @@ impl Quiet {
     }
 }
 
-/// A direction or place in space, and whether that is in the world.
+/// The frame that places and directions of a cell are in.
 enum Frame {
     World,
     Anchor,
@@ -85,7 +85,8 @@ impl Made<'_> {
 }
 
 impl Cell<'_> {
-    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `quiet` have what fields of a frame share. `window` has what the letter measured before.
+    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `quiet` have what the fields of a frame share,
+    /// and `window` what the letter measured before.
     pub(super) fn make(
         &self,
         cell: usize,
@@ -197,23 +198,23 @@ impl Cell<'_> {
         made.is_there = true;
         let mean = temperature::mean(&warm);
         made.give(Outputs::TEMPERATURE, Host::Temperature, &[mean]);
-        let extremes = [
-            (temperature::extreme(&warm, |a, b| a > b), Outputs::WARMEST, Host::Warmest),
-            (temperature::extreme(&warm, |a, b| a < b), Outputs::COLDEST, Host::Coldest),
+        let warmest = [
+            (Outputs::WARMEST, Host::Warmest),
+            (Outputs::WARMEST_TAXEL, Host::WarmestTaxel),
+            (Outputs::WARMEST_POSITION, Host::WarmestPosition),
         ];
-        for (found, output, host) in extremes {
+        let coldest = [
+            (Outputs::COLDEST, Host::Coldest),
+            (Outputs::COLDEST_TAXEL, Host::ColdestTaxel),
+            (Outputs::COLDEST_POSITION, Host::ColdestPosition),
+        ];
+        for (found, [value, taxel, position]) in
+            [(temperature::extreme(&warm, |a, b| a > b), warmest), (temperature::extreme(&warm, |a, b| a < b), coldest)]
+        {
             let Some(found) = found else { continue };
-            let is_warmest = output == Outputs::WARMEST;
-            made.give(output, host, &[warm[found].celsius]);
-            let member = members[found];
-            let id = f64::from(self.field.sensed[member].id);
-            let (taxel, position) = if is_warmest {
-                ((Outputs::WARMEST_TAXEL, Host::WarmestTaxel), (Outputs::WARMEST_POSITION, Host::WarmestPosition))
-            } else {
-                ((Outputs::COLDEST_TAXEL, Host::ColdestTaxel), (Outputs::COLDEST_POSITION, Host::ColdestPosition))
-            };
-            made.give(taxel.0, taxel.1, &[id]);
-            self.give_place(member, position, None, now, made);
+            made.give(value.0, value.1, &[warm[found].celsius]);
+            made.give(taxel.0, taxel.1, &[f64::from(self.field.sensed[members[found]].id)]);
+            self.give_place(members[found], position, None, now, made);
         }
         if self.field.chart.is_some()
             && let Some(gradient) = temperature::gradient(&warm)
@@ -264,16 +265,11 @@ impl Cell<'_> {
         }
     }
 
-    /// The taxels that are pressed and whose tangential forces are known; `quiet` says by channel which need no look; and the quantity that they measure.
-    fn pulled(
-        &self,
-        by: &ShearCalibration,
-        quiet: &[bool],
-        made: &mut Made<'_>,
-    ) -> (Vec<usize>, Vec<Pulled>, Option<Quantity>) {
+    /// The members that are pressed and whose tangential forces are known, and what they feel. `quiet` says by channel which need no
+    /// look.
+    fn pulled(&self, by: &ShearCalibration, quiet: &[bool], made: &mut Made<'_>) -> (Vec<usize>, Vec<Pulled>) {
         let (plan, row) = (self.plan, self.sensed.row(self.frame));
         let (mut members, mut pulled) = (Vec::new(), Vec::new());
-        let mut quantity = None;
         for (index, member) in self.field.sensed.iter().enumerate() {
             let Some(channel) = member.channel.filter(|&channel| !quiet[channel]) else { continue };
             let (calibration, curve) = (&plan.calibrations[channel], plan.curve_of(channel));
@@ -292,7 +288,6 @@ impl Cell<'_> {
                 }
             };
             let [tu, tv] = member.tangents_in_chart;
-            quantity = Some(calibration.quantity);
             members.push(index);
             pulled.push(Pulled {
                 weight: member.weight,
@@ -309,11 +304,11 @@ impl Cell<'_> {
                 ..Pulled::default()
             });
         }
-        (members, pulled, quantity)
+        (members, pulled)
     }
 
     fn shear(&self, by: &ShearCalibration, quiet: &[bool], now: &mut Now, made: &mut Made<'_>) {
-        let (members, mut pulled, quantity) = self.pulled(by, quiet, made);
+        let (members, mut pulled) = self.pulled(by, quiet, made);
         if pulled.is_empty() {
             return;
         }
@@ -353,7 +348,7 @@ impl Cell<'_> {
                 None => made.flags |= Flags::NOISE_UNKNOWN,
             }
         }
-        if let (Some(slips_at), Some(_)) = (by.slips_at, quantity) {
+        if let Some(slips_at) = by.slips_at {
             made.give(Outputs::SLIP_RATIO, Host::SlipRatio, &[found.friction / slips_at]);
         }
     }

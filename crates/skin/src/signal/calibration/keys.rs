@@ -3,9 +3,9 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::senses::{Curves, baselines_of, curve_called, gain_of};
+use super::senses::{Curves, baselines_of, curve_called, curve_index, gain_of};
 use super::{Onset, Sensors, TaxelCalibration};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result};
 use crate::keys::Text;
 use crate::signal::curve::{Column, Curve};
 use crate::signal::fsr::FsrCircuit;
@@ -244,14 +244,7 @@ impl Draft {
             return Err(text.wrong(curve.span(), what));
         }
         if let Some(curve) = &keys.curve {
-            let index = curves.iter().position(|name| name == curve.get_ref()).ok_or_else(|| {
-                let name = curve.get_ref();
-                let hint = match nearest(name, curves.iter().copied()) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("add a table [curve.{name}]"),
-                };
-                text.wrong(curve.span(), format!("`curve` is `{name}`, which the file does not have: {hint}"))
-            })?;
+            let index = curve_index(curve, curves, text)?;
             self.kind = Kind::Curve(index);
         }
         if let Some(sensor) = &keys.sensor {

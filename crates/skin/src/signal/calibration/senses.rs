@@ -79,16 +79,20 @@ struct Common<'a> {
 /// The file's curves and their names.
 pub(super) type Curves<'a> = (&'a [Curve], &'a [&'a str]);
 
-/// The curve called `name`.
-pub(super) fn curve_called(name: &Spanned<String>, (curves, names): Curves<'_>, text: Text<'_>) -> Result<Curve> {
-    let at = names.iter().position(|known| known == name.get_ref()).ok_or_else(|| {
+/// Which of the file's curves, whose names are `names`, is called `name`.
+pub(super) fn curve_index(name: &Spanned<String>, names: &[&str], text: Text<'_>) -> Result<usize> {
+    names.iter().position(|known| known == name.get_ref()).ok_or_else(|| {
         let hint = match nearest(name.get_ref(), names.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),
             None => format!("add a table [curve.{}]", name.get_ref()),
         };
         text.wrong(name.span(), format!("`curve` is `{}`, which the file does not have: {hint}", name.get_ref()))
-    })?;
-    Ok(curves[at].clone())
+    })
+}
+
+/// The curve called `name`.
+pub(super) fn curve_called(name: &Spanned<String>, (curves, names): Curves<'_>, text: Text<'_>) -> Result<Curve> {
+    Ok(curves[curve_index(name, names, text)?].clone())
 }
 
 /// A gain, which may be negative.
