@@ -173,6 +173,8 @@ pub struct Findings {
     pub forces_agree: Option<String>,
     /// By tangential channel, its raw value at rest; `None` where it delivered nothing, or moved.
     pub tangential: BTreeMap<u32, Option<f64>>,
+    /// By tangential channel, the standard deviation of its raw value at rest, where it delivered enough to tell.
+    pub tangential_sigmas: BTreeMap<u32, f64>,
 }
 
 impl Survey {
@@ -371,6 +373,7 @@ impl Survey {
             curves: Vec::new(),
             forces_agree: None,
             tangential: self.apart.as_ref().map(|apart| apart.baselines()).unwrap_or_default(),
+            tangential_sigmas: self.apart.as_ref().map(|apart| apart.sigmas()).unwrap_or_default(),
         })
     }
 
