@@ -170,6 +170,7 @@ impl Doubts {
     fn of_rest(&self, plan: &Plan) -> Option<String> {
         let pressed = self.where_in_body(|seen| seen.came && !seen.rested);
         let many: Vec<(usize, usize)> = (0..plan.fields().len())
+            .filter(|&field| plan.letters()[plan.letter_of(field)].receptor.is_of_pressure())
             .map(|field| self.among(plan, field, &pressed))
             .filter(|(_, all)| *all >= MIN_FIELD_TAXELS)
             .collect();

@@ -68,7 +68,7 @@ pub(crate) fn outputs_of(receptor: Receptor) -> Outputs {
 /// outputs are asked for, which all are by default.
 ///
 /// # Errors
-/// A letter has no taxels, or an output no letter.
+/// A usage error: a letter has no taxels, or what is asked for no letter.
 pub(super) fn letters_and_outputs(
     body: &Body,
     fields: &FieldSet,
@@ -93,9 +93,27 @@ pub(super) fn letters_and_outputs(
         scene.letters.clone()
     };
     let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
-    if let Some(empty) = others.into_iter().find(|&receptor| is_read(receptor) && !has(receptor)) {
-        let kind = if empty == Receptor::Shear { "of three axes (modality force3)" } else { "of that modality" };
-        return Err(Error::usage(format!("letter `{empty}` has no taxels: no field has one {kind}")).at(&body.name));
+    let there: Vec<Receptor> = others.into_iter().filter(|&other| has(other)).collect();
+    // Where nothing else is there either, no letter reads what is.
+    let is_empty = |receptor: &Receptor| !has(*receptor) && !(receptor.is_of_pressure() && there.is_empty());
+    if let Some(empty) = letters.iter().map(|letter| letter.receptor).find(is_empty) {
+        let what = match empty {
+            Receptor::Shear => {
+                "letter `shear` has no taxels: no field has one of three axes (modality force3)".to_owned()
+            }
+            Receptor::Temperature | Receptor::Proximity => {
+                format!("letter `{empty}` has no taxels: no field has one of that modality")
+            }
+            Receptor::Sustained | Receptor::Change => format!(
+                "no field has a taxel that measures pressure, of which letter `{empty}` is made; leave out what asks for \
+                 it: the taxels have {}",
+                listed(&there)
+            ),
+        };
+        return Err(Error::usage(what).at(&body.name));
+    }
+    if letters.is_empty() && !there.is_empty() {
+        return Err(Error::usage(without_pressure(scene, outputs)).at(&body.name));
     }
     let mut given = outputs - Outputs::OF_OTHER_LETTERS;
     for receptor in others {
@@ -106,24 +124,59 @@ pub(super) fn letters_and_outputs(
             given |= if of_letter.is_empty() { usual } else { of_letter };
         } else if !of_letter.is_empty() && !outputs.contains(Outputs::USUAL | own) {
             // Whoever asks for everything gets what there is.
-            let names: Vec<String> = of_letter.names().collect();
-            let what = format!("`{}` is of letter `{receptor}`, which no field's taxels have", listed(&names));
+            let names: Vec<String> = of_letter.names().map(|name| format!("`{name}`")).collect();
+            let why = why_not(receptor, has(receptor));
+            let what = format!("{} {} of letter `{receptor}`, {why}", listed(&names), is_or_are(&names));
             return Err(Error::usage(what).at(&body.name));
         }
     }
     Ok((letters, given))
 }
 
+fn is_or_are(names: &[String]) -> &'static str {
+    if names.len() == 1 { "is" } else { "are" }
+}
+
+/// Why `receptor`, which the taxels have or not, is not read.
+fn why_not(receptor: Receptor, is_there: bool) -> String {
+    if is_there {
+        format!("which `letters` leaves out; add `{receptor}` to `letters`")
+    } else {
+        "which no field's taxels have".to_owned()
+    }
+}
+
+/// That no taxel measures the pressures that `scene` asks for.
+fn without_pressure(scene: &Scene, outputs: Outputs) -> String {
+    let of_fields = outputs - Outputs::OF_OTHER_LETTERS;
+    let mut names: Vec<String> = of_fields.names().map(|name| format!("`{name}`")).collect();
+    if scene.touches.is_some() {
+        names.push("`touches`".to_owned());
+    }
+    let what = if names.is_empty() { "what is asked for".to_owned() } else { listed(&names) };
+    format!(
+        "no field has a taxel that measures pressure, of which {what} {} made; leave that out of `outputs`",
+        is_or_are(&names)
+    )
+}
+
 impl Senses {
-    /// For `letters` of the fields `chosen`.
+    /// For `letters` of the fields `chosen`; with `touches_bring`, touches have what the body's taxels give them whatever the letters are.
     pub(super) fn new(
         body: &Body,
         fields: &FieldSet,
         chosen: &[usize],
-        letters: &[Letter],
+        (letters, touches_bring): (&[Letter], bool),
         calibration: &Calibration,
     ) -> Self {
-        let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
+        let is_of_touches = |receptor: Receptor| {
+            touches_bring
+                && matches!(receptor, Receptor::Shear | Receptor::Temperature)
+                && body.taxels.iter().any(|taxel| receptor.reads(taxel.modality))
+        };
+        let is_read = |receptor: Receptor| {
+            letters.iter().any(|letter| letter.receptor == receptor) || is_of_touches(receptor)
+        };
         let [temperature, proximity, shear] =
             [Receptor::Temperature, Receptor::Proximity, Receptor::Shear].map(is_read);
         if !(temperature || proximity || shear) {
@@ -132,8 +185,15 @@ impl Senses {
         let all = Channel::all_of(body);
         let place = |channel: Channel| all.binary_search(&channel.0).expect("it is a channel of the body");
         let mut channels = BTreeSet::new();
-        for member in chosen.iter().flat_map(|&field| &fields.fields[field].members) {
-            let taxel = &body.taxels[member.taxel];
+        let of_fields = chosen.iter().flat_map(|&field| &fields.fields[field].members).map(|member| member.taxel);
+        // Touches are anywhere on the body.
+        let of_touches = (0..body.taxels.len()).filter(|&taxel| {
+            [Receptor::Shear, Receptor::Temperature]
+                .into_iter()
+                .any(|receptor| is_of_touches(receptor) && receptor.reads(body.taxels[taxel].modality))
+        });
+        for taxel in of_fields.chain(of_touches) {
+            let taxel = &body.taxels[taxel];
             if shear && Receptor::Shear.reads(taxel.modality) {
                 channels.extend([Axis::U, Axis::V].map(|axis| place(Channel::of_taxel(taxel.id, axis))));
             }
@@ -152,16 +212,21 @@ impl Senses {
     }
 
     /// Refuses what is `asked` of touches by name and no letter gives. Whoever asks for everything gets what there is.
-    pub(super) fn check_touches(&self, asked: TouchOutputs) -> Result<()> {
-        let others = (TouchOutputs::SHEAR | TouchOutputs::TEMPERATURE) & asked;
-        let lacking: Vec<String> = (others - self.of_touches()).names().map(|name| format!("touches.{name}")).collect();
-        if lacking.is_empty() || asked == TouchOutputs::all() {
+    pub(super) fn check_touches(&self, body: &Body, asked: TouchOutputs) -> Result<()> {
+        if asked == TouchOutputs::all() {
             return Ok(());
         }
-        Err(Error::usage(format!(
-            "no letter gives `{}`: no field's taxels have it, or it is not asked for",
-            listed(&lacking)
-        )))
+        let of_letters =
+            [(TouchOutputs::SHEAR, Receptor::Shear), (TouchOutputs::TEMPERATURE, Receptor::Temperature)];
+        let lacking = |(output, _): &(TouchOutputs, Receptor)| asked.contains(*output) && !self.of_touches().contains(*output);
+        match of_letters.into_iter().find(lacking) {
+            Some((_, receptor)) => {
+                let is_there = body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
+                let why = why_not(receptor, is_there);
+                Err(Error::usage(format!("`touches.{receptor}` is of letter `{receptor}`, {why}")))
+            }
+            None => Ok(()),
+        }
     }
 
     /// What touches have of these letters.

@@ -40,10 +40,12 @@ impl Plan {
         let touches = scene.asked_touches().filter(|_| feels_pressure || !scene.letters.is_empty());
         let read = read(body, fields, touches.is_some(), &chosen);
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
-        plan.senses = Senses::new(body, fields, &chosen, &letters, calibration);
+        // Who names letters has no others.
+        let touches_bring = touches.is_some() && scene.letters.is_empty();
+        plan.senses = Senses::new(body, fields, &chosen, (&letters, touches_bring), calibration);
         plan.letters = letters;
         let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
-        plan.senses.check_touches(of_touches).map_err(|e| e.at(&body.name))?;
+        plan.senses.check_touches(body, of_touches).map_err(|e| e.at(&body.name))?;
         plan.touch_outputs = touches.map(|touches| touches.outputs | plan.senses.of_touches());
         plan.left_out = left_out;
         let first_slots = plan.lay_out_slots(calibration)?;
