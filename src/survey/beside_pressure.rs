@@ -146,7 +146,8 @@ mod tests {
         assert!(text.contains("[taxel.1]\n") && text.contains("shear_baseline = [510, 530]"), "{text}");
         assert!(text.contains("shear_baseline = [7, 9]"), "{text}");
         // Steps of 1, 0, −1 and 0 along u of the first; along v they are as large. The second has whole numbers alone.
-        let noise = |text: &str| -> f64 { text.split("noise = ").nth(1).unwrap().lines().next().unwrap().parse().unwrap() };
+        let noise =
+            |text: &str| -> f64 { text.split("noise = ").nth(1).unwrap().lines().next().unwrap().parse().unwrap() };
         let of_shear = text.split("[shear]\n").nth(1).unwrap();
         let (first, second) = (noise(of_shear.split("[taxel.1]\n").nth(1).unwrap()), noise(of_shear));
         assert!((first - 0.5_f64.sqrt()).abs() < 0.02 && (second - 1.0 / 12.0_f64.sqrt()).abs() < 1e-6, "{text}");
@@ -156,6 +157,16 @@ mod tests {
         assert_eq!(calibration.shear.own_baselines[&0], [510.0, 530.0]);
         assert_eq!([0, 1].map(|taxel| calibration.shear.noise_of(taxel)), [Some(first), Some(second)]);
         assert!(Engine::new(&body, Options::default().calibration(calibration)).is_ok());
+    }
+
+    #[test]
+    fn a_body_without_pressures_is_no_matter_of_a_survey() {
+        let mut cell = SheetCell::rectangle(3, [0.0, 0.0], 0.01, 0.01);
+        cell.modality = Modality::Temperature;
+        let bytes = sheets(&[Sheet::new("pad", vec![cell])]).unwrap().to_bytes().unwrap();
+        let body = Body::from_bytes("pad", &bytes).unwrap();
+        let why = Survey::new(&[3]).on(&body).map(|_| ()).unwrap_err();
+        assert!(why.is_usage() && why.to_string().contains("no taxel measures pressure"), "{why}");
     }
 
     #[test]

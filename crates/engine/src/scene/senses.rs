@@ -174,9 +174,8 @@ impl Senses {
                 && matches!(receptor, Receptor::Shear | Receptor::Temperature)
                 && body.taxels.iter().any(|taxel| receptor.reads(taxel.modality))
         };
-        let is_read = |receptor: Receptor| {
-            letters.iter().any(|letter| letter.receptor == receptor) || is_of_touches(receptor)
-        };
+        let is_read =
+            |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor) || is_of_touches(receptor);
         let [temperature, proximity, shear] =
             [Receptor::Temperature, Receptor::Proximity, Receptor::Shear].map(is_read);
         if !(temperature || proximity || shear) {
@@ -216,9 +215,9 @@ impl Senses {
         if asked == TouchOutputs::all() {
             return Ok(());
         }
-        let of_letters =
-            [(TouchOutputs::SHEAR, Receptor::Shear), (TouchOutputs::TEMPERATURE, Receptor::Temperature)];
-        let lacking = |(output, _): &(TouchOutputs, Receptor)| asked.contains(*output) && !self.of_touches().contains(*output);
+        let of_letters = [(TouchOutputs::SHEAR, Receptor::Shear), (TouchOutputs::TEMPERATURE, Receptor::Temperature)];
+        let lacking =
+            |(output, _): &(TouchOutputs, Receptor)| asked.contains(*output) && !self.of_touches().contains(*output);
         match of_letters.into_iter().find(lacking) {
             Some((_, receptor)) => {
                 let is_there = body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));

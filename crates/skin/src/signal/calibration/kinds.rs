@@ -19,8 +19,9 @@ pub(super) fn check(keys: &Keys, id: u32, kind: Modality, text: Text<'_>) -> Res
     if !matches!(kind, Modality::Force3 | Modality::Other(_))
         && let Some((key, at)) = keys.of_shear().into_iter().find_map(|(key, at)| Some((key, at?)))
     {
-        let what =
-            format!("`{key}` is for taxels with three axes (modality force3), and taxel {id} measures {name}; remove it");
+        let what = format!(
+            "`{key}` is for taxels with three axes (modality force3), and taxel {id} measures {name}; remove it"
+        );
         return Err(text.wrong(at, what));
     }
     Ok(())
@@ -74,7 +75,15 @@ mod tests {
 
     #[test]
     fn keys_of_pressures_are_refused_for_what_feels_none() {
-        for key in ["dead_band = 1", "p_max = 9", "noise = 1", "sensor = \"fsr\"", "onset = \"soft\"", "gain_spread = 0.1", "wiper = 3"] {
+        for key in [
+            "dead_band = 1",
+            "p_max = 9",
+            "noise = 1",
+            "sensor = \"fsr\"",
+            "onset = \"soft\"",
+            "gain_spread = 0.1",
+            "wiper = 3",
+        ] {
             let name = key.split(' ').next().unwrap();
             assert_eq!(
                 read(&format!("[taxel.301]\nmask = true\n{key}")).unwrap_err(),

@@ -270,7 +270,9 @@ impl ShearKeys {
             let rows = matrix.get_ref();
             let why = match rows.iter().flatten().find(|share| !(share.abs() <= MOST_ACROSS)) {
                 Some(share) => format!("has {share}; its numbers are at most {MOST_ACROSS} in size"),
-                None if rows.iter().flatten().all(|share| *share == 0.0) => "leaves no shear; its rows are all 0".into(),
+                None if rows.iter().flatten().all(|share| *share == 0.0) => {
+                    "leaves no shear; its rows are all 0".into()
+                }
                 None => String::new(),
             };
             if !why.is_empty() {
