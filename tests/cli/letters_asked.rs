@@ -40,7 +40,7 @@ fn touches(lines: &[Value]) -> Vec<&Value> {
 #[test]
 fn touches_have_what_they_feel_beside_pressure_whatever_fields_have() {
     let whole = hand(&[]);
-    let keys = ["shear", "force_vector", "torsion", "friction", "temperature"];
+    let keys = ["shear", "torsion", "friction", "temperature"];
     let of = |lines: &[Value]| -> Vec<Vec<Value>> {
         touches(lines).iter().map(|touch| keys.map(|key| touch[key].clone()).to_vec()).collect()
     };
