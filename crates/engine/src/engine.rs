@@ -14,6 +14,7 @@ mod on_skin;
 mod options;
 mod place;
 mod post;
+mod pulls;
 mod self_contacts;
 mod skin_fits;
 mod skin_sigmas;

@@ -15,7 +15,7 @@ use somatic::sink::RosTime;
 use somatic::source::VendorFormat;
 use somatic::{BackendKind, Result};
 
-use super::flags::{ACCURACY, COMPUTED, LIVE, OUTPUT, RECORDINGS, ROBOT, one_of};
+use super::flags::{ACCURACY, COMPUTED, LIVE, OUTPUT, RECORDINGS, ROBOT, letter, one_of};
 use super::outputs::outputs_help;
 use crate::cli::text_flags::TextFlags;
 
@@ -86,7 +86,7 @@ pub(in crate::cli) struct RunFlags {
     /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
     /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and letters of other taxels].
     #[arg(long, help_heading = COMPUTED, value_name = "LETTER,...", value_delimiter = ',',
-        value_parser = one_of::<Receptor>(&["sustained", "change", "shear", "temperature", "proximity"]))]
+        value_parser = letter())]
     pub(in crate::cli) letters: Vec<Receptor>,
 
     /// Compute from the raw or the linear signal of force-sensing resistors, not the one in the calibration.

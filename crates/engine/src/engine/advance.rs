@@ -285,6 +285,7 @@ impl Engine {
             }
         }
         self.plan.senses.shear = Some(shear);
+        self.plan.calibration_changes += 1;
     }
 
     /// Ends an epoch of drift compensation, and calibrates from now on with its outcome.

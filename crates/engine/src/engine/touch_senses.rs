@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
 
-use super::letters::{tangential, tangential_gain};
+use super::pulls::{tangential, tangential_gain};
 use crate::body::{Body, Modality};
 use crate::percept::{Flags, Touch, TouchFlags, TouchFrame};
 use crate::scene::Plan;

@@ -11,11 +11,12 @@ bitflags! {
     pub struct Flags: u32 {
         /// The field is not in contact: everything that needs a touch is absent.
         const NO_CONTACT = 1 << 0;
-        /// Only one taxel is pressed: there is no line through two points, and no spread.
+        /// Only one taxel is pressed: there is no line through two points, no spread and no torsion.
         const ONE_TAXEL = 1 << 1;
         /// The second and third farthest points are as good as equally far (R₂ − R₃ ≤ 2⁻¹⁴ R₁): orientation is in doubt.
         const TIE = 1 << 2;
-        /// The points that would define a line fall together: orientation (or axis) is absent.
+        /// The points that would define a line fall together: orientation (or axis) is absent. Or taxels that would define a plane lie
+        /// in a line, or are under three: the gradient is absent.
         const COINCIDENT = 1 << 3;
         /// The pressure spreads equally in all directions (anisotropy under 10⁻³): the axis is absent.
         const ISOTROPIC = 1 << 4;

@@ -190,6 +190,6 @@ fn pulled(
         return (if is_missing { Reading::Missing } else { Reading::Faulty }, [0.0; 2]);
     };
     let gain = by.gain_of(taxel, calibration.gain, calibration.unit_factor);
-    let forces = by.forces(taxel, gain, own.value, [u, v]);
+    let forces = by.forces(by.rest_of(taxel), gain, own.value, [u, v]);
     (Reading::Value(libm::hypot(forces[0], forces[1]), true), forces)
 }

@@ -10,7 +10,9 @@ use crate::body::{Body, Taxel, listed};
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
 use crate::percept::{Column, Outputs, TouchOutputs};
-use crate::signal::{Axis, Calibration, Channel, Letter, Receptor, SenseCalibration, ShearCalibration};
+use crate::signal::{
+    Axis, Calibration, Channel, Letter, Receptor, Response, SenseCalibration, ShearCalibration, TaxelCalibration,
+};
 
 /// What the host reads of raw values for a plan's letters.
 #[derive(Clone, Debug, Default)]
@@ -149,6 +151,36 @@ impl Senses {
             proximity: proximity.then(|| calibration.proximity.clone()),
             shear: shear.then(|| calibration.shear.clone()),
         }
+    }
+
+    /// Refuses shear whose calibration does not say what it is made of: of the taxels `body_taxels`, which `calibrations` are of, one
+    /// has a curve and no gain for its tangential values; or `outputs` asks by name for the ratio to a friction that is not known.
+    pub(super) fn check_shear(
+        &self,
+        body: &Body,
+        body_taxels: &[usize],
+        calibrations: &[TaxelCalibration],
+        outputs: Outputs,
+    ) -> Result<()> {
+        let Some(by) = &self.shear else { return Ok(()) };
+        let lacks_gain = |taxel: usize, calibration: &TaxelCalibration| {
+            let has_axes = Receptor::Shear.reads(body.taxels[taxel].modality);
+            let has_gain = by.gain.is_some() || by.own_gains.contains_key(&taxel);
+            has_axes && !has_gain && calibration.response != Response::Linear
+        };
+        let found = body_taxels.iter().zip(calibrations).find(|&(&taxel, calibration)| lacks_gain(taxel, calibration));
+        if let Some((&taxel, _)) = found {
+            return Err(Error::usage(format!(
+                "taxel {} has a curve, which is of its normal force: give `gain` in [shear], the unit of P for a raw unit along the skin",
+                body.taxels[taxel].id
+            )));
+        }
+        if outputs.contains(Outputs::SLIP_RATIO) && !outputs.contains(Outputs::USUAL) && by.slips_at.is_none() {
+            return Err(Error::usage(
+                "`slip_ratio` is friction over that at which a touch slips: give `slips_at` in [shear] of the calibration",
+            ));
+        }
+        Ok(())
     }
 
     /// Refuses what is `asked` of touches by name and no letter gives. Whoever asks for everything gets what there is.

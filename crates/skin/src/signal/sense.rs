@@ -192,11 +192,17 @@ impl ShearCalibration {
         own.map_or(gain.abs(), |own| own * unit_factor)
     }
 
-    /// The forces along t and n × t, in the unit of P, that the body's taxel `taxel` feels under `pressure` with the raw values
-    /// `tangential`, each with `gain` ([`ShearCalibration::gain_of`]).
+    /// The raw tangential values at rest of the body's taxel `taxel`.
     #[must_use]
-    pub fn forces(&self, taxel: usize, gain: f64, pressure: f64, tangential: [f64; 2]) -> [f64; 2] {
-        let rest = self.own_baselines.get(&taxel).copied().unwrap_or(self.baselines);
+    pub fn rest_of(&self, taxel: usize) -> [f64; 2] {
+        self.own_baselines.get(&taxel).copied().unwrap_or(self.baselines)
+    }
+
+    /// The forces along t and n × t, in the unit of P, of a taxel that feels `pressure` and has the raw values `tangential`, with
+    /// `rest` ([`ShearCalibration::rest_of`]) and `gain` ([`ShearCalibration::gain_of`]).
+    #[must_use]
+    #[inline]
+    pub fn forces(&self, rest: [f64; 2], gain: f64, pressure: f64, tangential: [f64; 2]) -> [f64; 2] {
         let [u, v] = [0, 1].map(|axis| gain * (tangential[axis] - rest[axis]));
         self.cross_axis.map(|[of_p, of_u, of_v]| of_p * pressure + of_u * u + of_v * v)
     }

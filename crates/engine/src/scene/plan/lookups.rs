@@ -31,6 +31,7 @@ impl Plan {
 
     /// Per slot that is calibrated.
     #[doc(hidden)]
+    #[inline]
     pub fn curve_of(&self, slot: usize) -> Table<'_> {
         self.curves.table(self.taxels[slot].response)
     }

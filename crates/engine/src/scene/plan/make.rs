@@ -41,6 +41,7 @@ impl Plan {
         let read = read(body, fields, touches.is_some(), &chosen);
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
         plan.senses = Senses::new(body, fields, &chosen, &letters, calibration);
+        plan.senses.check_shear(body, &plan.body_taxels, &plan.calibrations, scene.outputs)?;
         plan.letters = letters;
         let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
         plan.senses.check_touches(of_touches).map_err(|e| e.at(&body.name))?;
