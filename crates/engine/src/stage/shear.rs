@@ -47,7 +47,7 @@ pub(crate) struct Shear {
 }
 
 /// The share of Σ w‖s‖ under which a sum is the rounding of its terms, and has no direction.
-const ROUNDING: f64 = 1e-12;
+pub(crate) const ROUNDING: f64 = 1e-12;
 
 /// What is right; `taxels` is not empty.
 pub(crate) fn reference(taxels: &[Pulled]) -> Shear {
