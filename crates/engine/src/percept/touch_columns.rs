@@ -109,10 +109,8 @@ impl TouchOutputs {
         .union(Self::PLACE);
 
     /// Standard deviations of what is not made of fits.
-    pub const SIGMAS: Self = Self::TOTAL_SIGMA
-        .union(Self::POSITION_SIGMA)
-        .union(Self::PRINCIPAL_AXIS_SIGMA)
-        .union(Self::FRICTION_SIGMA);
+    pub const SIGMAS: Self =
+        Self::TOTAL_SIGMA.union(Self::POSITION_SIGMA).union(Self::PRINCIPAL_AXIS_SIGMA).union(Self::FRICTION_SIGMA);
 
     /// The names as `--outputs touches.NAME` and NDJSON spell them, in order.
     pub fn names(self) -> impl Iterator<Item = String> {

@@ -138,8 +138,8 @@ impl TouchSenses {
         let reads_pulls = body.taxels.iter().any(|taxel| Receptor::Shear.reads(taxel.modality));
         let is_named = asked.intersects(OF_SHEAR)
             || (outputs.contains(Outputs::USUAL) && !outputs.intersects(Outputs::OF_OTHER_LETTERS));
-        let is_wanted = letters.iter().any(|letter| letter.receptor == Receptor::Shear)
-            || (scene.letters.is_empty() && is_named);
+        let is_wanted =
+            letters.iter().any(|letter| letter.receptor == Receptor::Shear) || (scene.letters.is_empty() && is_named);
         Self { reads_pulls, gives_shear: reads_pulls && is_wanted }
     }
 }
