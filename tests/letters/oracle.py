@@ -261,7 +261,7 @@ def shears(recording, field, frames):
         size, pull = (weights * terms.sum(axis=0)).sum(), (weights * p).sum()
         vector = (weights[:, None] * in_space).sum(axis=0)
         friction = np.linalg.norm(vector) / pull
-        found = {"shear_vector": Value(vector, size), "friction": Value(friction, size / pull)}
+        found = {"shear_vector": Value(vector, size)}
         if np.isnan(newtons[there]).any():
             flags |= {"no_unit"}
         else:
@@ -275,13 +275,15 @@ def shears(recording, field, frames):
             torsion = (weights * (arms[:, 0] * flat[:, 1] - arms[:, 1] * flat[:, 0])).sum()
             reach = np.abs(places).max() + 1e-3
             found |= {"shear": Value(total, size), "torsion": Value(torsion, 4 * size * reach)}
-            length, sizes = np.linalg.norm(total), (weights * np.linalg.norm(flat, axis=1)).sum()
+            length = np.linalg.norm(total)
+            friction, sizes = length / pull, (weights * np.linalg.norm(flat, axis=1)).sum()
             if length > 1e-9 * sizes:
                 found["shear_direction"] = Value(np.arctan2(total[1], total[0]), 4 * max(1, size / length))
             elif sizes == 0 or length == 0:
                 flags |= {"still"}
             else:
                 found["shear_direction"] = None
+        found["friction"] = Value(friction, size / pull)
         if np.isnan(noise[there]).any():
             flags |= {"noise_unknown"}
         else:

@@ -327,7 +327,7 @@ impl Cell<'_> {
             };
             (taxel.shear_in_space, taxel.normal) = (su * tu + sv * tv, normal);
         }
-        let found = shear::reference(&pulled);
+        let found = shear::reference(&pulled, self.field.chart.is_some());
         if matches!(frame, Frame::Nowhere) {
             made.flags |= Flags::NO_POSE;
         } else {

@@ -1,10 +1,10 @@
 //! What touches are beside pressure: how they pull along the skin, and how warm they are.
 //!
-//! Σs, ‖Σs‖/ΣP and Σ(x − c) × s · n go over the taxels of a touch that have three axes and whose tangential forces are known, x being
+//! Σs and Σ(x − c) × s · n go over the taxels of a touch that have three axes and whose tangential forces are known, x being
 //! where they are on the body at rest, c the mean of x by P and n the normal of the taxel at which the touch's chart is based. In
-//! that chart each s is turned by the smallest turn that takes its taxel's normal to the chart's. Those forces are a part of
-//! wrenches, too. A touch is as warm as the mean of the taxels of temperature whose nearest pressure taxel on the same link is one
-//! of its taxels.
+//! that chart each s is turned by the smallest turn that takes its taxel's normal to the chart's; the friction is ‖Σs‖/ΣP of
+//! these. Tangential forces are a part of wrenches, too. A touch is as warm as the mean of the taxels of temperature whose nearest
+//! pressure taxel on the same link is one of its taxels.
 
 use std::collections::BTreeMap;
 
@@ -142,7 +142,9 @@ impl TouchSenses {
             if self.pulls.is_empty() {
                 continue;
             }
-            self.shear((plan, skin), touch);
+            if self.wanted.contains(TouchOutputs::SHEAR) {
+                self.shear((plan, skin), touch);
+            }
             if self.wanted.contains(TouchOutputs::FRICTION_SIGMA) {
                 touch.friction_sigma = touch.friction.and_then(|friction| self.friction_sigma(plan, sensed, friction));
                 if touch.friction_sigma.is_none() {
@@ -215,7 +217,7 @@ impl TouchSenses {
             });
         }
         let turn = self.link_from_body[touch.link as usize];
-        let friction = shear.length() / total;
+        let friction = in_chart.length() / total;
         touch.shear = Some(turn * shear);
         touch.torsion = Some(torsion);
         touch.friction = Some(friction);

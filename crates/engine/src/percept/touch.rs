@@ -130,7 +130,7 @@ pub struct Touch {
     pub force_vector_newton: Option<DVec3>,
     /// Σ(x − c) × s · n about the mean c of those taxels by P, in the unit of P times m.
     pub torsion: Option<f64>,
-    /// ‖Σs‖ / ΣP of those taxels.
+    /// ‖Σs‖ / ΣP of those taxels, each s turned into the touch's chart.
     pub friction: Option<f64>,
     /// Standard deviation of that from the noise of the sensors; only on request.
     pub friction_sigma: Option<f64>,

@@ -229,7 +229,7 @@ touch_columns! {
     SHEAR "shear_direction" Radian 1 "The same as an angle in its own chart, rad in (−π, π]." |touch| one_of(touch.shear_direction_rad);
     SHEAR "force_vector" Newton 3 "The force on the skin by those taxels, normal and tangential, N." |touch| vector(touch.force_vector_newton);
     SHEAR "torsion" PMetre 1 "Σ(x − c) × s · n about the mean c of those taxels by P, counter-clockwise seen from outside." |touch| one_of(touch.torsion);
-    SHEAR "friction" One 1 "‖Σs‖ / ΣP of those taxels." |touch| one_of(touch.friction);
+    SHEAR "friction" One 1 "‖Σs‖ / ΣP of those taxels, each s turned into its own chart." |touch| one_of(touch.friction);
     SHEAR "slip_ratio" One 1 "Friction over that at which it slips, slips_at of the calibration: a slip begins at 0.95." |touch| one_of(touch.slip_ratio);
     FRICTION_SIGMA "friction_sigma" One 1 "The standard deviation of its friction, from the sensors' noise." |touch| one_of(touch.friction_sigma);
     TEMPERATURE "temperature" Celsius 1 "Mean of the temperature taxels that are nearest to its taxels, °C." |touch| one_of(touch.temperature_celsius);

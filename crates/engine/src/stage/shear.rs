@@ -2,8 +2,9 @@
 //!
 //! Over the pressed taxels, at x in the chart with weight w, normal part P > 0 and tangential force s = sᵤ t + sᵥ n × t: the sum
 //! s = Σ wᵢsᵢ, along u and v of the chart and as a vector in space; its direction; the torsion Σ wᵢ(xᵢ − c) × sᵢ · n about the
-//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A tangent
-//! comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost.
+//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP, along the chart where there is one; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A tangent
+//! comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost, as a sum in space
+//! loses it where the skin is curved.
 //!
 //! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend.
 //!
@@ -49,15 +50,15 @@ pub(crate) struct Shear {
 /// The share of Σ w‖s‖ under which a sum is the rounding of its terms, and has no direction.
 pub(crate) const ROUNDING: f64 = 1e-12;
 
-/// What is right; `taxels` is not empty.
-pub(crate) fn reference(taxels: &[Pulled]) -> Shear {
+/// What is right of a field, which has a chart if it is `charted`; `taxels` is not empty.
+pub(crate) fn reference(taxels: &[Pulled], charted: bool) -> Shear {
     let pull: f64 = taxels.iter().map(|taxel| taxel.weight * taxel.pressure).sum();
     let along_chart: DVec2 = taxels.iter().map(|taxel| taxel.weight * taxel.shear).sum();
     let in_space: DVec3 = taxels.iter().map(|taxel| taxel.weight * taxel.shear_in_space).sum();
     let size: f64 = taxels.iter().map(|taxel| taxel.weight * taxel.shear.length()).sum();
     let centroid = taxels.iter().map(|taxel| taxel.weight * taxel.pressure * taxel.place_m).sum::<DVec2>() / pull;
     let torsion = taxels.iter().map(|taxel| taxel.weight * (taxel.place_m - centroid).perp_dot(taxel.shear)).sum();
-    let friction = in_space.length() / pull;
+    let friction = if charted { along_chart.length() } else { in_space.length() } / pull;
     let force = taxels.iter().try_fold(DVec3::ZERO, |sum, taxel| {
         Some(sum + taxel.newtons_per_p? * (taxel.shear_in_space - taxel.pressure * taxel.normal))
     });
@@ -97,7 +98,7 @@ mod tests {
     #[test]
     fn a_drag_has_its_direction_and_no_torsion() {
         let taxels = [at(0.0, 0.0, 2.0, [0.6, 0.8]), at(0.01, 0.0, 2.0, [0.6, 0.8])];
-        let shear = reference(&taxels);
+        let shear = reference(&taxels, true);
         assert!((shear.along_chart - DVec2::new(1.2, 1.6)).length() < 1e-15);
         assert!((shear.direction.unwrap() - 0.8_f64.atan2(0.6)).abs() < 1e-15);
         assert!(shear.torsion.abs() < 1e-15 && (shear.friction - 0.5).abs() < 1e-15);
@@ -115,7 +116,7 @@ mod tests {
                 let (sin, cos) = angle.sin_cos();
                 at(0.01 * cos, 0.01 * sin, 1.0, [-sense * sin, sense * cos])
             };
-            reference(&(0..4).map(corner).collect::<Vec<_>>())
+            reference(&(0..4).map(corner).collect::<Vec<_>>(), true)
         };
         let left = ring(1.0);
         assert!((left.torsion - 0.04).abs() < 1e-15 && (ring(-1.0).torsion + 0.04).abs() < 1e-15);
@@ -128,7 +129,21 @@ mod tests {
             at(0.0, 0.0, 2.0, [0.6, 0.8]),
             Pulled { newtons_per_p: None, sigmas: None, ..at(0.01, 0.0, 2.0, [0.6, 0.8]) },
         ];
-        let shear = reference(&taxels);
+        let shear = reference(&taxels, true);
         assert!(shear.force.is_none() && shear.friction_sigma.is_none() && shear.direction.is_some());
+    }
+
+    #[test]
+    fn a_drag_around_a_limb_has_the_friction_of_each_of_its_taxels() {
+        let tilted = |turn: f64| Pulled {
+            shear_in_space: DVec3::new(turn.cos(), 0.0, -turn.sin()),
+            normal: DVec3::new(turn.sin(), 0.0, turn.cos()),
+            ..at(0.03 * turn, 0.0, 2.0, [1.0, 0.0])
+        };
+        let taxels = [tilted(-1.0), tilted(0.0), tilted(1.0)];
+        assert!((reference(&taxels, true).friction - 0.5).abs() < 1e-15);
+        // Without a chart it is that of what is left in space.
+        let left = (1.0 + 2.0 * 1.0_f64.cos()) / 6.0;
+        assert!((reference(&taxels, false).friction - left).abs() < 1e-15 && left < 0.4);
     }
 }
