@@ -44,7 +44,6 @@ fn limb() -> Body {
         }
     };
     glb.taxels("taxels", Some(link), &(0..COLUMNS * ROWS).map(taxel).collect::<Vec<_>>(), None);
-    let node = glb.node("surface", Some(link), DVec3::ZERO);
     let (around, high) = (120, 12);
     let corners = (0..=high).flat_map(|row| (0..around).map(move |column| (row, column)));
     let corner = |(row, column): (u32, u32)| {
@@ -64,15 +63,15 @@ fn limb() -> Body {
         positions: positions.iter().map(|p| p.as_vec3().to_array()).collect(),
         skinning: None,
     };
-    glb.mesh(node, "surface", &mesh, None, None);
+    glb.mesh(link, "surface", &mesh, None, None);
     let members = [COLUMNS / 2, COLUMNS / 2 + 1].map(|id| (id, MemberSpec::default())).into_iter().collect();
     glb.field(&FieldSpec { name: "back".into(), parent: None, members, chart: None }, Some(link), DVec3::ZERO);
     Body::from_bytes("limb", &glb.to_bytes().unwrap()).unwrap()
 }
 
-fn simulated(body: &Body, sensor: &str, duration_s: f64, touch: &str) -> SimulatedSource {
+fn simulated(body: &Body, sensor: &str, [rate_hz, duration_s]: [f64; 2], touch: &str) -> SimulatedSource {
     let text = format!(
-        "rate_hz = 100\nduration_s = {duration_s}\nseed = 5\n[layer]\nthickness_m = 0.007\n{sensor}\n[[touch]]\n\
+        "rate_hz = {rate_hz}\nduration_s = {duration_s}\nseed = 5\n[layer]\nthickness_m = 0.007\n{sensor}\n[[touch]]\n\
          on = \"body\"\n{touch}\n"
     );
     SimulatedSource::on_body("touch", &text, body.clone()).unwrap()
@@ -90,8 +89,12 @@ fn drag(link: &str, from: DVec3, to: DVec3, speed_m_s: f64) -> String {
 }
 
 fn scene() -> Scene {
-    let more = TouchOutputs::WRENCH | TouchOutputs::TAXELS | TouchOutputs::FRICTION_SIGMA;
-    Scene::default().touches(touch::Options { outputs: TouchOutputs::USUAL | more, ..touch::Options::default() })
+    with_wrenches(TouchOutputs::FRICTION_SIGMA)
+}
+
+fn with_wrenches(more: TouchOutputs) -> Scene {
+    let outputs = TouchOutputs::USUAL | TouchOutputs::WRENCH | TouchOutputs::TAXELS | more;
+    Scene::default().touches(touch::Options { outputs, ..touch::Options::default() })
 }
 
 fn engine(body: &Body, calibration: &str, scene: Scene) -> Engine {
@@ -124,8 +127,8 @@ fn moments(mut source: SimulatedSource, change: impl Fn(&mut Frame)) -> Vec<Mome
 
 /// Ways to drag over the limb: from and to, by the turn around it and the place along it.
 fn ways() -> impl Iterator<Item = [DVec3; 2]> {
-    [0.4_f64, 1.3, 2.6, 4.0, 5.5, 6.1].into_iter().enumerate().map(|(way, turn)| {
-        let heading = 1.1 * way as f64;
+    [0.4_f64, 2.6, 4.0, 6.1].into_iter().enumerate().map(|(way, turn)| {
+        let heading = 0.8 * way as f64;
         let (sin, cos) = heading.sin_cos();
         let at = |along: f64| on_limb(turn + along * cos / RADIUS, along * sin);
         [at(-0.008), at(0.008)]
@@ -143,13 +146,14 @@ fn rms(values: &[f64]) -> f64 {
 #[test]
 fn a_drag_around_a_limb_has_its_direction_and_friction() {
     let body = limb();
-    for (sensor, most_degrees, most_friction) in [("", 1.0, 0.01), ("[sensor]\nnoise_sigma = 0.01", 2.5, 0.04)] {
+    let noisy = "[sensor]\nnoise_sigma = 0.01";
+    for (sensor, count, most_degrees, most_friction) in [("", 4, 0.5, 1e-6), (noisy, 2, 1.5, 0.04)] {
         let (mut degrees, mut frictions) = (Vec::new(), Vec::new());
-        for [from, to] in ways() {
-            let run = moments(simulated(&body, sensor, 0.8, &drag("limb", from, to, 0.025)), |_| ());
+        for [from, to] in ways().take(count) {
+            let run = moments(simulated(&body, sensor, [50.0, 0.5], &drag("limb", from, to, 0.025)), |_| ());
             let begins = run.iter().position(slips).unwrap();
             let sees = run.iter().position(|moment| moment.touch.slip_ratio.is_some_and(|ratio| ratio >= 0.95));
-            assert!(sees.unwrap().abs_diff(begins) <= 2 && begins > 15, "{sees:?}, not {begins}");
+            assert!(sees.unwrap().abs_diff(begins) <= 2 && run[begins].frame.t_s > 0.155, "{sees:?}, not {begins}");
             for Moment { truth, touch, .. } in run.iter().filter(|moment| slips(moment)) {
                 assert!((truth.shear_in_link.unwrap().length() - MU * truth.force_newton).abs() < 1e-9);
                 let shear = touch.shear.unwrap();
@@ -158,20 +162,20 @@ fn a_drag_around_a_limb_has_its_direction_and_friction() {
                 // In its chart nothing of it is lost.
                 let [u, v] = touch.shear_in_chart.unwrap();
                 assert!((u.hypot(v) - touch.friction.unwrap() * touch.total).abs() < 1e-9);
-                assert!(shear.length() < u.hypot(v) + 1e-9);
-                assert_eq!(touch.shear_direction_rad, Some(v.atan2(u)));
-                assert_eq!(touch.friction_sigma.is_some(), !sensor.is_empty());
-                assert_eq!(touch.flags.contains(TouchFlags::NOISE_UNKNOWN), sensor.is_empty());
+                assert!(shear.length() < u.hypot(v) || !sensor.is_empty());
+                assert!((touch.shear_direction_rad.unwrap() - v.atan2(u)).abs() < 1e-12);
+                let sigma = touch.friction_sigma.unwrap();
+                assert_eq!(sigma > 1e-3, !sensor.is_empty(), "{sigma}");
             }
         }
         let (found, friction) = (rms(&degrees), rms(&frictions));
         eprintln!("{sensor:?}: {found:.2}° RMS, friction {friction:.4} of {} frames", degrees.len());
-        assert!(degrees.len() > 150 && found <= most_degrees && friction <= most_friction);
+        assert!(degrees.len() > 12 * count && found <= most_degrees && friction <= most_friction);
     }
     // Without what pulls there is none of it.
     let [from, to] = ways().next().unwrap();
     let taxels = body.taxels.len();
-    let still = moments(simulated(&body, "", 0.4, &drag("limb", from, to, 0.025)), |frame| {
+    let still = moments(simulated(&body, "", [50.0, 0.3], &drag("limb", from, to, 0.025)), |frame| {
         frame.values[taxels..].fill(RawValue::new(0.0));
     });
     assert!(still.iter().any(slips));
@@ -198,7 +202,7 @@ fn twists_and_turns_of_the_whole_body_have_their_sign() {
             30.0 + sense * 20.0
         );
         for (kind, touch) in [ball, rod].iter().enumerate() {
-            let run = moments(simulated(&body, "", 0.4, &place(touch)), |_| ());
+            let run = moments(simulated(&body, "", [50.0, 0.4], &place(touch)), |_| ());
             for Moment { truth, touch, .. } in run.iter().filter(|moment| slips(moment)) {
                 let (right, found) = (truth.torsion.unwrap(), touch.torsion.unwrap());
                 assert!(right * sense > 0.0 && (found / right - 1.0).abs() < 0.1, "{kind}: {found}, not {right}");
@@ -207,7 +211,7 @@ fn twists_and_turns_of_the_whole_body_have_their_sign() {
             }
         }
     }
-    assert!(count > 60 && reaches.iter().all(|&reach| reach > 5e-3), "{count} {reaches:?}");
+    assert!(count > 30 && reaches.iter().all(|&reach| reach > 5e-3), "{count} {reaches:?}");
 }
 
 /// The wrench of `ids` by its definition, of sensors that deliver newtons.
@@ -234,10 +238,10 @@ fn off(one: &Wrench, other: &Wrench) -> f64 {
 fn a_wrench_has_what_pulls_whatever_letters_are_read() {
     let body = limb();
     let [from, to] = ways().nth(1).unwrap();
-    let run = moments(simulated(&body, "", 0.4, &drag("limb", from, to, 0.025)), |_| ());
+    let run = moments(simulated(&body, "", [50.0, 0.3], &drag("limb", from, to, 0.025)), |_| ());
     let Moment { frame, .. } = run.iter().rfind(|moment| slips(moment)).unwrap();
     let newtons = "[all]\nunit = \"N\"\n";
-    let sustained = scene().letters(Letter::all_of(&[Receptor::Sustained], &[]));
+    let sustained = with_wrenches(TouchOutputs::empty()).letters(Letter::all_of(&[Receptor::Sustained], &[]));
     let mut bits = Vec::new();
     for (scene, has_shear) in [(scene(), true), (sustained.clone(), false)] {
         let mut engine = engine(&body, newtons, scene);
@@ -334,6 +338,14 @@ fn the_friction_of_a_touch_varies_as_its_sigma_says() {
         frictions.push(touches.touches[0].friction.unwrap());
         sigmas.push(touches.touches[0].friction_sigma.unwrap());
     }
+    // Of sensors that nobody says it of it is not known.
+    let frame = engine.frame(0.0);
+    let mut unsaid = self::engine(&body, "[all]\nunit = \"N\"\n", scene());
+    let mut frame = Frame { values: vec![RawValue::new(0.0); frame.values.len()], ..frame };
+    frame.values[0] = RawValue::new(1.0);
+    let touch = unsaid.process_one(&frame).unwrap().touches(0).unwrap().touches[0].clone();
+    assert!(touch.friction == Some(0.0) && touch.friction_sigma.is_none());
+    assert!(touch.flags.contains(TouchFlags::NOISE_UNKNOWN));
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let varies = rms(&frictions.iter().map(|friction| friction - mean(&frictions)).collect::<Vec<_>>());
     let ratio = mean(&sigmas) / varies;
@@ -349,9 +361,9 @@ fn a_drag_over_an_elbow_pulls_at_both_links_and_what_presses_stays_the_same() {
     let text = include_str!("../../examples/simulations/elbow.toml");
     let touch = text.split("[[touch]]").nth(1).unwrap();
     let sensor = "[sensor]\nkind = \"ideal\"";
-    let with = |touch: &str| simulated(&body, sensor, 1.5, touch);
     let touch = touch.replace("on = \"body\"\n", "");
-    let run = moments(with(&format!("friction = {MU}\n{touch}")), |_| ());
+    let touch = format!("friction = {MU}\n{touch}");
+    let run = moments(simulated(&body, sensor, [20.0, 1.5], &touch), |_| ());
     let mut on_both = 0;
     let mut slipping = 0;
     for moment in &run {
@@ -359,18 +371,11 @@ fn a_drag_over_an_elbow_pulls_at_both_links_and_what_presses_stays_the_same() {
         slipping += usize::from(slips(moment) && (moment.touch.friction.unwrap() / MU - 1.0).abs() < 0.1);
     }
     eprintln!("{} frames, {on_both} on both links, {slipping} slip", run.len());
-    assert!(on_both > 10 && slipping > 10);
+    assert!(on_both > 10 && slipping > 15);
     // The same presses on a body of pressure taxels.
-    let mut of_plain = SimulatedSource::on_body(
-        "touch",
-        &format!(
-            "rate_hz = 100\nduration_s = 1.5\nseed = 5\n[layer]\nthickness_m = 0.007\n{sensor}\n[[touch]]\non = \"body\"\n\
-             friction = {MU}\n{touch}\n"
-        ),
-        plain.clone(),
-    )
-    .unwrap();
-    let mut engine = engine(&plain, "[all]\nunit = \"N\"\n", scene());
+    let mut of_plain = simulated(&plain, sensor, [20.0, 1.5], &touch);
+    let pressed = with_wrenches(TouchOutputs::empty());
+    let mut engine = engine(&plain, "[all]\nunit = \"N\"\n", pressed);
     let mut frame = Frame::missing(0.0, of_plain.taxels().len());
     let mut compared = 0;
     while of_plain.next_frame(&mut frame).unwrap() {
@@ -389,7 +394,7 @@ fn a_drag_over_an_elbow_pulls_at_both_links_and_what_presses_stays_the_same() {
         }
         compared += 1;
     }
-    assert!(compared > 50);
+    assert!(compared > 20);
 }
 
 #[test]

@@ -27,7 +27,7 @@ pub(crate) struct Senses {
 
 /// What of the whole body is read for touches.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct TouchSenses {
+pub(super) struct ForTouches {
     /// Tangential forces: wrenches are made of them, whatever is asked for.
     reads_pulls: bool,
     gives_shear: bool,
@@ -125,7 +125,7 @@ pub(super) fn letters_and_outputs(
     Ok((letters, given))
 }
 
-impl TouchSenses {
+impl ForTouches {
     /// For the touches that `scene` asks for with `asked`, if it does, beside `outputs` of fields in `letters`. Touches have shear wherever the body
     /// has three axes, whatever fields are chosen, unless other letters or outputs are named.
     pub(super) fn new(
@@ -155,19 +155,19 @@ impl Senses {
         chosen: &[usize],
         letters: &[Letter],
         calibration: &Calibration,
-        of_touches: TouchSenses,
+        for_touches: ForTouches,
     ) -> Self {
         let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
         let [temperature, proximity, shear] =
             [Receptor::Temperature, Receptor::Proximity, Receptor::Shear].map(is_read);
-        if !(temperature || proximity || shear || of_touches.reads_pulls) {
+        if !(temperature || proximity || shear || for_touches.reads_pulls) {
             return Self::default();
         }
         let all = Channel::all_of(body);
         let place = |channel: Channel| all.binary_search(&channel.0).expect("it is a channel of the body");
         let mut channels = BTreeSet::new();
         let pulls = |taxel: &Taxel| [Axis::U, Axis::V].map(|axis| place(Channel::of_taxel(taxel.id, axis)));
-        if of_touches.reads_pulls {
+        if for_touches.reads_pulls {
             let pulled = body.taxels.iter().filter(|taxel| Receptor::Shear.reads(taxel.modality));
             channels.extend(pulled.flat_map(pulls));
         }
@@ -186,8 +186,8 @@ impl Senses {
             channels: channels.into_iter().collect(),
             temperature: temperature.then(|| calibration.temperature.clone()),
             proximity: proximity.then(|| calibration.proximity.clone()),
-            shear: (shear || of_touches.reads_pulls).then(|| calibration.shear.clone()),
-            pulls_touches: of_touches.gives_shear,
+            shear: (shear || for_touches.reads_pulls).then(|| calibration.shear.clone()),
+            pulls_touches: for_touches.gives_shear,
         }
     }
 

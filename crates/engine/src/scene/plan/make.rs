@@ -9,7 +9,7 @@ use super::super::curves::Curves;
 use super::super::left_out::{LeftOut, is_pressure, pressed_members};
 use super::super::members::{parts, quantity_of, surface, thresholds, unit_of, weights};
 use super::super::onset::softened;
-use super::super::senses::{Senses, TouchSenses, letters_and_outputs};
+use super::super::senses::{ForTouches, Senses, letters_and_outputs};
 use super::super::stages::Stages;
 use super::super::{Coordinates, Scene, choose_fields};
 use super::{Plan, PlanField};
@@ -41,7 +41,7 @@ impl Plan {
         let touches = scene.asked_touches().filter(|_| feels_pressure || !scene.letters.is_empty());
         let read = read(body, fields, touches.is_some(), &chosen);
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
-        let senses = TouchSenses::new(body, scene, (&letters, named), touches.map(|touches| touches.outputs));
+        let senses = ForTouches::new(body, scene, (&letters, named), touches.map(|touches| touches.outputs));
         plan.senses = Senses::new(body, fields, &chosen, &letters, calibration, senses);
         plan.letters = letters;
         let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
