@@ -126,8 +126,8 @@ pub(super) fn letters_and_outputs(
 }
 
 impl ForTouches {
-    /// For the touches that `scene` asks for with `asked`, if it does, beside `outputs` of fields in `letters`. Touches have shear wherever the body
-    /// has three axes, whatever fields are chosen, unless other letters or outputs are named.
+    /// For the touches that `scene` asks for with `asked`, if it does, beside `outputs` of fields in `letters`. Touches have shear
+    /// wherever the body has three axes, whatever fields are chosen, unless other letters or outputs are named.
     pub(super) fn new(
         body: &Body,
         scene: &Scene,

@@ -2,9 +2,9 @@
 //!
 //! Over the pressed taxels, at x in the chart with weight w, normal part P > 0 and tangential force s = sᵤ t + sᵥ n × t: the sum
 //! s = Σ wᵢsᵢ, along u and v of the chart and as a vector in space; its direction; the torsion Σ wᵢ(xᵢ − c) × sᵢ · n about the
-//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP, along the chart where there is one; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A tangent
-//! comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost, as a sum in space
-//! loses it where the skin is curved.
+//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP, along the chart where there is one; and the force on the skin,
+//! Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A tangent comes into the chart by the smallest turn that takes its taxel's normal to
+//! the chart's, so that no length is lost, as a sum in space loses it where the skin is curved.
 //!
 //! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend.
 //!
