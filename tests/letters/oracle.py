@@ -286,7 +286,7 @@ def shears(recording, field, frames):
         size, pull = (weights * terms.sum(axis=0)).sum(), (weights * p).sum()
         vector = (weights[:, None] * in_space).sum(axis=0)
         friction = np.linalg.norm(vector) / pull
-        found = {"shear_vector": Value(vector, size), "friction": Value(friction, size / pull)}
+        found = {"shear_vector": Value(vector, size)}
         # What presses counts in the force, whether it is known how it pulls or not.
         presses = np.flatnonzero(pressed)
         if np.isnan(newtons[presses]).any():
@@ -307,14 +307,16 @@ def shears(recording, field, frames):
                 found["torsion"] = Value(torsion, 4 * size * reach)
             else:
                 flags |= {"one_taxel"}
+            length = np.linalg.norm(total)
             # Raw values are rounded to single precision.
-            length, sizes = np.linalg.norm(total), 2.0**-24 * (weights * np.abs(along).sum(axis=0)).sum()
+            friction, sizes = length / pull, 2.0**-24 * (weights * np.abs(along).sum(axis=0)).sum()
             if length > 1.000001 * sizes:
                 found["shear_direction"] = Value(np.arctan2(total[1], total[0]), 4 * max(1, size / length))
             elif length < 0.999999 * sizes or sizes == 0:
                 flags |= {"still"}
             else:
                 found["shear_direction"] = None
+        found["friction"] = Value(friction, size / pull)
         if np.isnan(noise[there]).any():
             flags |= {"noise_unknown"}
         else:

@@ -337,12 +337,16 @@ impl Cell<'_> {
                 None => made.flags |= Flags::STILL,
             }
         }
-        let friction = found.friction();
+        let friction = found.friction(self.field.chart.is_some());
         made.give(Outputs::FRICTION, Host::Friction, &[friction]);
         if made.percepts.outputs().contains(Outputs::FRICTION_SIGMA) {
             match self.variances(by, pulls) {
                 Some(variances) => {
-                    made.give(Outputs::FRICTION_SIGMA, Host::FrictionSigma, &[found.friction_sigma(variances)]);
+                    made.give(
+                        Outputs::FRICTION_SIGMA,
+                        Host::FrictionSigma,
+                        &[found.friction_sigma(friction, variances)],
+                    );
                 }
                 None => made.flags |= Flags::NOISE_UNKNOWN,
             }

@@ -20,7 +20,8 @@ bitflags! {
         const COINCIDENT = 1 << 3;
         /// The pressure spreads equally in all directions (anisotropy under 10⁻³): the axis is absent.
         const ISOTROPIC = 1 << 4;
-        /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion.
+        /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion. Of letter shear:
+        /// nothing pulls along the skin, and there is no direction of shear.
         const STILL = 1 << 5;
         /// A pressed taxel is above its P_max; its value is kept.
         const SATURATED = 1 << 6;

@@ -185,6 +185,7 @@ impl Plan {
             "hysteresis" => "the calibration has thresholds",
             "centroid" | "position" => "later stages need it",
             "touches" => "of the whole body",
+            "shear" => "of touches, and in wrenches",
             _ => "others need it",
         }
     }

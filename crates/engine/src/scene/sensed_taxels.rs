@@ -108,7 +108,8 @@ impl SensedTaxels {
         let of_taxel = |(index, taxel): (usize, &crate::body::Taxel)| {
             let letter = [Receptor::Shear, Receptor::Temperature, Receptor::Proximity]
                 .into_iter()
-                .find(|receptor| receptor.reads(taxel.modality))?;
+                .find(|receptor| receptor.reads(taxel.modality))
+                .filter(|&receptor| plan.gives(receptor))?;
             let values = match letter {
                 Receptor::Shear => [Axis::U, Axis::V].map(|axis| place(taxel.id, axis)),
                 _ => [place(taxel.id, Axis::Normal); 2],

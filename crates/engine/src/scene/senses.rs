@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
 use crate::percept::{Column, Outputs, TouchOutputs};
 use crate::signal::{
-    Axis, Calibration, Channel, Letter, Receptor, Response, SenseCalibration, ShearCalibration, TaxelCalibration,
+    Axis, Calibration, Channel, Letter, Receptor, SenseCalibration, ShearCalibration, TaxelCalibration,
 };
 
 /// What the host reads of raw values for a plan's letters.
@@ -21,7 +21,18 @@ pub(crate) struct Senses {
     pub(crate) channels: Vec<usize>,
     pub(crate) temperature: Option<SenseCalibration>,
     pub(crate) proximity: Option<SenseCalibration>,
+    /// Of fields with that letter, and of touches.
     pub(crate) shear: Option<ShearCalibration>,
+    /// Whether touches have shear.
+    pulls_touches: bool,
+}
+
+/// What of the whole body is read for touches.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ForTouches {
+    /// Tangential forces: wrenches are made of them, whatever is asked for.
+    reads_pulls: bool,
+    gives_shear: bool,
 }
 
 /// A taxel of a field in such a letter.
@@ -116,28 +127,56 @@ pub(super) fn letters_and_outputs(
     Ok((letters, given))
 }
 
+impl ForTouches {
+    /// For the touches that `scene` asks for with `asked`, if it does, beside `outputs` of fields in `letters`. Touches have shear
+    /// wherever the body has three axes, whatever fields are chosen, unless other letters or outputs are named.
+    pub(super) fn new(
+        body: &Body,
+        scene: &Scene,
+        (letters, outputs): (&[Letter], Outputs),
+        asked: Option<TouchOutputs>,
+    ) -> Self {
+        let Some(asked) = asked else { return Self::default() };
+        let reads_pulls = body.taxels.iter().any(|taxel| Receptor::Shear.reads(taxel.modality));
+        let is_named = asked.intersects(OF_SHEAR)
+            || (outputs.contains(Outputs::USUAL) && !outputs.intersects(Outputs::OF_OTHER_LETTERS));
+        let is_wanted =
+            letters.iter().any(|letter| letter.receptor == Receptor::Shear) || (scene.letters.is_empty() && is_named);
+        Self { reads_pulls, gives_shear: reads_pulls && is_wanted }
+    }
+}
+
+/// What touches have of shear.
+const OF_SHEAR: TouchOutputs = TouchOutputs::SHEAR.union(TouchOutputs::FRICTION_SIGMA);
+
 impl Senses {
-    /// For `letters` of the fields `chosen`.
+    /// For `letters` of the fields `chosen`, and for touches.
     pub(super) fn new(
         body: &Body,
         fields: &FieldSet,
         chosen: &[usize],
         letters: &[Letter],
         calibration: &Calibration,
+        for_touches: ForTouches,
     ) -> Self {
         let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
         let [temperature, proximity, shear] =
             [Receptor::Temperature, Receptor::Proximity, Receptor::Shear].map(is_read);
-        if !(temperature || proximity || shear) {
+        if !(temperature || proximity || shear || for_touches.reads_pulls) {
             return Self::default();
         }
         let all = Channel::all_of(body);
         let place = |channel: Channel| all.binary_search(&channel.0).expect("it is a channel of the body");
         let mut channels = BTreeSet::new();
+        let pulls = |taxel: &Taxel| [Axis::U, Axis::V].map(|axis| place(Channel::of_taxel(taxel.id, axis)));
+        if for_touches.reads_pulls {
+            let pulled = body.taxels.iter().filter(|taxel| Receptor::Shear.reads(taxel.modality));
+            channels.extend(pulled.flat_map(pulls));
+        }
         for member in chosen.iter().flat_map(|&field| &fields.fields[field].members) {
             let taxel = &body.taxels[member.taxel];
             if shear && Receptor::Shear.reads(taxel.modality) {
-                channels.extend([Axis::U, Axis::V].map(|axis| place(Channel::of_taxel(taxel.id, axis))));
+                channels.extend(pulls(taxel));
             }
             let is_sensed = (temperature && Receptor::Temperature.reads(taxel.modality))
                 || (proximity && Receptor::Proximity.reads(taxel.modality));
@@ -149,24 +188,25 @@ impl Senses {
             channels: channels.into_iter().collect(),
             temperature: temperature.then(|| calibration.temperature.clone()),
             proximity: proximity.then(|| calibration.proximity.clone()),
-            shear: shear.then(|| calibration.shear.clone()),
+            shear: (shear || for_touches.reads_pulls).then(|| calibration.shear.clone()),
+            pulls_touches: for_touches.gives_shear,
         }
     }
 
     /// Refuses shear whose calibration does not say what it is made of: of the taxels `body_taxels`, which `calibrations` are of, one
     /// has a curve and no gain for its tangential values; or `outputs` asks by name for the ratio to a friction that is not known.
+    /// Nothing is refused if only wrenches read them, not touches nor, by `of_fields`, fields.
     pub(super) fn check_shear(
         &self,
         body: &Body,
-        body_taxels: &[usize],
-        calibrations: &[TaxelCalibration],
+        (body_taxels, calibrations): (&[usize], &[TaxelCalibration]),
         outputs: Outputs,
+        of_fields: bool,
     ) -> Result<()> {
-        let Some(by) = &self.shear else { return Ok(()) };
+        let Some(by) = self.shear.as_ref().filter(|_| of_fields || self.pulls_touches) else { return Ok(()) };
         let lacks_gain = |taxel: usize, calibration: &TaxelCalibration| {
             let has_axes = Receptor::Shear.reads(body.taxels[taxel].modality);
-            let has_gain = by.gain.is_some() || by.own_gains.contains_key(&taxel);
-            has_axes && !has_gain && calibration.response != Response::Linear
+            has_axes && !by.has_gain(taxel, calibration.response)
         };
         let found = body_taxels.iter().zip(calibrations).find(|&(&taxel, calibration)| lacks_gain(taxel, calibration));
         if let Some((&taxel, _)) = found {
@@ -185,8 +225,9 @@ impl Senses {
 
     /// Refuses what is `asked` of touches by name and no letter gives. Whoever asks for everything gets what there is.
     pub(super) fn check_touches(&self, asked: TouchOutputs) -> Result<()> {
-        let others = (TouchOutputs::SHEAR | TouchOutputs::TEMPERATURE) & asked;
-        let lacking: Vec<String> = (others - self.of_touches()).names().map(|name| format!("touches.{name}")).collect();
+        let others = (OF_SHEAR | TouchOutputs::TEMPERATURE) & asked;
+        let known = self.of_touches() | if self.pulls_touches { OF_SHEAR } else { TouchOutputs::empty() };
+        let lacking: Vec<String> = (others - known).names().map(|name| format!("touches.{name}")).collect();
         if lacking.is_empty() || asked == TouchOutputs::all() {
             return Ok(());
         }
@@ -198,7 +239,7 @@ impl Senses {
 
     /// What touches have of these letters.
     pub(super) fn of_touches(&self) -> TouchOutputs {
-        let shear = self.shear.as_ref().map_or(TouchOutputs::empty(), |_| TouchOutputs::SHEAR);
+        let shear = if self.pulls_touches { TouchOutputs::SHEAR } else { TouchOutputs::empty() };
         let temperature = self.temperature.as_ref().map_or(TouchOutputs::empty(), |_| TouchOutputs::TEMPERATURE);
         shear | temperature
     }

@@ -2,9 +2,10 @@
 //!
 //! Over the pressed taxels, at x in the chart with weight w, normal part P > 0 and tangential force s = sᵤ t + sᵥ n × t: the sum
 //! s = Σ wᵢsᵢ, along u and v of the chart and as a vector in space; its direction; the torsion Σ wᵢ(xᵢ − c) × sᵢ · n about the
-//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A taxel
-//! whose s is not known is in none of these but the force, with its normal part. A tangent
-//! comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost.
+//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP, along the chart where there is one; and the force on the skin,
+//! Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A taxel whose s is not known is in none of these but the force, with its normal
+//! part. A tangent comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost,
+//! as a sum in space loses it where the skin is curved.
 //!
 //! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend. Each sum goes over the taxels once,
 //! the torsion as Σ wx × s − c × Σ ws, and sums in space are turned into the world link by link.
@@ -60,7 +61,7 @@ struct InSpace {
 }
 
 /// The share of [`Sums::size`] that raw values' own rounding to single precision may make of a sum: up to it there is no direction.
-const ROUNDING: f64 = 1.0 / (1_u32 << 24) as f64;
+pub(crate) const ROUNDING: f64 = 1.0 / (1_u32 << 24) as f64;
 
 impl Sums {
     #[inline]
@@ -123,13 +124,15 @@ impl Sums {
         (self.taxels > 1).then(|| self.turn - (self.moment / self.pull).perp_dot(self.along_chart))
     }
 
-    pub(crate) fn friction(&self) -> f64 {
-        self.space.shear.length() / self.pull
+    /// Of a field that has a chart if it is `charted`.
+    pub(crate) fn friction(&self, charted: bool) -> f64 {
+        let size = if charted { self.along_chart.length() } else { self.space.shear.length() };
+        size / self.pull
     }
 
-    /// The standard deviation of the friction, from the variances of Σ wP and of Σ ws along its direction.
-    pub(crate) fn friction_sigma(&self, [of_pull, of_shear]: [f64; 2]) -> f64 {
-        (of_shear + self.friction().powi(2) * of_pull).sqrt() / self.pull
+    /// The standard deviation of `friction`, from the variances of Σ wP and of Σ ws along its direction.
+    pub(crate) fn friction_sigma(&self, friction: f64, [of_pull, of_shear]: [f64; 2]) -> f64 {
+        (of_shear + friction.powi(2) * of_pull).sqrt() / self.pull
     }
 }
 
@@ -163,11 +166,11 @@ mod tests {
         let sums = sums_of(&[at(0.0, 0.0, 2.0, [0.6, 0.8]), at(0.01, 0.0, 2.0, [0.6, 0.8])]);
         assert!((sums.along_chart - DVec2::new(1.2, 1.6)).length() < 1e-15);
         assert!((sums.direction().unwrap() - 0.8_f64.atan2(0.6)).abs() < 1e-15);
-        assert!(sums.torsion().unwrap().abs() < 1e-15 && (sums.friction() - 0.5).abs() < 1e-15);
+        assert!(sums.torsion().unwrap().abs() < 1e-15 && (sums.friction(true) - 0.5).abs() < 1e-15);
         assert!((sums.force().unwrap() - DVec3::new(1.2, 1.6, -4.0)).length() < 1e-15);
         // With σ = 0.1 of each P and 0.2 of each s, σₛ² = 2 · 0.04 and σₚ² = 2 · 0.01.
         let sigma = (0.08_f64 + 0.25 * 0.02).sqrt() / 4.0;
-        assert!((sums.friction_sigma([0.02, 0.08]) - sigma).abs() < 1e-15);
+        assert!((sums.friction_sigma(0.5, [0.02, 0.08]) - sigma).abs() < 1e-15);
     }
 
     #[test]
@@ -183,7 +186,7 @@ mod tests {
         };
         let left = ring(1.0);
         assert!((left.torsion().unwrap() - 0.04).abs() < 1e-15 && (ring(-1.0).torsion().unwrap() + 0.04).abs() < 1e-15);
-        assert!(left.direction().is_none() && left.friction() < 1e-15);
+        assert!(left.direction().is_none() && left.friction(true) < 1e-15);
     }
 
     #[test]
@@ -209,5 +212,17 @@ mod tests {
         half_known.add_normal(&at(0.02, 0.0, 3.0, [9.0, 9.0]));
         assert!((half_known.force().unwrap() - DVec3::new(0.6, 0.8, -5.0)).length() < 1e-15 && half_known.pull == 2.0);
         assert!(sums_of(&taxels[..1]).torsion().is_none(), "one taxel has no arm");
+    }
+
+    #[test]
+    fn a_drag_around_a_limb_has_the_friction_of_each_of_its_taxels() {
+        let turns = [-1.0, 0.0, 1.0_f64];
+        let tangents = turns.map(|turn| [DVec3::new(turn.cos(), 0.0, -turn.sin()), DVec3::Y]);
+        let tilted = |(turn, tangents)| Pulled { tangents, ..at(0.03 * turn, 0.0, 2.0, [1.0, 0.0]) };
+        let sums = sums_of(&turns.into_iter().zip(&tangents).map(tilted).collect::<Vec<_>>());
+        assert!((sums.friction(true) - 0.5).abs() < 1e-15);
+        // Without a chart it is that of what is left in space.
+        let left = (1.0 + 2.0 * 1.0_f64.cos()) / 6.0;
+        assert!((sums.friction(false) - left).abs() < 1e-15 && left < 0.4);
     }
 }

@@ -189,12 +189,14 @@ impl FieldNames {
     }
 }
 
-/// Frames, and access to their pressures.
+/// Frames, and access to their forces.
 pub struct InputFrames<'a> {
     /// The frames.
     pub frames: &'a [Frame],
     /// Replaces a list by the taxel ids and pressures of one of the frames.
     pub pressures: &'a Pressures<'a>,
+    /// The same of tangential forces: of taxels with three axes that are pressed, along t and n × t.
+    pub pulls: &'a Pressures<'a, [f64; 2]>,
     /// The plan that they went through, as it is after the last one.
     pub plan: &'a Plan,
     /// The values that the last frame's percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
@@ -209,8 +211,8 @@ pub struct InputFrames<'a> {
 
 somatic_skin::debug_by_name!(InputFrames<'_>);
 
-/// Writes taxel ids and pressures of a frame into a list.
-pub type Pressures<'a> = dyn Fn(&Frame, &mut Vec<(u32, f64)>) + 'a;
+/// Writes taxel ids and pressures, or other forces, of a frame into a list.
+pub type Pressures<'a, Force = f64> = dyn Fn(&Frame, &mut Vec<(u32, Force)>) + 'a;
 
 /// How boards are doing, and messages: time (s) and text.
 #[derive(Clone, Debug, Default, PartialEq)]

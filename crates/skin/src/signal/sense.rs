@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use super::curve::Curve;
 use super::frame::RawValue;
+use super::response::Response;
 
 /// 0 °C, K.
 pub(super) const ZERO_CELSIUS_K: f64 = 273.15;
@@ -190,6 +191,12 @@ impl ShearCalibration {
         // A gain of its own is in the file's unit, as the normal one was before it came into N or Pa.
         let own = self.own_gains.get(&taxel).copied().or(self.gain);
         own.map_or(gain.abs(), |own| own * unit_factor)
+    }
+
+    /// Whether [`ShearCalibration::gain_of`] the body's taxel `taxel` is one: its own gain is of raw values if its `response` is a line.
+    #[must_use]
+    pub fn has_gain(&self, taxel: usize, response: Response) -> bool {
+        response == Response::Linear || self.gain.is_some() || self.own_gains.contains_key(&taxel)
     }
 
     /// The raw tangential values at rest of the body's taxel `taxel`.

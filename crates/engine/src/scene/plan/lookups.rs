@@ -58,6 +58,12 @@ impl Plan {
         self.touch_outputs
     }
 
+    /// Whether a letter or touches give what `receptor` reads, beside wrenches.
+    pub(in super::super) fn gives(&self, receptor: Receptor) -> bool {
+        let of_touches = self.touch_outputs.is_some_and(|outputs| outputs.contains(TouchOutputs::SHEAR));
+        self.letters.iter().any(|letter| letter.receptor == receptor) || (receptor == Receptor::Shear && of_touches)
+    }
+
     /// Keeps the pressures that touches of the whole body are found in: those of the first letter `sustained`.
     pub(super) fn find_touches(&mut self, first_slots: &[u32]) -> Result<()> {
         let mut letters = self.letters.iter().zip(first_slots);

@@ -134,7 +134,7 @@ impl Sink for Ros2Sink {
     fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         self.moments.resize_with(self.moments.len().max(input.frames.len()), Moment::default);
         for (moment, frame) in self.moments.iter_mut().zip(input.frames) {
-            moment.read(self.clock.time_ns(frame.time()), frame, input.pressures);
+            moment.read(self.clock.time_ns(frame.time()), frame, input);
         }
         self.read = input.frames.len();
         Ok(Flow::Open)

@@ -138,7 +138,7 @@ impl Messages {
             let state = JointState { header: header(time_ns, ""), name, position, ..JointState::default() };
             send(JOINTS, state.to_cdr())?;
         }
-        self.readings.read(&moment.pressures);
+        self.readings.read(&moment.pressures, &moment.pulls);
         for (cloud, message) in self.clouds.messages(time_ns, &self.readings).enumerate() {
             send(Topic(self.first_cloud + cloud), message.to_cdr())?;
         }
