@@ -1,11 +1,14 @@
 //! Taxels with three axes in every file: their three values come back to the bit, by the names `4`, `4.u` and `4.v`.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use super::{done, fails, output, stderr, text_of};
+use serde_json::Value;
+
+use super::{done, fails, frames, output, stderr, text_of};
 
 /// Odd numbers that text and single precision have to the bit; `None` is missing.
 fn value(frame: usize, at: usize) -> Option<f32> {
@@ -145,4 +148,45 @@ fn an_axis_that_a_body_does_not_have_is_named_as_people_write_it() {
     let run = output(&["run", "--body", "hand", "--source", text_of(&path)]);
     let why = stderr(&run);
     assert!(!run.status.success() && why.contains("0.u") && !why.contains("33554432"), "{why}");
+}
+
+#[test]
+fn clouds_of_a_bag_have_what_every_kind_of_taxel_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = format!("ros2-mcap:{}", folder.path().join("bag").display());
+    let asked = ["run", "--body", "sensing-hand", "--backend", "reference", "--all-fields", "--sink", "-"];
+    let lines = frames(&done(&[&asked[..], &["--sink", &bag]].concat()));
+    let again = frames(&done(&[&asked[..], &["--source", &bag]].concat()));
+    assert!(lines.len() > 100 && lines.len() == again.len(), "{} and {}", lines.len(), again.len());
+    let percepts = |frame: &Value| frame["fields"].as_array().unwrap().clone();
+    let mut seen = BTreeSet::new();
+    for (sent, read) in lines.iter().zip(&again) {
+        for (sent, read) in percepts(sent).iter().zip(&percepts(read)) {
+            assert_eq!(sent, read, "at {}", sent["t"]);
+            let known = ["shear_vector", "friction", "temperature", "nearest"].map(|key| sent.get(key).map(|_| key));
+            seen.extend(known.into_iter().flatten());
+        }
+    }
+    assert_eq!(seen.len(), 4, "{seen:?}");
+    // A taxel without one of its values says so there, too, and no other value is in its place.
+    let body = folder.path().join("pad.glb");
+    let touch = folder.path().join("touch.csv");
+    fs::write(&touch, "t,0,0.u,0.v,1,1.u,1.v\n0,5,1,2,4,,3\n0.1,5,1,2,4,2,3\n").unwrap();
+    let [messages, map] = messages(folder.path());
+    let from = ["convert", "--map", text_of(&map), text_of(&messages), text_of(&body)];
+    done(&from);
+    let bag = format!("ros2-mcap:{}", folder.path().join("gaps").display());
+    let asked = ["run", "--body", text_of(&body), "--backend", "reference", "--all-fields", "--sink", "-", "--outputs"];
+    let asked = [&asked[..], &["total,shear,shear_vector"]].concat();
+    let lines = frames(&done(&[&asked[..], &["--source", text_of(&touch), "--sink", &bag]].concat()));
+    let again = frames(&done(&[&asked[..], &["--source", &bag]].concat()));
+    let shear = |frame: &Value| {
+        let all = percepts(frame);
+        all.into_iter().find(|percept| percept["letter"] == "shear").unwrap()
+    };
+    for (sent, read) in lines.iter().zip(&again) {
+        assert_eq!(shear(sent), shear(read));
+    }
+    assert!(shear(&lines[0])["flags"].to_string().contains("incomplete"), "{}", shear(&lines[0]));
+    assert_ne!(shear(&lines[0])["shear_vector"], shear(&lines[1])["shear_vector"]);
 }

@@ -203,7 +203,7 @@ mod tests {
         let mut pressures = Vec::new();
         engine.pressures(frame, &mut pressures);
         let mut readings = Readings::new(body);
-        readings.read(&pressures);
+        readings.read(&pressures, &[]);
         let missing: Vec<usize> = (0..frame.values.len()).filter(|&index| frame.values[index].is_missing()).collect();
         let messages = wrenches.messages(0, &readings, &missing);
         messages.map(|(_, message)| (message.header.frame_id, message.wrench)).collect()
