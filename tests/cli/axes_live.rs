@@ -66,22 +66,31 @@ fn packets_with_three_axes_give_what_the_same_rows_of_a_table_give() {
     let folder = tempfile::tempdir().unwrap();
     let body = pad(&folder);
     let [rows, calibration] = ["rows.csv", "rest.toml"].map(|name| folder.path().join(name));
-    // Counts have no sign: 512 is rest along the skin. In the second half, taxel 0 has no value along v.
-    let row = |n: u32| match n < 40 {
-        true => format!("{},300,600,400,200,512,700\n", f64::from(n) * 0.02),
-        false => format!("{},300,600,,200,512,700\n", f64::from(n) * 0.02),
+    // Counts have no sign: 512 is rest along the skin. Packets have no blanks: 1023 is no reading, of taxel 0 along v.
+    let row = |(n, v): (usize, &str)| format!("{},300,600,{v},200,512,700\n", n as f64 * 0.02);
+    let text = |values: &[&str]| {
+        let values = values.iter().flat_map(|value| std::iter::repeat_n(*value, 40));
+        format!("t,0,0.u,0.v,1,1.u,1.v\n{}", values.enumerate().map(row).collect::<String>())
     };
-    fs::write(&rows, format!("t,0,0.u,0.v,1,1.u,1.v\n{}", (0..80).map(row).collect::<String>())).unwrap();
-    fs::write(&calibration, "[all]\nunit = \"N\"\ngain = 0.01\n[shear]\nbaseline = [512, 512]\n").unwrap();
+    let calibrated = |missing: &str| {
+        let text = format!("[all]\nunit = \"N\"\ngain = 0.01\n{missing}[shear]\nbaseline = [512, 512]\n");
+        fs::write(&calibration, text).unwrap();
+    };
     let felt = |text: &str| {
         let known = frames(text).into_iter().filter(|frame| !frame.to_string().contains("stale"));
         known.map(|frame| frame["fields"].to_string()).collect::<Vec<_>>()
     };
     let own = ["run", "--body", text_of(&body), "--calibration", text_of(&calibration)];
-    let table = felt(&done(&[&own[..], &["--source", text_of(&rows)], &ASKED].concat()));
+    let of_table = || felt(&done(&[&own[..], &["--source", text_of(&rows)], &ASKED].concat()));
+    fs::write(&rows, text(&["400", "1023", ""])).unwrap();
+    calibrated("");
+    assert_ne!(of_table()[40], of_table()[80], "without `missing` it is a reading");
+    calibrated("missing = [1023]\n");
+    let table = of_table();
     let expected: BTreeSet<&String> = table.iter().collect();
     assert_eq!(expected.len(), 2, "{expected:?}");
-    assert!(table[0].contains("shear_vector") && !table[0].contains("incomplete") && table[79].contains("incomplete"));
+    assert!(table[0].contains("shear_vector") && !table[0].contains("incomplete") && table[40].contains("incomplete"));
+    fs::write(&rows, text(&["400", "1023"])).unwrap();
     let source = format!("csv:{}", rows.display());
     let boards = Boards::start(&["--source", &source, "--body", text_of(&body), "--loop", "--wait", "--for", "20s"]);
     let line = format!("serial:{}", boards.ports[0]);
