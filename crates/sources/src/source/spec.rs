@@ -140,12 +140,12 @@ fn topic(text: &str) -> Result<SourceSpec> {
     Ok(SourceSpec::Ros2 { topic: topic.to_owned(), kind: kind.map(whole) })
 }
 
-/// A serial line: `PORT[@BAUD]`.
-fn port(text: &str) -> Result<(String, Option<u32>)> {
+/// A serial line of the source `kind`: `PORT[@BAUD]`.
+fn port(kind: &str, text: &str) -> Result<(String, Option<u32>)> {
     let Some((port, baud)) = text.rsplit_once('@') else { return Ok((text.to_owned(), None)) };
     match baud.parse() {
         Ok(baud) if baud > 0 && !port.is_empty() => Ok((port.to_owned(), Some(baud))),
-        _ => Err(Error::usage(format!("`{baud}` is not a baud rate; write serial:PORT@115200"))),
+        _ => Err(Error::usage(format!("`{baud}` is not a baud rate; write {kind}:PORT@115200"))),
     }
 }
 
@@ -226,8 +226,8 @@ impl SourceSpec {
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
             "ros2" => return topic(rest),
-            "paxini" => port(rest).map(|(port, baud)| Self::Paxini { port, baud })?,
-            _ => port(rest).map(|(port, baud)| Self::Serial { port, baud })?,
+            "paxini" => port(kind, rest).map(|(port, baud)| Self::Paxini { port, baud })?,
+            _ => port(kind, rest).map(|(port, baud)| Self::Serial { port, baud })?,
         })
     }
 

@@ -381,8 +381,10 @@ impl Messages for PaxiniBoard {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
+    #![cfg(unix)]
+
     use std::fs::File;
     use std::os::unix::fs::symlink;
     use std::sync::Arc;
