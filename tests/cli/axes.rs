@@ -190,3 +190,24 @@ fn clouds_of_a_bag_have_what_every_kind_of_taxel_reads() {
     assert!(shear(&lines[0])["flags"].to_string().contains("incomplete"), "{}", shear(&lines[0]));
     assert_ne!(shear(&lines[0])["shear_vector"], shear(&lines[1])["shear_vector"]);
 }
+
+#[test]
+fn a_recording_of_lines_or_messages_has_the_body_that_was_made_for_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let [lines, map] = messages(folder.path());
+    let (of_map, of_lines) = (folder.path().join("map.mcap"), folder.path().join("lines.mcap"));
+    let asked = ["--backend", "reference", "--all-fields", "--outputs", "total,shear_vector", "--sink", "-"];
+    let sink = |path: &Path| format!("mcap:{}", path.display());
+    let source = format!("ndjson:{}", lines.display());
+    let by_map = ["run", "--source", &source, "--map", text_of(&map), "--sink", &sink(&of_map)];
+    let percepts = done(&[&by_map[..], &asked].concat());
+    let again = |path: &Path| done(&[&["run", "--source", text_of(path)][..], &asked].concat());
+    assert!(percepts.contains("shear_vector") && again(&of_map) == percepts);
+    let rows = "4,4.u,4.v,7,7.u,7.v\n1.5,2,0.5,3,1,-1\n1.25,4,0.5,3,1,-1\n";
+    let by_lines = ["run", "--source", "text:-", "--rate", "100", "--sink", &sink(&of_lines)];
+    let (percepts, said) = fed(rows, &[&by_lines[..], &asked].concat());
+    assert_eq!(said.matches("a body is made").count(), 1, "{said}");
+    assert!(percepts.contains("shear_vector") && again(&of_lines) == percepts);
+    // The recording has it itself: without, the frames are of no bundled body.
+    assert!(done(&["info", text_of(&of_lines)]).contains("text (model/gltf-binary"));
+}
