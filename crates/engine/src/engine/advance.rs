@@ -11,13 +11,11 @@ use super::dominated::orient_again;
 use super::input::{GoOn, Input};
 use super::letters::SensedValues;
 use super::post::{Post, flag_stale, flag_stale_poses};
-use super::pulls::{tangential, tangential_gain};
 use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
 use crate::scene::{SensedTaxels, SensedValue};
 use crate::signal::{Axis, Channel, Frame, RawValue};
-use crate::stage::calibrate;
 
 /// Frames until `go_on` is asked first.
 const FIRST_PART: usize = 256;
@@ -29,43 +27,32 @@ impl Engine {
     /// [`Engine::pressures`].
     pub fn sensed(&self, frame: &Frame, sensed: &SensedTaxels, to: &mut Vec<SensedValue>) {
         to.clear();
-        if sensed.channels().is_empty() {
-            return;
+        if !sensed.channels().is_empty() {
+            to.extend(sensed.read(&self.plan, &self.raw_in(frame), self.values_sensed()));
         }
+    }
+
+    /// The same of any frame, as far as a single frame can tell.
+    pub fn sensed_alone(&self, frame: &Frame, sensed: &SensedTaxels, to: &mut Vec<SensedValue>) {
+        to.clear();
+        if !sensed.channels().is_empty() {
+            let value = |(at, &channel): (&Option<u32>, &usize)| {
+                at.map_or(RawValue::MISSING, |at| self.intake.read(channel, frame.values[at as usize]))
+            };
+            let own: Vec<RawValue> = self.sensed_at.iter().zip(&self.plan.senses.channels).map(value).collect();
+            to.extend(sensed.read(&self.plan, &self.raw_in(frame), &own));
+        }
+    }
+
+    /// The values of `frame` by the plan's channels.
+    fn raw_in(&self, frame: &Frame) -> Vec<RawValue> {
         let mut raw = vec![RawValue::MISSING; self.plan.channels()];
         for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
             if let Some(channel) = self.channel_of_taxel[taxel] {
                 raw[channel as usize] = self.intake.read(taxel, value);
             }
         }
-        to.extend(sensed.read(&self.plan, &raw, self.values_sensed()));
-    }
-
-    /// Puts into `to`, in place of what it holds, the tangential forces of the taxels with three axes that are pressed in `frame`, by
-    /// the taxel's id, along t and n × t, in the unit of P, as far as both are known: to look at, as [`Engine::pressures`]. They are
-    /// read for letter shear and for touches.
-    pub fn pulls(&self, frame: &Frame, to: &mut Vec<(u32, [f64; 2])>) {
-        to.clear();
-        let senses = &self.plan.senses;
-        let Some(by) = &senses.shear else { return };
-        let value = |channel: Channel| {
-            let slot = self.ids.binary_search(&channel.0).ok()?;
-            let at = self.sensed_at[senses.channels.binary_search(&slot).ok()?]?;
-            Some(self.intake.read(slot, *frame.values.get(at as usize)?))
-        };
-        for (&taxel, &normal) in self.intake.taxel_of_value().iter().zip(&frame.values) {
-            let Some(channel) = self.channel_of_taxel[taxel].map(|channel| channel as usize) else { continue };
-            let id = self.ids[taxel];
-            let [Some(u), Some(v)] = [Axis::U, Axis::V].map(|axis| value(Channel::of_taxel(id, axis))) else {
-                continue;
-            };
-            let (calibration, curve) = (&self.plan.calibrations[channel], self.plan.curve_of(channel));
-            let pressure = calibrate::pressure(self.intake.read(taxel, normal), calibration, curve);
-            if let Some(pressure) = pressure.filter(|&pressure| pressure > 0.0) {
-                let gain = tangential_gain(by, taxel, calibration);
-                to.extend(tangential(by, taxel, gain, pressure, [u, v]).ok().map(|forces| (id, forces)));
-            }
-        }
+        raw
     }
 
     /// The values that the last frame's letters beside pressure were made of, by

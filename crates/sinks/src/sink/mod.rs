@@ -54,7 +54,7 @@ use std::time::{Duration, Instant};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::percept::{Outputs, Percepts};
-use crate::scene::{Plan, PlannedField};
+use crate::scene::{Plan, PlannedField, SensedTaxels, SensedValue};
 use crate::signal::{BoardHealth, Frame, RawValue, Wiring};
 
 /// Something that takes percepts.
@@ -195,8 +195,8 @@ pub struct InputFrames<'a> {
     pub frames: &'a [Frame],
     /// Replaces a list by the taxel ids and pressures of one of the frames.
     pub pressures: &'a Pressures<'a>,
-    /// The same of tangential forces: of taxels with three axes that are pressed, along t and n × t.
-    pub pulls: &'a Pressures<'a, [f64; 2]>,
+    /// Replaces a list by what taxels of other kinds read in one of the frames, by itself.
+    pub sensed: &'a dyn Fn(&Frame, &SensedTaxels, &mut Vec<SensedValue>),
     /// The plan that they went through, as it is after the last one.
     pub plan: &'a Plan,
     /// The values that the last frame's percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).

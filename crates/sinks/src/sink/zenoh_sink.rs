@@ -226,7 +226,7 @@ mod tests {
         let input = InputFrames {
             frames: &frames,
             pressures: &|_, _| (),
-            pulls: &|_, _| (),
+            sensed: &|_, _, _| (),
             plan: engine.plan(),
             values_read: None,
             values_sensed: &[],

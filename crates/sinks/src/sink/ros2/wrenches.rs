@@ -240,9 +240,9 @@ mod tests {
         let mut pressures = Vec::new();
         engine.pressures(frame, &mut pressures);
         let mut readings = Readings::new(body);
-        let mut pulls = Vec::new();
-        engine.pulls(frame, &mut pulls);
-        readings.read(&pressures, &pulls);
+        let mut sensed = Vec::new();
+        engine.sensed_alone(frame, &SensedTaxels::new(engine.plan(), body), &mut sensed);
+        readings.read(&pressures, &sensed);
         let missing: Vec<usize> = (0..frame.values.len()).filter(|&index| frame.values[index].is_missing()).collect();
         let messages = wrenches.messages(0, &readings, &missing);
         messages.map(|(_, message)| (message.header.frame_id, message.wrench)).collect()
