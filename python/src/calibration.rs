@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use somatic::body::Modality;
 use somatic::{Calibration, OutputPath};
 
 use crate::body::PyBody;
@@ -27,18 +28,21 @@ pub(crate) struct PyCalibration {
     /// As tables keep it.
     pub(crate) text: String,
     /// The name and the taxels of the body that it is for.
-    of: (String, Vec<u32>),
+    of: (String, Vec<(u32, u32)>),
 }
 
 impl PyCalibration {
     pub(crate) fn of_text(text: &str, body: &PyBody) -> somatic::Result<Self> {
-        Self::of_parts(text, body.inner.name.clone(), body.ids())
+        let taxels = body.inner.taxels.iter().map(|taxel| (taxel.id, taxel.modality.code()));
+        Self::of_parts(text, body.inner.name.clone(), taxels.collect())
     }
 
-    fn of_parts(text: &str, body: String, ids: Vec<u32>) -> somatic::Result<Self> {
-        let inner = Calibration::parse(text, &ids)?;
+    /// `taxels` are ids, and the numbers of what they measure.
+    fn of_parts(text: &str, body: String, taxels: Vec<(u32, u32)>) -> somatic::Result<Self> {
+        let kinds: Vec<_> = taxels.iter().map(|&(id, code)| (id, Modality::from_code(code))).collect();
+        let inner = Calibration::parse_for(text, &kinds)?;
         inner.check_body(&body)?;
-        Ok(Self { inner, text: text.to_owned(), of: (body, ids) })
+        Ok(Self { inner, text: text.to_owned(), of: (body, taxels) })
     }
 
     fn is_same(&self, other: &Self) -> bool {
@@ -127,14 +131,14 @@ impl PyCalibration {
     }
 
     #[expect(clippy::type_complexity, reason = "pickle's own form: a function and its arguments")]
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, String, Vec<u32>))> {
-        let Self { text, of: (body, ids), .. } = slf.get();
-        Ok((slf.get_type().getattr("_of_parts")?, (text.clone(), body.clone(), ids.clone())))
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, String, Vec<(u32, u32)>))> {
+        let Self { text, of: (body, taxels), .. } = slf.get();
+        Ok((slf.get_type().getattr("_of_parts")?, (text.clone(), body.clone(), taxels.clone())))
     }
 
     #[staticmethod]
     #[pyo3(name = "_of_parts")]
-    fn unpickled(py: Python<'_>, text: &str, body: String, ids: Vec<u32>) -> PyResult<Self> {
-        Self::of_parts(text, body, ids).or_raise(py)
+    fn unpickled(py: Python<'_>, text: &str, body: String, taxels: Vec<(u32, u32)>) -> PyResult<Self> {
+        Self::of_parts(text, body, taxels).or_raise(py)
     }
 }

@@ -24,8 +24,8 @@ pub(super) struct Doubts {
     body: String,
     /// The ids of the body's taxels.
     ids: Vec<u32>,
-    /// Per value of a frame, the index of its taxel in the body.
-    taxel_of_value: Vec<usize>,
+    /// Per value of a frame, the index of its taxel in the body; `None` of a tangential one.
+    taxel_of_value: Vec<Option<usize>>,
     /// Whether frames have a slot for every taxel of the body, as on standard input.
     holds_any: bool,
     /// Whether a taxel's pressure is its raw value.
@@ -170,6 +170,7 @@ impl Doubts {
     fn of_rest(&self, plan: &Plan) -> Option<String> {
         let pressed = self.where_in_body(|seen| seen.came && !seen.rested);
         let many: Vec<(usize, usize)> = (0..plan.fields().len())
+            .filter(|&field| plan.letters()[plan.letter_of(field)].receptor.is_of_pressure())
             .map(|field| self.among(plan, field, &pressed))
             .filter(|(_, all)| *all >= MIN_FIELD_TAXELS)
             .collect();
@@ -187,7 +188,9 @@ impl Doubts {
     fn where_in_body(&self, is: impl Fn(&ValueHistory) -> bool) -> Vec<bool> {
         let mut there = vec![false; self.ids.len()];
         for (&taxel, seen) in self.taxel_of_value.iter().zip(&self.seen) {
-            there[taxel] = is(seen);
+            if let Some(taxel) = taxel {
+                there[taxel] = is(seen);
+            }
         }
         there
     }
@@ -198,7 +201,7 @@ impl Doubts {
     }
 }
 
-/// Per taxel of `ids`, its place among those of the body.
-fn indices(ids: &[u32], of_body: &[u32]) -> Vec<usize> {
-    ids.iter().filter_map(|id| of_body.binary_search(id).ok()).collect()
+/// Per channel of `ids`, the place of its taxel among those of the body, if that is its own value.
+fn indices(ids: &[u32], of_body: &[u32]) -> Vec<Option<usize>> {
+    ids.iter().map(|id| of_body.binary_search(id).ok()).collect()
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::overlaid::{How, overlaid};
 use super::{Setup, attached};
-use crate::body::Body;
+use crate::body::{Body, Modality};
 use crate::error::{Error, Result};
 use crate::limits::{self, MAX_TOML_BYTES};
 use crate::signal::Calibration;
@@ -44,17 +44,19 @@ impl Setup {
 
     /// The calibration that is named, or that comes with what is read, for `body`, whose taxels have `ids`.
     pub(super) fn calibration_for(&self, body: &Body, ids: &[u32]) -> Result<Option<Calibration>> {
+        let modality = |id: u32| body.taxel_index(id).map_or(Modality::default(), |index| body.taxels[index].modality);
+        let taxels: Vec<(u32, Modality)> = ids.iter().map(|&id| (id, modality(id))).collect();
         let load = |path: &PathBuf| {
             let given = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
             // Alone first, so that what is wrong with the file has its line.
-            let calibration = Calibration::parse(&given, ids).map_err(|e| e.at(path.display()))?;
+            let calibration = Calibration::parse_for(&given, &taxels).map_err(|e| e.at(path.display()))?;
             calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
             let text = self.over_own(path, given)?;
-            Calibration::parse(&text, ids)
+            Calibration::parse_for(&text, &taxels)
                 .map_err(|e| e.at("laid over the calibration of what is read").at(path.display()))
         };
         let parse = |(path, text): (PathBuf, String)| {
-            Calibration::parse(&text, ids).map_err(|e| e.at("its own calibration").at(path.display()))
+            Calibration::parse_for(&text, &taxels).map_err(|e| e.at("its own calibration").at(path.display()))
         };
         let calibration = match &self.calibration {
             Some(path) => Some(load(path)?),

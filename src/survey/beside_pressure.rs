@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::at_rest::rest_of;
-use super::{Apart, AtRest, Findings, Survey, several};
+use super::at_rest::{median, rest_of, sigma_of};
+use super::{Apart, AtRest, Findings, MIN_SIGMA_VALUES, Survey, several};
 use crate::signal::{Axis, Channel, RawValue};
 
 impl Apart {
@@ -41,6 +41,13 @@ impl Apart {
         let baseline = |place: usize| at_rest[place].filter(|_| !moved[place]).map(|(baseline, _)| baseline);
         survey.ids.iter().enumerate().map(|(place, &id)| (id, baseline(place))).collect()
     }
+
+    /// By tangential channel the standard deviation of its raw value at rest, with that of rounding, where it delivered enough to tell.
+    pub(super) fn sigmas(&self) -> BTreeMap<u32, f64> {
+        let survey = &self.survey;
+        let delivered = survey.ids.iter().zip(&survey.rest).filter(|(_, kept)| kept.len() >= MIN_SIGMA_VALUES);
+        delivered.map(|(&id, kept)| (id, sigma_of(kept, survey.step()))).collect()
+    }
 }
 
 fn of(values: &[RawValue], places: &[usize]) -> Vec<RawValue> {
@@ -53,6 +60,17 @@ impl Findings {
         let along = |axis| *self.tangential.get(&Channel::of_taxel(id, axis).0)?;
         let both = [along(Axis::U)?, along(Axis::V)?];
         (both != [0.0; 2]).then_some(both)
+    }
+
+    /// The noise of the tangential values of taxel `id`, raw units: the larger of its two, if both are known.
+    pub(super) fn shear_noise(&self, id: u32) -> Option<f64> {
+        let along = |axis| self.tangential_sigmas.get(&Channel::of_taxel(id, axis).0).copied();
+        Some(along(Axis::U)?.max(along(Axis::V)?))
+    }
+
+    /// The middle one of these of the taxels `ids`.
+    pub(super) fn usual_shear_noise(&self, ids: impl Iterator<Item = u32>) -> Option<f64> {
+        median(&mut ids.filter_map(|id| self.shear_noise(id)).collect::<Vec<f64>>())
     }
 
     /// Which axes have no baseline, in words.
@@ -127,11 +145,28 @@ mod tests {
         let text = found.calibration("pad");
         assert!(text.contains("[taxel.1]\n") && text.contains("shear_baseline = [510, 530]"), "{text}");
         assert!(text.contains("shear_baseline = [7, 9]"), "{text}");
+        // Steps of 1, 0, −1 and 0 along u of the first; along v they are as large. The second has whole numbers alone.
+        let noise =
+            |text: &str| -> f64 { text.split("noise = ").nth(1).unwrap().lines().next().unwrap().parse().unwrap() };
+        let of_shear = text.split("[shear]\n").nth(1).unwrap();
+        let (first, second) = (noise(of_shear.split("[taxel.1]\n").nth(1).unwrap()), noise(of_shear));
+        assert!((first - 0.5_f64.sqrt()).abs() < 0.02 && (second - 1.0 / 12.0_f64.sqrt()).abs() < 1e-6, "{text}");
         // At rest there is no shear, as `run` reads the file.
         let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let calibration = Calibration::parse(&text, &ids).unwrap();
         assert_eq!(calibration.shear.own_baselines[&0], [510.0, 530.0]);
+        assert_eq!([0, 1].map(|taxel| calibration.shear.noise_of(taxel)), [Some(first), Some(second)]);
         assert!(Engine::new(&body, Options::default().calibration(calibration)).is_ok());
+    }
+
+    #[test]
+    fn a_body_without_pressures_is_no_matter_of_a_survey() {
+        let mut cell = SheetCell::rectangle(3, [0.0, 0.0], 0.01, 0.01);
+        cell.modality = Modality::Temperature;
+        let bytes = sheets(&[Sheet::new("pad", vec![cell])]).unwrap().to_bytes().unwrap();
+        let body = Body::from_bytes("pad", &bytes).unwrap();
+        let why = Survey::new(&[3]).on(&body).map(|_| ()).unwrap_err();
+        assert!(why.is_usage() && why.to_string().contains("no taxel measures pressure"), "{why}");
     }
 
     #[test]

@@ -47,6 +47,10 @@ impl Findings {
         if !self.missing.is_empty() {
             line("missing", format!("{:?}", self.missing));
         }
+        let shear_noise = self.usual_shear_noise(sound().map(|found| found.id)).map(number);
+        if let Some(noise) = shear_noise {
+            let _ = write!(text, "\n[shear]\nnoise = {noise}\n");
+        }
         for found in &self.sensors {
             let mut own: Vec<(&str, String)> = Vec::new();
             if self.is_lost(found) {
@@ -68,6 +72,9 @@ impl Findings {
                 }
                 if let Some([u, v]) = self.shear_baseline(found.id) {
                     own.push(("shear_baseline", format!("[{u}, {v}]")));
+                }
+                if let Some(noise) = self.shear_noise(found.id).map(number).filter(|own| Some(*own) != shear_noise) {
+                    own.push(("shear_noise", noise.to_string()));
                 }
             }
             if !own.is_empty() {

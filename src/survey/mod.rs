@@ -173,6 +173,8 @@ pub struct Findings {
     pub forces_agree: Option<String>,
     /// By tangential channel, its raw value at rest; `None` where it delivered nothing, or moved.
     pub tangential: BTreeMap<u32, Option<f64>>,
+    /// By tangential channel, the standard deviation of its raw value at rest, where it delivered enough to tell.
+    pub tangential_sigmas: BTreeMap<u32, f64>,
 }
 
 impl Survey {
@@ -208,11 +210,15 @@ impl Survey {
     /// columns.
     ///
     /// # Errors
-    /// As [`crate::field::FieldSet::new`].
+    /// As [`crate::field::FieldSet::new`]; a usage error if none of them measures pressure.
     pub fn on(self, body: &Body) -> Result<Self> {
         let all = self.apart.as_ref().map_or(&self.ids, |apart| &apart.all);
         let is_pressed = |id: u32| body.taxel_index(id).is_none_or(|index| body.taxels[index].modality.is_pressed());
         let new = Self::split(all, is_pressed);
+        if new.ids.is_empty() && !all.is_empty() {
+            let what = "no taxel measures pressure, which a survey is of; write [temperature] and [proximity] by hand";
+            return Err(Error::usage(what).at(&body.name));
+        }
         Ok(Self { leaks: Leaks::new(body, &new.ids)?, ..new })
     }
 
@@ -371,6 +377,7 @@ impl Survey {
             curves: Vec::new(),
             forces_agree: None,
             tangential: self.apart.as_ref().map(|apart| apart.baselines()).unwrap_or_default(),
+            tangential_sigmas: self.apart.as_ref().map(|apart| apart.sigmas()).unwrap_or_default(),
         })
     }
 

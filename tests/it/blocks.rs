@@ -99,7 +99,7 @@ fn a_block_of_another_shape_is_refused() {
     let values = vec![RawValue::new(1.0); 2 * body.taxels.len() - 1];
     let block = FrameBlock { t_s: &[0.0, 1.0], values: &values, poses: &[] };
     let why = engine.process_block(&block).unwrap_err().to_string();
-    assert_eq!(why, "there are 79 values, and 2 frames of 40 taxels take 80");
+    assert_eq!(why, "there are 79 values, and 2 frames of 40 values take 80");
     let poses = [("hand".to_owned(), Vec::new())];
     let values = vec![RawValue::new(1.0); body.taxels.len()];
     let block = FrameBlock { t_s: &[0.0], values: &values, poses: &poses };

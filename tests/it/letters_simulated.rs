@@ -342,8 +342,14 @@ fn what_makes_no_sense_is_said_with_its_line() {
     assert!(why("", "friction = 0.5").contains("`friction` needs a layer that gives way"));
     assert!(why(layer, "friction = 0").contains("`friction` is 0; it must be over 0"));
     assert!(why(layer, "twist_deg = [[0, 0]]").contains("`twist_deg` has no effect without `friction`"));
-    assert!(why(layer, "gap_m = [[0, -1]]").contains("`gap_m` is -1 at 0 s; give [t, metres, 0 or more]"));
+    assert!(why(layer, "gap_m = [[0, -1]]").contains("`gap_m` is -1 at 0 s; give [t, metres], from 0 to 1000000"));
+    assert!(why(layer, "gap_m = [[0, 1e7]]").ends_with("is 10000000 at 0 s; give [t, metres], from 0 to 1000000"));
+    let twists = |list: &str| why(layer, &format!("friction = 1\ntwist_deg = {list}"));
+    assert!(twists("[[0, 0, 0]]").ends_with("a list has 3 entries here; give it 2"), "{}", twists("[[0, 0, 0]]"));
+    assert!(why(layer, "gap_m = [[0]]").ends_with("a list has 1 entry here; give it 2"));
     assert!(why(layer, "celsius = inf").contains("`celsius`"));
+    assert!(why(layer, "celsius = -300").contains("`celsius` is -300; nothing is colder than -273.15 °C"));
+    assert!(why("[temperature]\nambient_celsius = -500", "").contains("`ambient_celsius` is -500; nothing is colder"));
     assert!(why("[temperature]\ntime_constant_s = 0", "").contains("`time_constant_s` is 0; it must be over 0"));
     assert!(why("[sensor]\nkind = \"fsr\"", "").contains("`kind` is fsr, which feels only the normal force"));
     let off = why(

@@ -216,13 +216,7 @@ impl Engine {
         let mut taken = vec![false; self.ids.len()];
         let mut taxel_of_value = Vec::with_capacity(ids.len());
         for id in ids {
-            let taxel = self.ids.binary_search(id).map_err(|_| {
-                Error::failed(format!(
-                    "taxel id {} is not in the body, whose ids are {}; is it the right body?",
-                    Channel(*id),
-                    ranges(self.taxel_ids())
-                ))
-            })?;
+            let taxel = self.ids.binary_search(id).map_err(|_| self.no_channel(Channel(*id)))?;
             if std::mem::replace(&mut taken[taxel], true) {
                 return Err(Error::failed(format!("taxel id {} appears twice", Channel(*id))));
             }
@@ -231,6 +225,16 @@ impl Engine {
         self.intake.set_channels(taxel_of_value);
         self.pick();
         Ok(())
+    }
+
+    fn no_channel(&self, channel: Channel) -> Error {
+        let taxel = channel.taxel();
+        Error::failed(if self.taxel_ids().binary_search(&taxel).is_ok() {
+            format!("taxel {taxel} has one value, and {channel} is given; its modality is not force3")
+        } else {
+            let ids = ranges(self.taxel_ids());
+            format!("taxel id {channel} is not in the body, whose ids are {ids}; is it the right body?")
+        })
     }
 
     /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`Flags::STALE`](crate::percept::Flags::STALE) beside

@@ -3,7 +3,8 @@
 use std::fmt::Display;
 use std::ops::Range;
 
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 use crate::error::{Error, Result, parse_toml, place_in, unknown};
@@ -102,9 +103,82 @@ impl Text<'_> {
     }
 }
 
+/// What has lists of a fixed length: of a longer list, an array of serde leaves the rest unread.
+pub trait Whole: Sized {
+    /// The same with lists of any length.
+    type Read: DeserializeOwned;
+
+    /// What was read, if its lists are as long as they must be; else what is wrong.
+    fn of_read(read: Self::Read) -> Result<Self, String>;
+}
+
+impl Whole for f64 {
+    type Read = Self;
+
+    fn of_read(read: Self) -> Result<Self, String> {
+        Ok(read)
+    }
+}
+
+impl<T: Whole> Whole for Vec<T> {
+    type Read = Vec<T::Read>;
+
+    fn of_read(read: Self::Read) -> Result<Self, String> {
+        read.into_iter().map(T::of_read).collect()
+    }
+}
+
+impl<T: Whole, const N: usize> Whole for [T; N] {
+    type Read = Vec<T::Read>;
+
+    fn of_read(read: Self::Read) -> Result<Self, String> {
+        let whole: Vec<T> = Whole::of_read(read)?;
+        whole.try_into().map_err(|whole: Vec<T>| {
+            let entries = if whole.len() == 1 { "entry" } else { "entries" };
+            format!("a list has {} {entries} here; give it {N}", whole.len())
+        })
+    }
+}
+
+/// For `deserialize_with`: the value of a key whose lists must have their length, not more.
+///
+/// # Errors
+/// A list is too short or too long, or of something else.
+pub fn whole<'de, D: Deserializer<'de>, T: Whole>(from: D) -> Result<Option<Spanned<T>>, D::Error> {
+    let Some(read) = Option::<Spanned<T::Read>>::deserialize(from)? else { return Ok(None) };
+    let span = read.span();
+    T::of_read(read.into_inner()).map(|value| Some(Spanned::new(span, value))).map_err(D::Error::custom)
+}
+
 /// `message` without its column.
 #[cfg(test)]
 pub fn without_column(message: &str) -> String {
     let (before, after) = message.split_once(", column ").unwrap_or((message, ""));
     format!("{before}{}", after.trim_start_matches(|c: char| c.is_ascii_digit()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Deserialize)]
+    struct File {
+        #[serde(default, deserialize_with = "whole")]
+        pair: Option<Spanned<[f64; 2]>>,
+        #[serde(default, deserialize_with = "whole")]
+        pairs: Option<Spanned<Vec<[f64; 2]>>>,
+    }
+
+    #[test]
+    fn lists_have_their_length_and_neither_less_nor_more() {
+        let read = |text: &str| Text(text).parse::<File>().map_err(|e| without_column(&e.to_string()));
+        let both = read("pair = [1, 2]\npairs = [[3, 4], [5, 6]]").unwrap();
+        assert_eq!(*both.pair.unwrap().get_ref(), [1.0, 2.0]);
+        assert_eq!(both.pairs.unwrap().get_ref()[..], [[3.0, 4.0], [5.0, 6.0]]);
+        assert!(read("").unwrap().pair.is_none());
+        assert_eq!(read("\npair = [1, 2, 3]").unwrap_err(), "line 2: a list has 3 entries here; give it 2");
+        assert_eq!(read("pair = [1]").unwrap_err(), "line 1: a list has 1 entry here; give it 2");
+        assert_eq!(read("pairs = [[1, 2], [3, 4, 5]]").unwrap_err(), "line 1: a list has 3 entries here; give it 2");
+        assert!(read("pair = 1").unwrap_err().starts_with("line 1: invalid type"));
+    }
 }

@@ -48,7 +48,8 @@ pub(super) fn calibrate(
     };
     let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let calibration = Calibration::parse(&text, &ids).map_err(|e| e.at(path.display()))?;
+    let kinds: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+    let calibration = Calibration::parse_for(&text, &kinds).map_err(|e| e.at(path.display()))?;
     let mut survey = GainsSurvey::new(body, calibration, channels)?;
     let stop = stop_soon_on_signal()?;
     let mut bar = Bar::new("read");
@@ -89,7 +90,7 @@ pub(super) fn calibrate(
     }
     let written = with_gains(&text, &ids, &estimate).map_err(|e| e.at(path.display()))?;
     // What is written must be what `run` takes; if it were not, nothing is written.
-    Calibration::parse(&written, &ids).map_err(|e| e.at("the calibration that follows from these touches"))?;
+    Calibration::parse_for(&written, &kinds).map_err(|e| e.at("the calibration that follows from these touches"))?;
     let name = to.name().display().to_string();
     to.write(written.as_bytes())?;
     print(&if as_json { json_of(&ids, &estimate) } else { table_of(&ids, &estimate, path) })?;

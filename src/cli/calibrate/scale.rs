@@ -37,8 +37,8 @@ pub(super) fn calibrate(
     as_json: bool,
 ) -> Result<u8> {
     let text = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
-    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-    let calibration = Calibration::parse(&text, &ids).map_err(|e| e.at(path.display()))?;
+    let kinds: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+    let calibration = Calibration::parse_for(&text, &kinds).map_err(|e| e.at(path.display()))?;
     let mut survey = ScaleSurvey::new(body, calibration, channels).map_err(|e| e.at(path.display()))?;
     let Presses { name, source, lines, is_live, for_s } = presses;
     let output = to.name().display().to_string();
@@ -88,7 +88,7 @@ pub(super) fn calibrate(
     let estimate = survey.finish(forces).map_err(|e| e.at(name))?;
     let written = with_scale(&text, &estimate).map_err(|e| e.at(path.display()))?;
     // What is written must be what `run` takes; if it were not, nothing is written.
-    Calibration::parse(&written, &ids).map_err(|e| e.at("the calibration that follows from these presses"))?;
+    Calibration::parse_for(&written, &kinds).map_err(|e| e.at("the calibration that follows from these presses"))?;
     to.write(written.as_bytes())?;
     print(&if as_json { json_of(&estimate) } else { text_of(&estimate) })?;
     say(&format!("wrote {output}"));

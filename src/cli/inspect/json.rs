@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 use somatic::author::Finding;
-use somatic::body::Body;
+use somatic::body::{Body, Modality};
 use somatic::field::{Field, WORLD};
 use somatic::internal::author::cell_spread;
 
@@ -18,7 +18,7 @@ pub(super) fn text(seen: &Inspection) -> String {
         let node = skin.taxels().binary_search_by_key(&taxel.id, |node| node.id).ok().map(|node| &skin.taxels()[node]);
         let mean_normal =
             node.map(|node| skin.link_from_body(node.link).transform_vector3(node.mean_normal).to_array());
-        json!({
+        let mut seen = json!({
             "id": taxel.id,
             "link": link(taxel.link),
             "position": taxel.position_in_link.to_array(),
@@ -27,7 +27,11 @@ pub(super) fn text(seen: &Inspection) -> String {
             "modality": taxel.modality.name(),
             "cell": node.map(|node| node.cell_m2),
             "mean_normal": mean_normal,
-        })
+        });
+        if taxel.modality == Modality::Force3 {
+            seen["tangent"] = json!(taxel.tangents_in_link()[0].to_array());
+        }
+        seen
     };
     let mut whole = json!({
         "links": body.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>(),

@@ -72,7 +72,7 @@ impl Engine {
         let (frames, width) = (block.t_s.len(), self.intake.width());
         if block.values.len() != frames * width {
             return Err(Error::failed(format!(
-                "there are {} values, and {frames} frames of {width} taxels take {}",
+                "there are {} values, and {frames} frames of {width} values take {}",
                 block.values.len(),
                 frames * width
             )));

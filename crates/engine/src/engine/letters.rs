@@ -365,7 +365,8 @@ impl Cell<'_> {
             let calibration = &plan.calibrations[channel];
             let (noise, raw) = (calibration.noise?, self.frames.raw.rows.value(self.frames.offset, channel));
             let pressure = calibrate::sigma(raw.number()?, noise, calibration, plan.curve_of(channel));
-            let shear = tangential_gain(by, member.taxel, calibration).abs() * noise;
+            let along = by.noise_of(member.taxel).unwrap_or(noise);
+            let shear = tangential_gain(by, member.taxel, calibration).abs() * along;
             let squared = |sigma: f64| (member.weight * sigma).powi(2);
             Some([of_pull + squared(pressure), of_shear + squared(shear)])
         })

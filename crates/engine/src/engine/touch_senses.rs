@@ -252,7 +252,9 @@ impl TouchSenses {
             let curve = plan.curve_of(first_slot + node);
             pull += own.pressure;
             of_pull += calibrate::sigma(number, noise, calibration, curve).powi(2);
-            of_shear += (own.gain * noise).powi(2);
+            let taxel = self.pulled[node].as_ref()?.taxel;
+            let along = plan.senses.shear.as_ref()?.noise_of(taxel).unwrap_or(noise);
+            of_shear += (own.gain * along).powi(2);
         }
         Some((of_shear + friction.powi(2) * of_pull).sqrt() / pull)
     }

@@ -33,6 +33,11 @@ impl AskedOutputs {
     }
 }
 
+/// What asks for the quantity of touches that is called `name` where that does not.
+fn comes_with(name: &str) -> Option<String> {
+    TouchOutputs::all().columns().find(|column| column.name == name)?.output.names().next()
+}
+
 /// The name that asks for the usual quantities of touches.
 const TOUCHES: &str = "touches";
 
@@ -64,6 +69,9 @@ impl FromStr for AskedOutputs {
             return Ok(Self { of_fields: Outputs::empty(), of_touches });
         }
         Outputs::named(name).map(Self::from).ok_or_else(|| {
+            if let Some(with) = name.strip_prefix("touches.").and_then(comes_with) {
+                return Error::usage(format!("`{name}` comes with `{TOUCHES}.{with}`: ask for that"));
+            }
             let names: Vec<String> = Self::names().collect();
             Error::usage(unknown("output", name, names.iter().map(String::as_str)))
         })
@@ -93,6 +101,15 @@ mod tests {
         }
         let error = "touches.wrenches".parse::<AskedOutputs>().unwrap_err().to_string();
         assert!(error.contains("touches.wrench"), "{error}");
+        let why = |name: &str| name.parse::<AskedOutputs>().unwrap_err().to_string();
+        for name in ["force_vector", "torsion", "friction"] {
+            assert_eq!(
+                why(&format!("touches.{name}")),
+                format!("`touches.{name}` comes with `touches.shear`: ask for that")
+            );
+        }
+        assert!(why("touches.fit_angle").contains("comes with `touches.fit_direction`"));
+        assert!(why("touches.tortion").starts_with("there is no output `touches.tortion`"));
         // What fields had, touches have now.
         let error = "fit_angle".parse::<AskedOutputs>().unwrap_err().to_string();
         assert_eq!(error, "`fit_angle` is `touches.fit_direction` now");

@@ -60,7 +60,7 @@ impl LeftOut {
             [] => String::new(),
         };
         let mut line = format!(
-            "{}; no letter reads that: left out of every field",
+            "{}; no letter that is asked for reads that: left out of every field",
             self.taxels.iter().map(kind).collect::<Vec<_>>().join(", ")
         );
         match &self.fields[..] {

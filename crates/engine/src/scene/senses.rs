@@ -33,6 +33,7 @@ pub(super) struct ForTouches {
     /// Tangential forces: wrenches are made of them, whatever is asked for.
     reads_pulls: bool,
     gives_shear: bool,
+    gives_temperature: bool,
 }
 
 /// A taxel of a field in such a letter.
@@ -81,7 +82,7 @@ pub(crate) fn outputs_of(receptor: Receptor) -> Outputs {
 /// outputs are asked for, which all are by default.
 ///
 /// # Errors
-/// A letter has no taxels, or an output no letter.
+/// A usage error: a letter has no taxels, or what is asked for no letter.
 pub(super) fn letters_and_outputs(
     body: &Body,
     fields: &FieldSet,
@@ -106,9 +107,27 @@ pub(super) fn letters_and_outputs(
         scene.letters.clone()
     };
     let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
-    if let Some(empty) = others.into_iter().find(|&receptor| is_read(receptor) && !has(receptor)) {
-        let kind = if empty == Receptor::Shear { "of three axes (modality force3)" } else { "of that modality" };
-        return Err(Error::usage(format!("letter `{empty}` has no taxels: no field has one {kind}")).at(&body.name));
+    let there: Vec<Receptor> = others.into_iter().filter(|&other| has(other)).collect();
+    // Where nothing else is there either, no letter reads what is.
+    let is_empty = |receptor: &Receptor| !has(*receptor) && !(receptor.is_of_pressure() && there.is_empty());
+    if let Some(empty) = letters.iter().map(|letter| letter.receptor).find(is_empty) {
+        let what = match empty {
+            Receptor::Shear => {
+                "letter `shear` has no taxels: no field has one of three axes (modality force3)".to_owned()
+            }
+            Receptor::Temperature | Receptor::Proximity => {
+                format!("letter `{empty}` has no taxels: no field has one of that modality")
+            }
+            Receptor::Sustained | Receptor::Change => format!(
+                "no field has a taxel that measures pressure, of which letter `{empty}` is made; leave out what asks for \
+                 it: the taxels have {}",
+                listed(&there)
+            ),
+        };
+        return Err(Error::usage(what).at(&body.name));
+    }
+    if letters.is_empty() && !there.is_empty() {
+        return Err(Error::usage(without_pressure(scene, outputs)).at(&body.name));
     }
     let mut given = outputs - Outputs::OF_OTHER_LETTERS;
     for receptor in others {
@@ -119,8 +138,9 @@ pub(super) fn letters_and_outputs(
             given |= if of_letter.is_empty() { usual } else { of_letter };
         } else if !of_letter.is_empty() && !outputs.contains(Outputs::USUAL | own) {
             // Whoever asks for everything gets what there is.
-            let names: Vec<String> = of_letter.names().collect();
-            let what = format!("`{}` is of letter `{receptor}`, which no field's taxels have", listed(&names));
+            let names: Vec<String> = of_letter.names().map(|name| format!("`{name}`")).collect();
+            let why = why_not(receptor, has(receptor));
+            let what = format!("{} {} of letter `{receptor}`, {why}", listed(&names), is_or_are(&names));
             return Err(Error::usage(what).at(&body.name));
         }
     }
@@ -128,29 +148,53 @@ pub(super) fn letters_and_outputs(
 }
 
 impl ForTouches {
-    /// For the touches that `scene` asks for with `asked`, if it does, beside `outputs` of fields in `letters`. Touches have shear
-    /// wherever the body has three axes, whatever fields are chosen, unless other letters or outputs are named.
-    pub(super) fn new(
-        body: &Body,
-        scene: &Scene,
-        (letters, outputs): (&[Letter], Outputs),
-        asked: Option<TouchOutputs>,
-    ) -> Self {
-        let Some(asked) = asked else { return Self::default() };
-        let reads_pulls = body.taxels.iter().any(|taxel| Receptor::Shear.reads(taxel.modality));
-        let is_named = asked.intersects(OF_SHEAR)
-            || (outputs.contains(Outputs::USUAL) && !outputs.intersects(Outputs::OF_OTHER_LETTERS));
-        let is_wanted =
-            letters.iter().any(|letter| letter.receptor == Receptor::Shear) || (scene.letters.is_empty() && is_named);
-        Self { reads_pulls, gives_shear: reads_pulls && is_wanted }
+    /// For touches, if `scene` asks for them, beside fields in `letters`: whoever names letters has no others.
+    pub(super) fn new(body: &Body, scene: &Scene, letters: &[Letter], are_asked: bool) -> Self {
+        let has = |receptor: Receptor| are_asked && body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
+        let gives = |receptor: Receptor| {
+            let is_named = letters.iter().any(|letter| letter.receptor == receptor);
+            has(receptor) && (is_named || scene.letters.is_empty())
+        };
+        Self {
+            reads_pulls: has(Receptor::Shear),
+            gives_shear: gives(Receptor::Shear),
+            gives_temperature: gives(Receptor::Temperature),
+        }
     }
 }
 
 /// What touches have of shear.
 const OF_SHEAR: TouchOutputs = TouchOutputs::SHEAR.union(TouchOutputs::FRICTION_SIGMA);
 
+fn is_or_are(names: &[String]) -> &'static str {
+    if names.len() == 1 { "is" } else { "are" }
+}
+
+/// Why `receptor`, which the taxels have or not, is not read.
+fn why_not(receptor: Receptor, is_there: bool) -> String {
+    if is_there {
+        format!("which `letters` leaves out; add `{receptor}` to `letters`")
+    } else {
+        "which no field's taxels have".to_owned()
+    }
+}
+
+/// That no taxel measures the pressures that `scene` asks for.
+fn without_pressure(scene: &Scene, outputs: Outputs) -> String {
+    let of_fields = outputs - Outputs::OF_OTHER_LETTERS;
+    let mut names: Vec<String> = of_fields.names().map(|name| format!("`{name}`")).collect();
+    if scene.touches.is_some() {
+        names.push("`touches`".to_owned());
+    }
+    let what = if names.is_empty() { "what is asked for".to_owned() } else { listed(&names) };
+    format!(
+        "no field has a taxel that measures pressure, of which {what} {} made; leave that out of `outputs`",
+        is_or_are(&names)
+    )
+}
+
 impl Senses {
-    /// For `letters` of the fields `chosen`, and for touches.
+    /// For `letters` of the fields `chosen`, and for touches, which are anywhere on the body.
     pub(super) fn new(
         body: &Body,
         fields: &FieldSet,
@@ -162,34 +206,34 @@ impl Senses {
         let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
         let [temperature, proximity, shear] =
             [Receptor::Temperature, Receptor::Proximity, Receptor::Shear].map(is_read);
-        if !(temperature || proximity || shear || for_touches.reads_pulls) {
+        let ForTouches { reads_pulls, gives_shear, gives_temperature } = for_touches;
+        if !(temperature || proximity || shear || reads_pulls || gives_temperature) {
             return Self::default();
         }
         let all = Channel::all_of(body);
         let place = |channel: Channel| all.binary_search(&channel.0).expect("it is a channel of the body");
         let mut channels = BTreeSet::new();
-        let pulls = |taxel: &Taxel| [Axis::U, Axis::V].map(|axis| place(Channel::of_taxel(taxel.id, axis)));
-        if for_touches.reads_pulls {
-            let pulled = body.taxels.iter().filter(|taxel| Receptor::Shear.reads(taxel.modality));
-            channels.extend(pulled.flat_map(pulls));
-        }
-        for member in chosen.iter().flat_map(|&field| &fields.fields[field].members) {
-            let taxel = &body.taxels[member.taxel];
-            if shear && Receptor::Shear.reads(taxel.modality) {
-                channels.extend(pulls(taxel));
-            }
-            let is_sensed = (temperature && Receptor::Temperature.reads(taxel.modality))
-                || (proximity && Receptor::Proximity.reads(taxel.modality));
-            if is_sensed {
-                channels.insert(place(Channel::of_taxel(taxel.id, Axis::Normal)));
-            }
-        }
+        let mut read = |taxel: usize, of: [(Receptor, bool); 3]| {
+            let taxel = &body.taxels[taxel];
+            let Some((receptor, true)) = of.into_iter().find(|(receptor, _)| receptor.reads(taxel.modality)) else {
+                return;
+            };
+            let axes: &[Axis] = if receptor == Receptor::Shear { &[Axis::U, Axis::V] } else { &[Axis::Normal] };
+            channels.extend(axes.iter().map(|&axis| place(Channel::of_taxel(taxel.id, axis))));
+        };
+        let of_fields =
+            [(Receptor::Shear, shear), (Receptor::Temperature, temperature), (Receptor::Proximity, proximity)];
+        let of_touches =
+            [(Receptor::Shear, reads_pulls), (Receptor::Temperature, gives_temperature), (Receptor::Proximity, false)];
+        let members = chosen.iter().flat_map(|&field| &fields.fields[field].members);
+        members.for_each(|member| read(member.taxel, of_fields));
+        (0..body.taxels.len()).for_each(|taxel| read(taxel, of_touches));
         Self {
             channels: channels.into_iter().collect(),
-            temperature: temperature.then(|| calibration.temperature.clone()),
+            temperature: (temperature || gives_temperature).then(|| calibration.temperature.clone()),
             proximity: proximity.then(|| calibration.proximity.clone()),
-            shear: (shear || for_touches.reads_pulls).then(|| calibration.shear.clone()),
-            pulls_touches: for_touches.gives_shear,
+            shear: (shear || reads_pulls).then(|| calibration.shear.clone()),
+            pulls_touches: gives_shear,
         }
     }
 
@@ -224,17 +268,19 @@ impl Senses {
     }
 
     /// Refuses what is `asked` of touches by name and no letter gives. Whoever asks for everything gets what there is.
-    pub(super) fn check_touches(&self, asked: TouchOutputs) -> Result<()> {
-        let others = (OF_SHEAR | TouchOutputs::TEMPERATURE) & asked;
-        let known = self.of_touches() | if self.pulls_touches { OF_SHEAR } else { TouchOutputs::empty() };
-        let lacking: Vec<String> = (others - known).names().map(|name| format!("touches.{name}")).collect();
-        if lacking.is_empty() || asked == TouchOutputs::all() {
+    pub(super) fn check_touches(&self, body: &Body, asked: TouchOutputs) -> Result<()> {
+        if asked == TouchOutputs::all() {
             return Ok(());
         }
-        Err(Error::usage(format!(
-            "no letter gives `{}`: no field's taxels have it, or it is not asked for",
-            listed(&lacking)
-        )))
+        let known = self.of_touches() | if self.pulls_touches { OF_SHEAR } else { TouchOutputs::empty() };
+        let of_letters = [(OF_SHEAR, Receptor::Shear), (TouchOutputs::TEMPERATURE, Receptor::Temperature)];
+        for (outputs, receptor) in of_letters {
+            if let Some(name) = (outputs & asked - known).names().next() {
+                let why = why_not(receptor, body.taxels.iter().any(|taxel| receptor.reads(taxel.modality)));
+                return Err(Error::usage(format!("`touches.{name}` is of letter `{receptor}`, {why}")));
+            }
+        }
+        Ok(())
     }
 
     /// What touches have of these letters.

@@ -1,10 +1,12 @@
 //! The first line of NDJSON, where it is asked for: the units, and the body.
 
+use std::collections::HashSet;
+
 use serde_json::{Map, Value, json};
 
 use crate::body::Body;
 use crate::percept::{Column, TouchOutputs, Unit};
-use crate::scene::Plan;
+use crate::scene::{Plan, PlannedField};
 
 /// Version of the percepts' schema, with the header as its first line.
 const VERSION: u32 = 2;
@@ -31,8 +33,10 @@ fn in_unit(plan: &Plan, unit: Unit) -> Value {
         (Unit::Force, Some(quantity)) => quantity.of_force().symbol().into(),
         (Unit::PMetre, Some(quantity)) => format!("{} m", quantity.symbol()).into(),
         (Unit::P, None) => {
-            let of_field = |index: usize| (plan.label(index), plan.quantity(index).symbol().into());
-            Value::Object((0..plan.fields().len()).map(of_field).collect())
+            let of_field = |(index, field): (usize, PlannedField<'_>)| {
+                (field.name.to_owned(), plan.quantity(index).symbol().into())
+            };
+            Value::Object(plan.fields().enumerate().map(of_field).collect())
         }
         (unit, _) => unit.symbol().into(),
     }
@@ -42,10 +46,19 @@ fn in_unit(plan: &Plan, unit: Unit) -> Value {
 pub(super) fn line(plan: &Plan, body: Option<&Body>) -> String {
     let units: Map<String, Value> = units(plan).into_iter().map(|(name, unit)| (name.to_owned(), unit)).collect();
     let body = body.map(|body| {
-        let fields: Vec<String> = (0..plan.fields().len()).map(|index| plan.label(index)).collect();
+        let mut seen = HashSet::new();
+        let fields: Vec<&str> = plan.fields().map(|field| field.name).filter(|name| seen.insert(*name)).collect();
         json!({"name": body.name, "taxels": body.taxels.len(), "fields": fields})
     });
     let mut line = json!({"somatic": VERSION, "units": units, "body": body});
+    // As lines name them: not where all are the usual one.
+    let mut seen = HashSet::new();
+    let named = plan.letters().iter().filter_map(|letter| letter.mark(plan.letters()).receptor);
+    let letters: Vec<String> =
+        named.map(|letter| letter.to_string()).filter(|name| seen.insert(name.clone())).collect();
+    if !letters.is_empty() {
+        line["letters"] = letters.into();
+    }
     if plan.touch_outputs().is_some() {
         let units = units_of_touches(plan).into_iter();
         line["touches"] = Value::Object(units.map(|(name, unit)| (name.to_owned(), unit)).collect());

@@ -13,7 +13,7 @@ use crate::recording::{
     Cloud, FIELDS, LINKS, Recorder, SURFACE, Scene, ShownTouch, TAXELS, TOUCHES, Transforms, nanoseconds, scalars,
     surface,
 };
-use crate::signal::Frame;
+use crate::signal::{Frame, Receptor};
 
 /// Period of the taxels' messages, s.
 const TAXELS_PERIOD_S: f64 = 0.1;
@@ -95,9 +95,18 @@ impl ViewWriter {
             let parent = body.fields.iter().find(|spec| spec.name == name).and_then(|spec| spec.parent.as_deref());
             !parent.is_some_and(is_computed)
         };
-        let top = names.iter().enumerate().filter(|(_, names)| is_top(&names.field));
+        // Letters beside pressure have no total.
+        let is_pressed = |names: &FieldNames| {
+            names.letter.as_deref().is_none_or(|letter| letter.parse::<Receptor>().is_ok_and(Receptor::is_of_pressure))
+        };
+        let top = names.iter().enumerate().filter(|(_, names)| is_top(&names.field) && is_pressed(names));
+        let is_alone =
+            |field: &str| names.iter().filter(|names| names.field == field && is_pressed(names)).count() == 1;
+        let topic = |names: &FieldNames| {
+            if is_alone(&names.field) { names.field.clone() } else { names.with_marks().field }
+        };
         Self {
-            top_fields: top.map(|(index, names)| (format!("{FIELDS}{}", names.with_marks().field), index)).collect(),
+            top_fields: top.map(|(index, names)| (format!("{FIELDS}{}", topic(names)), index)).collect(),
             surface: Some(surface),
             index_of: links.iter().enumerate().map(|(index, link)| (link.name.clone(), index)).collect(),
             world: links.iter().map(|link| link.world_from_link).collect(),

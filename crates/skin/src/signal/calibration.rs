@@ -4,6 +4,7 @@
 
 mod file;
 mod keys;
+mod kinds;
 mod layer;
 mod old_names;
 mod overlay;

@@ -1,6 +1,6 @@
 //! Senses beside pressure: how raw values become temperatures, distances and tangential forces. In double precision.
 //!
-//! Temperature: T = gain · r(raw − baseline) + offset, in °C. Distance: the same in m. r is the raw value itself, a table, or
+//! Temperature: T = gain · r(raw − baseline) + offset, in °C, or with r(baseline − raw) if it is inverted. Distance: the same in m. r is the raw value itself, a table, or
 //! the temperature of a thermistor in a divider, by its B parameter: 1/T = 1/298.15 K + ln(R/R₂₅)/B.
 
 use std::collections::BTreeMap;
@@ -36,6 +36,8 @@ pub struct Sense {
     pub offset: f64,
     /// The response before the gain.
     pub response: SenseResponse,
+    /// Whether its response is at the baseline less the raw value (`invert`), not at the raw value less the baseline.
+    pub falls: bool,
     /// The range of raw values; others are flagged `out_of_range`.
     pub raw_range: [f64; 2],
     /// Ignore this taxel.
@@ -72,6 +74,7 @@ impl Default for Sense {
             gain: 1.0,
             offset: 0.0,
             response: SenseResponse::Linear,
+            falls: false,
             raw_range: [f64::NEG_INFINITY, f64::INFINITY],
             mask: false,
             missing: Vec::new(),
@@ -111,7 +114,8 @@ impl Sense {
         if self.missing.contains(&(number as f32)) {
             return Reading::Missing;
         }
-        let value = self.response.at(number - self.baseline).map(|response| self.gain * response + self.offset);
+        let above = if self.falls { self.baseline - number } else { number - self.baseline };
+        let value = self.response.at(above).map(|response| self.gain * response + self.offset);
         match value.filter(|value| value.abs() <= UNBELIEVABLE) {
             Some(value) => Reading::Value(value, (self.raw_range[0]..=self.raw_range[1]).contains(&number)),
             None => Reading::Faulty,
@@ -164,6 +168,10 @@ pub struct ShearCalibration {
     pub gain: Option<f64>,
     /// By the taxel's place in the body, where it has its own.
     pub own_gains: BTreeMap<usize, f64>,
+    /// Standard deviation of a tangential raw value, raw units; `None` where it is not given.
+    pub noise: Option<f64>,
+    /// By the taxel's place in the body, where it has its own.
+    pub own_noises: BTreeMap<usize, f64>,
     /// C: what of P and of each raw tangential force is in each tangential force.
     pub cross_axis: [[f64; 3]; 2],
     /// μ, the friction at which a contact slips, if it is known.
@@ -177,6 +185,8 @@ impl Default for ShearCalibration {
             own_baselines: BTreeMap::new(),
             gain: None,
             own_gains: BTreeMap::new(),
+            noise: None,
+            own_noises: BTreeMap::new(),
             cross_axis: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             slips_at: None,
         }
@@ -191,6 +201,12 @@ impl ShearCalibration {
         // A gain of its own is in the file's unit, as the normal one was before it came into N or Pa.
         let own = self.own_gains.get(&taxel).copied().or(self.gain);
         own.map_or(gain.abs(), |own| own * unit_factor)
+    }
+
+    /// The standard deviation of each tangential raw value of the body's taxel `taxel`, raw units; `None` where it is not given.
+    #[must_use]
+    pub fn noise_of(&self, taxel: usize) -> Option<f64> {
+        self.own_noises.get(&taxel).copied().or(self.noise)
     }
 
     /// Whether [`ShearCalibration::gain_of`] the body's taxel `taxel` is one: its own gain is of raw values if its `response` is a line.
@@ -231,6 +247,8 @@ mod tests {
         let line = Sense { baseline: 100.0, gain: 0.5, offset: -10.0, raw_range: [0.0, 300.0], ..Sense::default() };
         assert_eq!(value(&line, 140.0), 10.0);
         assert_eq!(line.read(RawValue::new(301.0)), Reading::Value(90.5, false));
+        let falling = Sense { falls: true, ..line.clone() };
+        assert_eq!(value(&falling, 40.0), 20.0);
         let curve = SenseResponse::Curve(Curve::new(&[0.0, 10.0, 20.0], &[100.0, 20.0, 10.0]).unwrap());
         let table = Sense { response: curve, gain: 1e-3, ..Sense::default() };
         assert!((value(&table, 15.0) - 0.015).abs() < 1e-15 && value(&table, 99.0) == 0.01);

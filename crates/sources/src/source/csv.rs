@@ -556,7 +556,7 @@ mod tests {
                 .contains("--columns force_*: there is no such column; the header has frame, ")
         );
         assert!(why(None, Some("stamp"), None, None).contains("--time stamp: there is no such column"));
-        assert!(why(Some("2-4"), Some("5"), None, None).contains("3 columns are sensors, for 2 taxels"));
+        assert!(why(Some("2-4"), Some("5"), None, None).contains("3 columns are sensors, for 2 taxels; "));
         assert!(why(Some("2,4"), None, None, None).contains("column 1 is not the time; name the column"));
         assert!(why(Some("2,4"), Some("5"), None, Some(1.0)).contains("give one of them"));
         assert!(why(Some("2,4"), Some("arrival"), None, None).contains("--time arrival is for lines as they come"));

@@ -98,10 +98,11 @@ fn taxels(names: &[String], sensors: &[usize], asked: &TextOptions, ids: &[u32])
         }
     };
     if taxels.len() != sensors.len() {
+        let of_body = Channel::taxels_of(&taxels).len();
+        let values = if of_body == taxels.len() { String::new() } else { format!(" with {} values", taxels.len()) };
         return Err(Error::usage(format!(
-            "{} columns are sensors, for {} taxels; name the columns with --columns, or their taxels with --ids",
-            sensors.len(),
-            taxels.len()
+            "{} columns are sensors, for {of_body} taxels{values}; name the columns with --columns, or their taxels with --ids",
+            sensors.len()
         )));
     }
     let mut sorted = taxels.clone();

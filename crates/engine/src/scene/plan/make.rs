@@ -41,13 +41,13 @@ impl Plan {
         let touches = scene.asked_touches().filter(|_| feels_pressure || !scene.letters.is_empty());
         let read = read(body, fields, touches.is_some(), &chosen);
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
-        let senses = ForTouches::new(body, scene, (&letters, named), touches.map(|touches| touches.outputs));
-        plan.senses = Senses::new(body, fields, &chosen, &letters, calibration, senses);
+        let for_touches = ForTouches::new(body, scene, &letters, touches.is_some());
+        plan.senses = Senses::new(body, fields, &chosen, &letters, calibration, for_touches);
         plan.letters = letters;
         let tells_shear = plan.letters.iter().any(|letter| letter.receptor == Receptor::Shear);
         plan.senses.check_shear(body, (&plan.body_taxels, &plan.calibrations), scene.outputs, tells_shear)?;
         let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
-        plan.senses.check_touches(of_touches).map_err(|e| e.at(&body.name))?;
+        plan.senses.check_touches(body, of_touches).map_err(|e| e.at(&body.name))?;
         plan.touch_outputs = touches.map(|touches| touches.outputs | plan.senses.of_touches());
         plan.left_out = left_out;
         let first_slots = plan.lay_out_slots(calibration)?;

@@ -7,10 +7,12 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
+use super::kinds;
 use super::layer::LayerKeys;
 use super::senses::{ProximityKeys, ShearKeys, TemperatureKeys};
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
+use crate::body::Modality;
 use crate::error::{Error, Result, failed};
 use crate::keys::Text;
 use crate::limits::{self, MAX_TOML_BYTES};
@@ -60,7 +62,20 @@ impl Calibration {
     /// # Errors
     /// As [`Calibration::load`].
     pub fn parse(text: &str, ids: &[u32]) -> Result<Self> {
-        let text = Text(text);
+        Self::of_kinds(Text(text), ids, |_| None)
+    }
+
+    /// Reads the calibration in `text` for `taxels`, ids and what they measure, ascending by id, as [`Calibration::parse`] does.
+    ///
+    /// # Errors
+    /// As [`Calibration::load`]; also for a taxel's key that taxels of its modality do not have.
+    pub fn parse_for(text: &str, taxels: &[(u32, Modality)]) -> Result<Self> {
+        let ids: Vec<u32> = taxels.iter().map(|(id, _)| *id).collect();
+        Self::of_kinds(Text(text), &ids, |index| Some(taxels[index].1))
+    }
+
+    /// `kind_of` a place among `ids` is what that taxel measures, where it is known.
+    fn of_kinds(text: Text<'_>, ids: &[u32], kind_of: impl Fn(usize) -> Option<Modality>) -> Result<Self> {
         let file: File = text.parse()?;
         let mut named: Vec<_> = file.curve.into_iter().collect();
         named.sort_by_key(|(name, _)| name.span().start);
@@ -69,6 +84,7 @@ impl Calibration {
 
         let mut all = Draft::default();
         all.apply(&file.all, &names, text)?;
+        kinds::check_all(&file.all, text)?;
         let mut drafts = vec![all; ids.len()];
         let mut missing = vec![file.all.missing(text)?.unwrap_or_default(); ids.len()];
         let mut named: Vec<_> = file.taxel.into_iter().collect();
@@ -96,7 +112,14 @@ impl Calibration {
             if let Some(codes) = keys.missing(text)? {
                 missing[index] = codes;
             }
+            let kind = kind_of(index);
+            if let Some(kind) = kind {
+                kinds::check(&keys, ids[index], kind, text)?;
+            }
             drafts[index].apply(&keys, &names, text)?;
+            if kind.is_some_and(|kind| !kind.is_pressed()) {
+                drafts[index].of_no_pressure();
+            }
             for sense in [&mut temperature, &mut proximity] {
                 keys.sense(index, sense, (&curves, &names), text)?;
             }

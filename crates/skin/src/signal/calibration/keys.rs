@@ -1,12 +1,14 @@
 //! The keys of a taxel's calibration, and the check that they fit together.
 
+use std::ops::Range;
+
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::senses::{Curves, baselines_of, curve_called, curve_index, gain_of};
+use super::senses::{Curves, baselines_of, curve_called, curve_index, gain_of, noise_of};
 use super::{Onset, Sensors, TaxelCalibration};
 use crate::error::{Error, Result};
-use crate::keys::Text;
+use crate::keys::{Text, whole};
 use crate::signal::curve::{Column, Curve};
 use crate::signal::fsr::FsrCircuit;
 use crate::signal::response::{FsrResponse, GAIN_RANGE, MAX_MAGNITUDE, Response};
@@ -28,6 +30,7 @@ pub(super) struct Keys {
     dead_band: Option<Spanned<f64>>,
     onset: Option<Spanned<String>>,
     p_max: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
     noise: Option<Spanned<f64>>,
     gain_spread: Option<Spanned<f64>>,
@@ -38,8 +41,10 @@ pub(super) struct Keys {
     wiper: Option<Spanned<i64>>,
     signal: Option<Spanned<String>>,
     full_scale_newton: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
     shear_baseline: Option<Spanned<[f64; 2]>>,
     shear_gain: Option<Spanned<f64>>,
+    shear_noise: Option<Spanned<f64>>,
 }
 
 impl Keys {
@@ -55,6 +60,32 @@ impl Keys {
             raw => Err(text.wrong(code.span(), format!("`missing` has {raw}; its values must be finite raw values"))),
         };
         codes.get_ref().iter().map(code).collect::<Result<_>>().map(Some)
+    }
+
+    /// The keys that only a taxel that feels pressure has, and where they are.
+    pub(super) fn of_pressure(&self) -> [(&'static str, Option<Range<usize>>); 11] {
+        [
+            ("unit", self.unit.as_ref().map(Spanned::span)),
+            ("sensors", self.sensors.as_ref().map(Spanned::span)),
+            ("dead_band", self.dead_band.as_ref().map(Spanned::span)),
+            ("onset", self.onset.as_ref().map(Spanned::span)),
+            ("p_max", self.p_max.as_ref().map(Spanned::span)),
+            ("noise", self.noise.as_ref().map(Spanned::span)),
+            ("gain_spread", self.gain_spread.as_ref().map(Spanned::span)),
+            ("sensor", self.sensor.as_ref().map(Spanned::span)),
+            ("wiper", self.wiper.as_ref().map(Spanned::span)),
+            ("signal", self.signal.as_ref().map(Spanned::span)),
+            ("full_scale_newton", self.full_scale_newton.as_ref().map(Spanned::span)),
+        ]
+    }
+
+    /// The keys that only a taxel with three axes has, and where they are.
+    pub(super) fn of_shear(&self) -> [(&'static str, Option<Range<usize>>); 3] {
+        [
+            ("shear_baseline", self.shear_baseline.as_ref().map(Spanned::span)),
+            ("shear_gain", self.shear_gain.as_ref().map(Spanned::span)),
+            ("shear_noise", self.shear_noise.as_ref().map(Spanned::span)),
+        ]
     }
 
     /// Lays the keys of the body's taxel `taxel` over those of its sense, whichever that is.
@@ -78,6 +109,7 @@ impl Keys {
         if let Some(range) = &self.raw_range {
             own.raw_range = *range.get_ref();
         }
+        own.falls = self.invert.unwrap_or(own.falls);
         own.mask = self.mask.unwrap_or(own.mask);
         if own != senses.all {
             senses.own.insert(taxel, own);
@@ -92,6 +124,9 @@ impl Keys {
         }
         if let Some(gain) = &self.shear_gain {
             shear.own_gains.insert(taxel, gain_of("shear_gain", gain, text)?);
+        }
+        if let Some(noise) = &self.shear_noise {
+            shear.own_noises.insert(taxel, noise_of("shear_noise", noise, text)?);
         }
         Ok(())
     }
@@ -279,6 +314,14 @@ impl Draft {
         self.gain_at = keys.gain.as_ref().map(|x| x.span().start).or(self.gain_at);
         self.range_given |= keys.raw_range.is_some();
         Ok(())
+    }
+
+    /// For a taxel that feels no pressure: what its keys say of a pressure need not fit together.
+    pub(super) fn of_no_pressure(&mut self) {
+        self.baseline_at = None;
+        if matches!(self.kind, Kind::Curve(_)) {
+            self.kind = Kind::Linear;
+        }
     }
 
     /// The unit of what it measures.

@@ -1,16 +1,25 @@
 //! The tables of senses beside pressure: `[temperature]`, `[proximity]` and `[shear]`.
 
+use std::ops::RangeInclusive;
+
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::error::{Result, nearest};
-use crate::keys::Text;
+use crate::keys::{Text, whole};
 use crate::signal::curve::Curve;
 use crate::signal::response::{GAIN_RANGE, MAX_MAGNITUDE};
 use crate::signal::sense::{Sense, SenseCalibration, SenseResponse, ShearCalibration, ZERO_CELSIUS_K};
 
 /// Windows of rates, s.
-const WINDOWS_S: std::ops::RangeInclusive<f64> = 1e-3..=3600.0;
+const WINDOWS_S: RangeInclusive<f64> = 1e-3..=3600.0;
+/// B parameters of thermistors, K. Those that are sold have 2000 to 6000; with less the temperatures of a divider leave all that a
+/// sensor survives.
+const B_K: RangeInclusive<f64> = 500.0..=20_000.0;
+/// Resistances of thermistors at 25 °C and beside them, Ω. Those that are sold have some Ω to some MΩ.
+const OHMS: RangeInclusive<f64> = 0.1..=1e9;
+/// Of what one raw value of another axis is in a tangential force.
+const MOST_ACROSS: f64 = 1e6;
 
 /// Units of temperature: the name, °C of one of it, °C at 0 of it.
 const TEMPERATURES: [(&str, f64, f64); 3] =
@@ -27,6 +36,7 @@ pub(super) struct TemperatureKeys {
     gain: Option<Spanned<f64>>,
     curve: Option<Spanned<String>>,
     ntc: Option<Spanned<NtcKeys>>,
+    #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
     missing: Option<Vec<f64>>,
     window_s: Option<Spanned<f64>>,
@@ -40,6 +50,7 @@ pub(super) struct ProximityKeys {
     baseline: Option<Spanned<f64>>,
     gain: Option<Spanned<f64>>,
     curve: Option<Spanned<String>>,
+    #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
     missing: Option<Vec<f64>>,
     window_s: Option<Spanned<f64>>,
@@ -50,20 +61,47 @@ pub(super) struct ProximityKeys {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ShearKeys {
+    #[serde(default, deserialize_with = "whole")]
     baseline: Option<Spanned<[f64; 2]>>,
     gain: Option<Spanned<f64>>,
+    noise: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
     cross_axis: Option<Spanned<[[f64; 3]; 2]>>,
     slips_at: Option<Spanned<f64>>,
 }
 
 /// A thermistor to ground under a resistor.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "{ ohm_at_25 = Ω, b_k = K, series_ohm = Ω, full_raw = the raw value of the reference voltage }"
+)]
 struct NtcKeys {
-    ohm_at_25: f64,
-    b_k: f64,
-    series_ohm: f64,
-    full_raw: f64,
+    ohm_at_25: Spanned<f64>,
+    b_k: Spanned<f64>,
+    series_ohm: Spanned<f64>,
+    full_raw: Spanned<f64>,
+}
+
+impl NtcKeys {
+    fn read(&self, text: Text<'_>) -> Result<SenseResponse> {
+        let within = |key: &str, value: &Spanned<f64>, range: &RangeInclusive<f64>, of: &str| {
+            let number = *value.get_ref();
+            if range.contains(&number) {
+                return Ok(number);
+            }
+            let (least, most) = range.clone().into_inner();
+            let what = format!("`{key}` is {number}; {of} is from {least} to {most}");
+            Err(text.wrong(value.span(), what))
+        };
+        let resistance = "a resistance in Ω";
+        Ok(SenseResponse::Ntc {
+            ohm_at_25: within("ohm_at_25", &self.ohm_at_25, &OHMS, resistance)?,
+            b_k: within("b_k", &self.b_k, &B_K, "the B parameter of a thermistor, in K,")?,
+            series_ohm: within("series_ohm", &self.series_ohm, &OHMS, resistance)?,
+            full_raw: text.positive("full_raw", &self.full_raw)?,
+        })
+    }
 }
 
 /// The keys that two tables share.
@@ -102,6 +140,15 @@ pub(super) fn gain_of(key: &str, gain: &Spanned<f64>, text: Text<'_>) -> Result<
         return Ok(number);
     }
     Err(text.wrong(gain.span(), format!("`{key}` is {number}; it must be between 1e-12 and 1e12 in size")))
+}
+
+/// A standard deviation of raw values.
+pub(super) fn noise_of(key: &str, noise: &Spanned<f64>, text: Text<'_>) -> Result<f64> {
+    let number = *noise.get_ref();
+    if (0.0..=MAX_MAGNITUDE).contains(&number) {
+        return Ok(number);
+    }
+    Err(text.wrong(noise.span(), format!("`{key}` is {number}; it must be 0 or more raw units")))
 }
 
 pub(super) fn baselines_of(key: &str, baselines: &Spanned<[f64; 2]>, text: Text<'_>) -> Result<[f64; 2]> {
@@ -180,13 +227,7 @@ impl TemperatureKeys {
                 let what = "`ntc` gives °C by itself; leave out `curve` and `unit`";
                 return Err(text.wrong(ntc.span(), what));
             }
-            let &NtcKeys { ohm_at_25, b_k, series_ohm, full_raw } = ntc.get_ref();
-            if ![ohm_at_25, b_k, series_ohm, full_raw].iter().all(|x| *x > 0.0 && x.is_finite()) {
-                let what =
-                    "`ntc` has a number that is not over 0: ohm_at_25 (Ω), b_k (K), series_ohm (Ω) and full_raw are";
-                return Err(text.wrong(ntc.span(), what));
-            }
-            all.response = SenseResponse::Ntc { ohm_at_25, b_k, series_ohm, full_raw };
+            all.response = ntc.get_ref().read(text)?;
         }
         let usual = SenseCalibration::of_temperature();
         let window_s = window_of(self.window_s.as_ref(), usual.window_s, text)?;
@@ -223,10 +264,19 @@ impl ShearKeys {
         if let Some(baselines) = &self.baseline {
             shear.baselines = baselines_of("baseline", baselines, text)?;
         }
+        shear.noise = self.noise.as_ref().map(|noise| noise_of("noise", noise, text)).transpose()?;
         shear.gain = self.gain.as_ref().map(|gain| gain_of("gain", gain, text)).transpose()?;
         if let Some(matrix) = &self.cross_axis {
-            if !matrix.get_ref().iter().flatten().all(|x| x.abs() <= 1e6) {
-                let what = "`cross_axis` has a number that is not finite; give two rows of three: shares of the normal force, of u and of v";
+            let rows = matrix.get_ref();
+            let why = match rows.iter().flatten().find(|share| !(share.abs() <= MOST_ACROSS)) {
+                Some(share) => format!("has {share}; its numbers are at most {MOST_ACROSS} in size"),
+                None if rows.iter().flatten().all(|share| *share == 0.0) => {
+                    "leaves no shear; its rows are all 0".into()
+                }
+                None => String::new(),
+            };
+            if !why.is_empty() {
+                let what = format!("`cross_axis` {why}: give two rows, shares of the normal force, of u and of v");
                 return Err(text.wrong(matrix.span(), what));
             }
             shear.cross_axis = *matrix.get_ref();
@@ -295,10 +345,70 @@ mod tests {
         assert!(why("[proximity]\nwindow_s = 0").starts_with("line 2: `window_s` is 0"));
         assert!(why("[proximity]\nrange = -1").starts_with("line 2: `range` is -1; it must be over 0"));
         assert!(why("[proximity]\ncurve = \"far\"").contains("add a table [curve.far]"));
-        let both = "[temperature]\nunit = \"K\"\nntc = { ohm_at_25 = 1, b_k = 1, series_ohm = 1, full_raw = 1 }";
+        let both = "[temperature]\nunit = \"K\"\nntc = { ohm_at_25 = 1, b_k = 1000, series_ohm = 1, full_raw = 1 }";
         assert!(why(both).starts_with("line 3: `ntc` gives °C by itself"));
-        assert!(why("[shear]\ncross_axis = [[1, nan, 0], [0, 0, 1]]").starts_with("line 2: `cross_axis`"));
+        let rows = "give two rows, shares of the normal force, of u and of v";
+        for (wrong, why_not) in [
+            ("[[1, nan, 0], [0, 0, 1]]", "has NaN; its numbers are at most 1000000 in size"),
+            ("[[1e8, 1, 1], [0, 0, 1]]", "has 100000000; its numbers are at most 1000000 in size"),
+            ("[[0, 0, 0], [0, 0, 0]]", "leaves no shear; its rows are all 0"),
+        ] {
+            let is = why(&format!("[shear]\ncross_axis = {wrong}"));
+            assert_eq!(is, format!("line 2: `cross_axis` {why_not}: {rows}"));
+        }
+        assert!(why("[shear]\nnoise = -1").starts_with("line 2: `noise` is -1; it must be 0 or more raw units"));
+        assert!(why("[taxel.7]\nshear_noise = nan").starts_with("line 2: `shear_noise` is NaN"));
         assert!(why("[shear]\nslips_at = 0").starts_with("line 2: `slips_at` is 0"));
         assert!(why("[temprature]\ngain = 1").contains("did you mean `temperature`"));
+    }
+
+    #[test]
+    fn lists_of_another_length_are_refused() {
+        for text in [
+            "[shear]\nbaseline = [0, 0, 0]",
+            "[shear]\ncross_axis = [[0, 1, 0, 9], [0, 0, 1]]",
+            "[shear]\ncross_axis = [[0, 1, 0], [0, 0, 1], [0, 0, 0]]",
+            "[taxel.3]\nshear_baseline = [0, 0, 4]",
+            "[all]\nraw_range = [0, 10, 20]",
+            "[temperature]\nraw_range = [0]",
+            "[proximity]\nraw_range = [0, 1, 2]",
+        ] {
+            let why = read(text).unwrap_err();
+            assert!(why.starts_with("line 2: a list has ") && why.contains("here; give it "), "{text}: {why}");
+        }
+    }
+
+    #[test]
+    fn thermistors_are_such_as_there_are() {
+        let why = |keys: &str| read(&format!("[temperature]\nntc = {keys}")).unwrap_err();
+        assert_eq!(
+            why("5"),
+            "line 2: invalid type: integer `5`, expected { ohm_at_25 = Ω, b_k = K, series_ohm = Ω, full_raw = the raw \
+             value of the reference voltage }"
+        );
+        let with = |r25: &str, b: &str, above: &str, full: &str| {
+            why(&format!("{{ ohm_at_25 = {r25}, b_k = {b}, series_ohm = {above}, full_raw = {full} }}"))
+        };
+        assert_eq!(
+            with("1e4", "100", "1e4", "1023"),
+            "line 2: `b_k` is 100; the B parameter of a thermistor, in K, is from 500 to 20000"
+        );
+        assert_eq!(
+            with("1e30", "3950", "1e4", "1023"),
+            format!("line 2: `ohm_at_25` is {}; a resistance in Ω is from 0.1 to 1000000000", 1e30)
+        );
+        assert!(with("1e4", "3950", "0", "1023").starts_with("line 2: `series_ohm` is 0; a resistance"));
+        assert!(with("1e4", "3950", "1e4", "nan").starts_with("line 2: `full_raw` is NaN; it must be over 0"));
+    }
+
+    #[test]
+    fn the_noise_of_tangential_values_is_their_own_where_it_is_given() {
+        let of = |text: &str| {
+            let shear = read(text).unwrap().shear;
+            [0, 1].map(|taxel| shear.noise_of(taxel))
+        };
+        assert_eq!(of("[all]\nnoise = 2"), [None, None]);
+        assert_eq!(of("[shear]\nnoise = 3\n[taxel.7]\nshear_noise = 0"), [Some(3.0), Some(0.0)]);
+        assert_eq!(of("[taxel.3]\nshear_noise = 1.5"), [Some(1.5), None]);
     }
 }

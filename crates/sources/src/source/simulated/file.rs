@@ -3,6 +3,8 @@
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::keys::whole;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
@@ -191,6 +193,7 @@ pub(super) struct TouchKeys {
     pub(super) radius_m: Option<Spanned<f64>>,
     pub(super) length_m: Option<Spanned<f64>>,
     pub(super) width_m: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
     pub(super) radii_m: Option<Spanned<[f64; 3]>>,
     pub(super) apart_m: Option<Spanned<f64>>,
     pub(super) aspect: Option<Spanned<f64>>,
@@ -199,13 +202,16 @@ pub(super) struct TouchKeys {
     pub(super) times_s: Option<Spanned<Vec<f64>>>,
     pub(super) start_s: Option<Spanned<f64>>,
     pub(super) speed_m_s: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
     pub(super) force_newton: Option<Spanned<Vec<[f64; 2]>>>,
     pub(super) tap: Option<Spanned<TapKeys>>,
     pub(super) press: Option<Spanned<PressKeys>>,
     pub(super) hold: Option<Spanned<HoldKeys>>,
     pub(super) friction: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
     pub(super) twist_deg: Option<Spanned<Vec<[f64; 2]>>>,
     pub(super) celsius: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
     pub(super) gap_m: Option<Spanned<Vec<[f64; 2]>>>,
 }
 

@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 
 use super::file::{ProximityKeys, TemperatureKeys};
 use super::noise;
+use super::senses_setup::celsius;
 use crate::body::{Body, Modality};
 use crate::error::Result;
 use crate::keys::Text;
@@ -58,7 +59,7 @@ impl Senses {
             taxels.map(|(index, taxel)| (index, side(taxel.area))).collect::<Vec<_>>()
         };
         let (warm_taxels, near_taxels) = (of(Modality::Temperature), of(Modality::Proximity));
-        let ambient = warm.ambient_celsius.as_ref().map(|ambient| text.finite("ambient_celsius", ambient));
+        let ambient = warm.ambient_celsius.as_ref().map(|ambient| celsius(text, "ambient_celsius", ambient));
         let ambient_celsius = ambient.transpose()?.unwrap_or(AMBIENT_CELSIUS);
         let time_constant = warm.time_constant_s.as_ref().map(|tau| text.positive("time_constant_s", tau));
         let warm_sigma = warm.noise_sigma.as_ref().map(|sigma| text.not_negative("noise_sigma", sigma));

@@ -9,9 +9,21 @@ use super::profile::Profile;
 use super::setup::Setup;
 use crate::body::Modality;
 use crate::error::Result;
+use crate::keys::Text;
 
 /// The most that a coefficient of friction, a turn in degrees and a gap in m may be.
 const MOST: f64 = 1e6;
+/// The absolute zero.
+const ZERO_KELVIN_CELSIUS: f64 = -273.15;
+
+/// A temperature that there is, °C.
+pub(super) fn celsius(text: Text<'_>, key: &str, value: &Spanned<f64>) -> Result<f64> {
+    if *value.get_ref() < ZERO_KELVIN_CELSIUS {
+        let what = format!("`{key}` is {}; nothing is colder than {ZERO_KELVIN_CELSIUS} °C", value.get_ref());
+        return Err(text.wrong(value.span(), what));
+    }
+    text.finite(key, value)
+}
 
 /// What a touch does beside pressing.
 pub(super) struct Beside {
@@ -41,13 +53,13 @@ impl Setup<'_> {
         }
         let twist = self.list("twist_deg", keys.twist_deg.as_ref(), -MOST, "degrees")?;
         let twist = twist.map(|points| points.into_iter().map(|(t_s, degrees)| (t_s, degrees.to_radians())).collect());
-        let celsius = keys.celsius.as_ref().map(|celsius| text.finite("celsius", celsius)).transpose()?;
+        let celsius = keys.celsius.as_ref().map(|value| celsius(text, "celsius", value)).transpose()?;
         Ok(Beside { friction, twist: twist.map(Profile::new), celsius })
     }
 
     /// The touch's gaps, if the body has taxels that see them.
     pub(super) fn gap(&self, keys: &TouchKeys) -> Result<Option<Profile>> {
-        let gap = self.list("gap_m", keys.gap_m.as_ref(), 0.0, "metres, 0 or more")?.map(Profile::new);
+        let gap = self.list("gap_m", keys.gap_m.as_ref(), 0.0, "metres")?.map(Profile::new);
         let sees = self.body.taxels.iter().any(|taxel| taxel.modality == Modality::Proximity);
         Ok(gap.filter(|_| sees))
     }
@@ -65,7 +77,8 @@ impl Setup<'_> {
         self.text.check_times(key, list.span(), points.iter().map(|point| point.0))?;
         match points.iter().find(|point| !(least..=MOST).contains(&point.1)) {
             Some((t_s, bad)) => {
-                Err(self.text.wrong(list.span(), format!("`{key}` is {bad} at {t_s} s; give [t, {what}]")))
+                let what = format!("`{key}` is {bad} at {t_s} s; give [t, {what}], from {least} to {MOST}");
+                Err(self.text.wrong(list.span(), what))
             }
             None => Ok(Some(points)),
         }
