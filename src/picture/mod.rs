@@ -1,6 +1,7 @@
 //! Pictures of bodies: from several sides at one scale, each taxel a disc in its field's colour. Drawn on a GPU or a
 //! software adapter, without a window.
 
+mod arrows;
 mod chart;
 mod colour;
 mod drawn;
