@@ -23,7 +23,7 @@ pub(crate) fn draw(py: Python<'_>, wish: Wish<'_>) -> PyResult<PyPicture> {
     let mut raised = None;
     let times = match (wish.at_s, wish.from_s, wish.to_s) {
         (Some(t_s), ..) => Times::At(t_s),
-        (None, None, None) => Times::MostPressed,
+        (None, None, None) => Times::Most,
         (None, from_s, to_s) => Times::Span {
             from_s: from_s.unwrap_or(f64::NEG_INFINITY),
             to_s: to_s.unwrap_or(f64::INFINITY),

@@ -19,8 +19,8 @@ const MAX_SIDES: usize = 2;
 /// The times of a recording that pictures show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Times {
-    /// The one at which most is pressed.
-    MostPressed,
+    /// The first at which there is most to see of the letter: most is pressed or pulled, it is warmest, or something is nearest.
+    Most,
     /// The last frame up to this time, s.
     At(f64),
     /// An animation.
@@ -70,8 +70,8 @@ struct Shown {
 pub struct Moments {
     shown: Vec<Shown>,
     letter: Receptor,
-    /// Of the colours, in SI units: up to the largest pressure of the whole recording, 1 where nothing is pressed; of other letters those
-    /// of the calibration, or all that was read.
+    /// Of the colours, in SI units: up to the largest pressure or tangential force of the whole recording, 1 where there is none; of
+    /// other letters those of the calibration, or all that was read.
     ends: [f64; 2],
     quantity: Quantity,
 }
@@ -100,11 +100,11 @@ impl Moments {
         let of_skin: Vec<usize> = (0..body.taxels.len()).filter(is_of_skin).collect();
         let mut trails = TouchTrails::default();
         let (from_s, to_s) = match times {
-            Times::MostPressed => (f64::NEG_INFINITY, f64::INFINITY),
+            Times::Most => (f64::NEG_INFINITY, f64::INFINITY),
             Times::At(t_s) => (f64::NEG_INFINITY, t_s),
             Times::Span { from_s, to_s, .. } => (from_s, to_s),
         };
-        let (mut shown, mut max_pressure) = (Vec::<Shown>::new(), 0.0_f64);
+        let (mut shown, mut max_force) = (Vec::<Shown>::new(), 0.0_f64);
         let (mut next_s, mut most) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         let mut list = Vec::new();
         for frame in frames {
@@ -115,13 +115,17 @@ impl Moments {
             engine.pressures(&frame, &mut list);
             engine.sensed(&frame, &senses, &mut sensed);
             sensed.iter().for_each(|value| ranges.see(value));
-            let sum: f64 = list.iter().map(|&(_, pressure)| pressure).sum();
-            max_pressure = list.iter().map(|&(_, pressure)| pressure).fold(max_pressure, f64::max);
+            let forces = || forces_of(letter, &list, &sensed);
+            max_force = forces().fold(max_force, f64::max);
+            let to_see = match letter {
+                Receptor::Temperature | Receptor::Proximity => extreme(letter, &sensed),
+                _ => forces().sum(),
+            };
             if !(from_s..=to_s).contains(&frame.t_s) {
                 continue;
             }
             let is_due = match times {
-                Times::MostPressed => sum > most,
+                Times::Most => to_see > most,
                 Times::At(_) => true,
                 // A picture may be early by less than recordings tell times apart.
                 Times::Span { .. } => frame.t_s >= next_s - 1e-6,
@@ -129,7 +133,7 @@ impl Moments {
             if !is_due {
                 continue;
             }
-            most = sum;
+            most = to_see;
             match times {
                 Times::Span { .. } if shown.len() == MAX_PICTURES => {
                     let what = format!("over {MAX_PICTURES} pictures; choose a shorter part or a lower rate");
@@ -138,7 +142,7 @@ impl Moments {
                 Times::Span { rate_hz, .. } => {
                     next_s = if next_s.is_finite() { next_s } else { frame.t_s } + 1.0 / rate_hz;
                 }
-                Times::MostPressed | Times::At(_) => shown.clear(),
+                Times::Most | Times::At(_) => shown.clear(),
             }
             let touches = found.map_or_else(Vec::new, |found| marked(found, &trails, &of_skin));
             shown.push(Shown { t_s: frame.t_s, touches, ..read(body, letter, &list, &sensed) });
@@ -151,7 +155,7 @@ impl Moments {
         let known = match letter {
             Receptor::Temperature => calibrated.celsius.or(ranges.celsius),
             Receptor::Proximity => calibrated.distance_m.or(ranges.distance_m).map(|[_, most]| [0.0, most]),
-            _ => Some([0.0, max_pressure]),
+            _ => Some([0.0, max_force]),
         };
         let ends = match known.unwrap_or_default() {
             [least, most] if least < most => [least, most],
@@ -175,13 +179,23 @@ impl Moments {
     ) -> Result<Vec<Picture>> {
         let mut options = options.clone();
         if options.views.is_empty() {
-            let looks = |taxel: &usize| self.shown.iter().any(|shown| shown.pressed[*taxel]);
+            let is_force = !matches!(self.letter, Receptor::Temperature | Receptor::Proximity);
+            let is_to_see = |shown: &Shown, taxel: usize| match is_force {
+                true => shown.pressed[taxel],
+                false => shown.values[taxel].is_some_and(f64::is_finite),
+            };
+            let looks = |taxel: &usize| self.shown.iter().any(|shown| is_to_see(shown, *taxel));
             let normals = (0..body.taxels.len()).filter(looks).map(|taxel| {
                 let taxel = &body.taxels[taxel];
                 body.links[taxel.link].body_from_link.transform_vector3(taxel.normal_in_link)
             });
-            options.views = View::best(&normals.collect::<Vec<_>>());
+            let normals: Vec<DVec3> = normals.collect();
+            options.views = View::best(&normals);
             options.views.truncate(MAX_SIDES);
+            // From above, what is below is not seen.
+            if normals.iter().all(|normal| normal.dot(View::ThreeQuarter.axes()[2]) <= 0.0) && options.views.len() > 1 {
+                options.views.retain(|view| *view != View::ThreeQuarter);
+            }
         }
         let picture = TouchPicture::new(body, fields, &options, ids)?;
         self.drawn(|moment| picture.draw(moment), progress)
@@ -241,6 +255,28 @@ pub fn letters_of(body: &Body, fields: &[Field], letter: Receptor) -> Vec<Letter
         other => *other == letter,
     };
     read.into_iter().filter(is_read).map(|receptor| Letter { receptor, ..Letter::default() }).collect()
+}
+
+/// The sizes of the forces that `letter` is made of: `list` has pressures by id, `sensed` all else.
+fn forces_of<'a>(
+    letter: Receptor,
+    list: &'a [(u32, f64)],
+    sensed: &'a [SensedValue],
+) -> impl Iterator<Item = f64> + 'a {
+    let is_shear = letter == Receptor::Shear;
+    let pressures = list.iter().filter(move |_| !is_shear).map(|&(_, pressure)| pressure);
+    let pulls = sensed.iter().filter(move |value| is_shear && value.receptor == letter);
+    pressures.chain(pulls.map(|value| libm::hypot(value.shear[0], value.shear[1])))
+}
+
+/// How warm the warmest of `sensed` is, or how near the nearest, in a number that grows with it.
+fn extreme(letter: Receptor, sensed: &[SensedValue]) -> f64 {
+    let own = sensed.iter().filter(|value| value.receptor == letter).filter_map(|value| match value.reading {
+        Reading::Value(number, _) if letter == Receptor::Temperature => Some(number),
+        Reading::Value(number, true) => Some(-number),
+        _ => None,
+    });
+    own.fold(f64::MIN, f64::max)
 }
 
 /// What is shown of taxels in a frame: `list` has pressures by id, `sensed` all else.

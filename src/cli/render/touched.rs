@@ -35,7 +35,7 @@ pub(super) struct Flags {
     #[arg(long, value_name = "LETTER", value_parser = letter)]
     letter: Option<Receptor>,
 
-    /// The time to show, such as 2.9s [default: when most is pressed].
+    /// The time to show, such as 2.9s [default: when most is pressed or pulled, or it is warmest, or nearest].
     ///
     /// A bare number is in seconds.
     #[arg(long, value_name = "TIME", value_parser = seconds, conflicts_with_all = ["from", "to"])]
@@ -100,7 +100,7 @@ impl Flags {
     ) -> Result<Vec<u8>> {
         let times = match (self.at, self.from, self.to) {
             (Some(t_s), ..) => Times::At(t_s),
-            (None, None, None) => Times::MostPressed,
+            (None, None, None) => Times::Most,
             (None, from, to) => Times::Span {
                 from_s: from.unwrap_or(f64::NEG_INFINITY),
                 to_s: to.unwrap_or(f64::INFINITY),
