@@ -2,6 +2,7 @@
 
 use somatic::internal::setup::Setup;
 use somatic::internal::setup::{Input, RECORDED_BATCH};
+use somatic::internal::signal::Channel;
 use somatic::internal::tradeoff::{MeasureOptions, Measurement, Pick, Store, Target, TestFrames};
 use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{Body, Options, Result};
@@ -51,7 +52,8 @@ pub(super) fn in_words(row: &Measurement) -> String {
 }
 
 /// Frames for a body that nobody has recorded, or cannot be read again: every taxel pressed, each time otherwise.
-pub(super) fn made_up(body: &Body, taxels: Vec<u32>) -> TestFrames {
-    let frames = pressed(body.taxels.len(), 32);
+pub(super) fn made_up(body: &Body) -> TestFrames {
+    let taxels = Channel::all_of(body);
+    let frames = pressed(taxels.len(), 32);
     TestFrames { source: "every taxel pressed".to_owned(), taxels, frames, truth: Vec::new() }
 }
