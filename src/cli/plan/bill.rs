@@ -82,7 +82,7 @@ impl Bill {
         };
         let planned = plan.explain().into_iter();
         let mut stages: Vec<Stage> = planned.map(|planned| Stage { planned, measured_us: None }).collect();
-        let mut engines = 
+        let mut engines =
             rungs.iter().map(|rung| made(rung.outputs, rung.touches, &rung.letters)).collect::<Result<Vec<_>>>()?;
         let whole = || made(plan.outputs(), plan.touch_outputs(), plan.letters());
         let compared = (kind != BackendKind::Reference).then(whole).transpose()?;

@@ -8,7 +8,7 @@ use somatic::internal::tradeoff::{
 use somatic::scene::Coverage;
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::measured::{in_words, made_up, measure_options, missed, played};
+use super::measured::{in_words, made_up, measure_options, missed, nothing_to_choose, played};
 use crate::cli::stdio::say;
 
 /// Seconds of a brief measurement, and its frames.
@@ -87,6 +87,9 @@ pub(in crate::cli) fn settled(asked: &Setup, input: Option<&Input>, body: &Body,
             (measured, when)
         }
     };
+    if report.rows.is_empty() {
+        return Err(nothing_to_choose(&target));
+    }
     let Some(pick) = target.pick(&report, way) else {
         return Err(Error::failed(format!(
             "no measurement meets {}; widen the tolerance or the budget",

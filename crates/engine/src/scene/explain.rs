@@ -137,12 +137,7 @@ impl Plan {
             ("sigma", stages.sigma, found, ""),
             ("fit", self.fits(), (self.channels(), 0), ""),
             ("shear", senses.shear.is_some(), sensed(Receptor::Shear), "no letter is `shear`"),
-            (
-                "temperature",
-                senses.temperature.is_some(),
-                sensed(Receptor::Temperature),
-                "no letter is `temperature`",
-            ),
+            ("temperature", senses.temperature.is_some(), sensed(Receptor::Temperature), "no letter is `temperature`"),
             ("proximity", senses.proximity.is_some(), sensed(Receptor::Proximity), "no letter is `proximity`"),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
