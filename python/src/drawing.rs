@@ -3,7 +3,6 @@
 use pyo3::prelude::*;
 use somatic::field::FieldSet;
 use somatic::internal::scene::choose_fields;
-use somatic::internal::signal::Receptor;
 use somatic::picture::{self, Moment, Moments, Options, Picture, Times, TouchPicture, View};
 use somatic::scene::Coordinates;
 use somatic::{BackendKind, Engine, Error, Frame, Outputs, Scene};
@@ -96,7 +95,8 @@ impl Wish<'_> {
         if let Some(read) = read {
             let touches = somatic::touch::Options::default();
             let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).coordinates(Coordinates::Anchor);
-            let scene = scene.letters(picture::letters_of(body, &set.fields, Receptor::Sustained));
+            let letter = picture::usual_letter(body, &set.fields);
+            let scene = scene.letters(picture::letters_of(body, &set.fields, letter));
             let options_of_engine = somatic::Options::default().scene(scene).backend(BackendKind::Cpu).batch(1);
             let options_of_engine = match self.calibration {
                 Some(calibration) => options_of_engine.calibration(calibration.inner.clone()),
@@ -105,7 +105,7 @@ impl Wish<'_> {
             let mut engine = Engine::new(body, options_of_engine)?;
             engine.set_channels(&read.channels)?;
             let frames = read.frames(raised);
-            let moments = Moments::compute(&mut engine, body, (Receptor::Sustained, times), &read.name, frames)?;
+            let moments = Moments::compute(&mut engine, body, (letter, times), &read.name, frames)?;
             return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));
         }
         let picture = match &self.uv {

@@ -127,7 +127,7 @@ fn tradeoff_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     });
     drop(bar);
     let mut report = report?;
-    report.left_out.extend(software().filter(|_| options.backend == BackendKind::Auto));
+    report.left_out.extend(software().filter(|_| options.backend == BackendKind::Auto && !report.rows.is_empty()));
     // A run that was cut short, or with knobs that are held, is not what others would measure.
     if !stop.load(Ordering::Relaxed)
         && options.scene.knobs == somatic::scene::Knobs::default()

@@ -130,6 +130,9 @@ impl<'a> ChartPicture<'a> {
         let time = moment.t_s.map_or(String::new(), |t_s| format!("{t_s:.2} s"));
         let slices = |rims: bool| self.dots.flat_slices(&discs, DVec3::ZERO, rims);
         let radius_m = self.dots.mean_radius();
+        let held = |&&(taxel, _): &&(usize, DVec3)| self.held.binary_search(&taxel).is_ok();
+        let pulled: Vec<(usize, DVec3)> = moment.shear.iter().filter(held).copied().collect();
+        let moment = &Moment { shear: &pulled, ..moment.clone() };
         let label = |labels: &mut Labels, arrangement: &Arrangement| {
             moment.legend().into_iter().for_each(|legend| labels.colours(legend));
             moment.arrow_key(radius_m * arrangement.scale).into_iter().for_each(|key| labels.arrow(key));

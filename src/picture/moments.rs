@@ -13,8 +13,6 @@ use crate::signal::{Frame, Letter, Quantity, Reading, Receptor};
 
 /// Pictures of an animation at most: each is held in memory.
 const MAX_PICTURES: usize = 1000;
-/// Sides that a touch is shown from, unless others are asked for.
-const MAX_SIDES: usize = 2;
 
 /// The times of a recording that pictures show.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,7 +162,7 @@ impl Moments {
         Ok(Self { shown, letter, ends, quantity })
     }
 
-    /// Draws them on `body`, by default from the two sides that face the touch most; `progress` gets the share that is done and
+    /// Draws them on `body`, by default from the one or two sides that show most of the touch, or of what is shown; `progress` gets the share that is done and
     /// says whether to go on.
     ///
     /// # Errors
@@ -189,13 +187,7 @@ impl Moments {
                 let taxel = &body.taxels[taxel];
                 body.links[taxel.link].body_from_link.transform_vector3(taxel.normal_in_link)
             });
-            let normals: Vec<DVec3> = normals.collect();
-            options.views = View::best(&normals);
-            options.views.truncate(MAX_SIDES);
-            // From above, what is below is not seen.
-            if normals.iter().all(|normal| normal.dot(View::ThreeQuarter.axes()[2]) <= 0.0) && options.views.len() > 1 {
-                options.views.retain(|view| *view != View::ThreeQuarter);
-            }
+            options.views = View::two_best(&normals.collect::<Vec<_>>());
         }
         let picture = TouchPicture::new(body, fields, &options, ids)?;
         self.drawn(|moment| picture.draw(moment), progress)
@@ -204,7 +196,7 @@ impl Moments {
     /// Draws them on the chart of field `index` of `fields`; else as [`Moments::draw`].
     ///
     /// # Errors
-    /// As [`super::of_chart`]; or `progress` has ended it.
+    /// As [`super::of_chart`]; the field has no taxels of the letter; or `progress` has ended it.
     pub fn draw_chart(
         &self,
         body: &Body,
@@ -213,6 +205,11 @@ impl Moments {
         ids: bool,
         progress: impl FnMut(f64) -> bool,
     ) -> Result<Vec<Picture>> {
+        let field = &fields[index];
+        if !field.members.iter().any(|member| self.letter.reads(body.taxels[member.taxel].modality)) {
+            let what = format!("no taxel of field `{}` measures what letter `{}` shows", field.name, self.letter);
+            return Err(Error::usage(format!("{what}; choose another field or letter")).at(&body.name));
+        }
         let picture = ChartPicture::new(body, fields, index, options, ids)?;
         self.drawn(|moment| picture.draw(moment), progress)
     }
@@ -242,16 +239,25 @@ impl Moments {
     }
 }
 
+/// The letter that is shown of `body` unless another is asked for: pressure, or else what its taxels in `fields` measure.
+#[must_use]
+pub fn usual_letter(body: &Body, fields: &[Field]) -> Receptor {
+    let all = [Receptor::Sustained, Receptor::Temperature, Receptor::Proximity];
+    all.into_iter().find(|letter| has_taxels(body, fields, *letter)).unwrap_or_default()
+}
+
+/// Whether a taxel of `body` in `fields` measures what `letter` is made of.
+fn has_taxels(body: &Body, fields: &[Field], letter: Receptor) -> bool {
+    fields.iter().flat_map(|field| &field.members).any(|member| letter.reads(body.taxels[member.taxel].modality))
+}
+
 /// The letters that an engine must read for pictures of `letter`: that one, pressures for touches, and shear for arrows, where the
 /// `fields` of `body` have such taxels.
 #[must_use]
 pub fn letters_of(body: &Body, fields: &[Field], letter: Receptor) -> Vec<Letter> {
-    let has = |receptor: Receptor| {
-        fields.iter().flat_map(|field| &field.members).any(|member| receptor.reads(body.taxels[member.taxel].modality))
-    };
     let read = [Receptor::Sustained, Receptor::Shear, Receptor::Temperature, Receptor::Proximity];
     let is_read = |receptor: &Receptor| match receptor {
-        Receptor::Sustained | Receptor::Shear => has(*receptor) || *receptor == letter,
+        Receptor::Sustained | Receptor::Shear => has_taxels(body, fields, *receptor) || *receptor == letter,
         other => *other == letter,
     };
     read.into_iter().filter(is_read).map(|receptor| Letter { receptor, ..Letter::default() }).collect()

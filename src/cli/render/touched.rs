@@ -7,7 +7,7 @@ use somatic::field::Field;
 use somatic::internal::scene_file::{hertz, seconds};
 use somatic::internal::setup::Setup;
 use somatic::internal::signal::{Channel, Receptor};
-use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture, letters_of};
+use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture, letters_of, usual_letter};
 use somatic::scene::Coordinates;
 use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
@@ -29,7 +29,7 @@ pub(super) struct Flags {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
 
-    /// What taxels are coloured by: pressure, shear, temperature or proximity [default: pressure].
+    /// What taxels are coloured by: pressure, shear, temperature or proximity [default: pressure if there is any].
     ///
     /// Taxels with three axes have arrows of their tangential forces with pressure and shear.
     #[arg(long, value_name = "LETTER", value_parser = letter)]
@@ -117,7 +117,7 @@ impl Flags {
         let engine_options = asked.options(body, &taxels, 1)?;
         // Pictures are of the body at rest, and show touches whatever else is computed.
         let scene: Scene = engine_options.scene.clone().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor);
-        let letter = self.letter.unwrap_or_default();
+        let letter = self.letter.unwrap_or_else(|| usual_letter(body, fields));
         let letters = letters_of(body, fields, letter);
         let has_pressure = letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
         let touches = scene.touches.unwrap_or_default();
