@@ -93,10 +93,12 @@ impl Wish<'_> {
         let options =
             Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone(), edges: self.edges };
         if let Some(read) = read {
-            let touches = somatic::touch::Options::default();
-            let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).coordinates(Coordinates::Anchor);
             let letter = picture::usual_letter(body, &set.fields);
-            let scene = scene.letters(picture::letters_of(body, &set.fields, letter));
+            let letters = picture::letters_of(body, &set.fields, letter);
+            let has_pressure = letters.iter().any(|letter| letter.receptor.is_of_pressure());
+            let scene = Scene::default().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor).letters(letters);
+            let touches = somatic::touch::Options::default();
+            let scene = if has_pressure { scene.touches(touches) } else { scene };
             let options_of_engine = somatic::Options::default().scene(scene).backend(BackendKind::Cpu).batch(1);
             let options_of_engine = match self.calibration {
                 Some(calibration) => options_of_engine.calibration(calibration.inner.clone()),
