@@ -198,3 +198,47 @@ impl<'a> ChartPicture<'a> {
         [x, y]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+    use crate::field::FieldSet;
+
+    /// How far what is along an axis of a taxel's link in the chart is from what a step along it does to the taxel's own place there,
+    /// and from having the length of what is tangential in it.
+    fn off(name: &str) -> [f64; 2] {
+        let body = Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
+        let fields = FieldSet::new(&body).unwrap().fields;
+        let index = fields.iter().position(|field| field.name == name).unwrap();
+        let (field, options) = (&fields[index], Options { size: [400, 400], ..Options::default() });
+        let picture = ChartPicture::new(&body, &fields, index, &options, false).unwrap();
+        let (chart, anchor) = (field.chart.as_ref().unwrap(), field.anchor.unwrap());
+        let mut worst = [0.0_f64; 2];
+        for (member, axes) in field.members.iter().zip(&picture.link_axes) {
+            let taxel = &body.taxels[member.taxel];
+            let place = |step: DVec3| {
+                let in_anchor = body.rest_transform(anchor, taxel.link).transform_point3(taxel.position_in_link + step);
+                chart.project(in_anchor - field.origin_in_anchor).truncate()
+            };
+            for (tangent, own) in taxel.tangents_in_link().map(|tangent| {
+                (tangent, tangent.to_array().into_iter().zip(axes).map(|(x, axis)| x * *axis).sum::<DVec2>())
+            }) {
+                let step = place(tangent * 1e-4) - place(DVec3::ZERO);
+                worst[0] = worst[0].max((own - step * 1e4).length());
+                worst[1] = worst[1].max((own.length() - 1.0).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn forces_lie_in_a_chart_as_their_taxels_do_and_keep_their_length() {
+        // A palm is flat: a step along a tangent is a step along it in the chart.
+        let [step, length] = off("hand/palm");
+        assert!(step < 1e-6 && length < 1e-9, "{step}, {length}");
+        // A finger is not: steps are shortened there, and forces are not.
+        let [step, length] = off("hand/midhand/index");
+        assert!(step > 0.05 && length < 1e-9, "{step}, {length}");
+    }
+}

@@ -330,6 +330,7 @@ impl Trial {
 mod tests {
     use super::*;
     use crate::bundled;
+    use crate::signal::Frame;
     use crate::source::{CsvSource, Source as _};
 
     pub(crate) fn touch() -> TestFrames {

@@ -122,7 +122,7 @@ impl Flags {
         let has_pressure = letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
         let touches = scene.touches.unwrap_or_default();
         let scene = scene.letters(letters);
-        let scene = if has_pressure { scene.touches(touches) } else { scene };
+        let scene = scene.touches(has_pressure.then_some(touches));
         let mut engine = Engine::new(body, engine_options.scene(scene).backend(BackendKind::Cpu))?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
         let width = source.taxels().len();
