@@ -93,7 +93,8 @@ impl Wish<'_> {
         let options =
             Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone(), edges: self.edges };
         if let Some(read) = read {
-            let letter = picture::usual_letter(body, &set.fields);
+            let named = self.letter.as_deref().map(picture::shown_letter).transpose().map_err(|e| e.at("letter"))?;
+            let letter = named.unwrap_or_else(|| picture::usual_letter(body, &set.fields));
             let letters = picture::letters_of(body, &set.fields, letter);
             let has_pressure = letters.iter().any(|letter| letter.receptor.is_of_pressure());
             let scene = Scene::default().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor).letters(letters);

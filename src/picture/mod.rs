@@ -21,7 +21,7 @@ use glam::DVec3;
 pub use chart::ChartPicture;
 pub use chart::of_chart;
 pub use drawn::Picture;
-pub use moments::{Moments, Times, letters_of, usual_letter};
+pub use moments::{Moments, Times, letters_of, shown_letter, usual_letter};
 pub use touch::{MarkedTouch, Moment, TouchPicture};
 pub use view::View;
 

@@ -239,6 +239,22 @@ impl Moments {
     }
 }
 
+/// The letter that a word names; pressure itself is called so, too.
+///
+/// # Errors
+/// It names none, or changes, which are not drawn.
+pub fn shown_letter(word: &str) -> Result<Receptor> {
+    match word {
+        "pressure" => Ok(Receptor::Sustained),
+        word => match word.parse()? {
+            Receptor::Change => {
+                Err(Error::usage("changes are not drawn; give pressure, shear, temperature or proximity"))
+            }
+            receptor => Ok(receptor),
+        },
+    }
+}
+
 /// The letter that is shown of `body` unless another is asked for: pressure, or else what its taxels in `fields` measure.
 #[must_use]
 pub fn usual_letter(body: &Body, fields: &[Field]) -> Receptor {

@@ -7,7 +7,9 @@ use somatic::field::Field;
 use somatic::internal::scene_file::{hertz, seconds};
 use somatic::internal::setup::Setup;
 use somatic::internal::signal::{Channel, Receptor};
-use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture, letters_of, usual_letter};
+use somatic::picture::{
+    Moment, Moments, Options, Picture, Times, TouchPicture, letters_of, shown_letter, usual_letter,
+};
 use somatic::scene::Coordinates;
 use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
@@ -32,7 +34,7 @@ pub(super) struct Flags {
     /// What taxels are coloured by: pressure, shear, temperature or proximity [default: pressure if there is any].
     ///
     /// Taxels with three axes have arrows of their tangential forces with pressure and shear.
-    #[arg(long, value_name = "LETTER", value_parser = letter)]
+    #[arg(long, value_name = "LETTER", value_parser = shown_letter)]
     letter: Option<Receptor>,
 
     /// The time to show, such as 2.9s [default: when most is pressed or pulled, or it is warmest, or nearest].
@@ -144,19 +146,6 @@ impl Flags {
             None => moments.draw(body, fields, options, ids, progress),
         };
         Picture::animation(&pictures?, times.picture_s())
-    }
-}
-
-/// The letter that a word names; pressure itself is called so, too.
-fn letter(word: &str) -> Result<Receptor> {
-    match word {
-        "pressure" => Ok(Receptor::Sustained),
-        word => match word.parse()? {
-            Receptor::Change => {
-                Err(Error::usage("changes are not drawn; give pressure, shear, temperature or proximity"))
-            }
-            receptor => Ok(receptor),
-        },
     }
 }
 
