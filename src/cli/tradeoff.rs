@@ -39,7 +39,8 @@ Examples:
 
 Methods are compared with the truth: of touches simulated on the body, under the layer that the
 calibration names in [layer], or of the source if it is a simulation. Options of rounding are compared
-with the reference. Combinations take turns, so that a machine that slows down slows all of them.
+with the reference. Shear, temperature and proximity are the same with every option: only what they cost
+is reported. Combinations take turns, so that a machine that slows down slows all of them.
 The front has those that no other combination beats: none is as true and faster. Results are kept.
 With them `somatic run` and `somatic plan` choose the backend and the options that a scene leaves
 open, on the same recording or live.";
