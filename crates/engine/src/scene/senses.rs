@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use glam::{DQuat, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use super::Scene;
 use crate::body::{Body, Taxel, listed};
@@ -314,11 +314,7 @@ impl Senses {
             let normal_in_anchor = anchor_from_link.transform_vector3(taxel.normal_in_link);
             let tangents_in_anchor = tangents_in_link.map(|tangent| anchor_from_link.transform_vector3(tangent));
             let tangents_in_chart = field.chart.as_ref().map_or([DVec2::ZERO; 2], |chart| {
-                let turn = DQuat::from_rotation_arc(normal_in_anchor.normalize(), chart.normal_in_anchor.normalize());
-                tangents_in_anchor.map(|tangent| {
-                    let tangent = turn * tangent;
-                    DVec2::new(tangent.dot(chart.u_in_anchor), tangent.dot(chart.v_in_anchor))
-                })
+                tangents_in_anchor.map(|tangent| chart.along(tangent, normal_in_anchor))
             });
             SensedMember {
                 taxel: member.taxel,
