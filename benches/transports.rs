@@ -170,6 +170,7 @@ fn run(body: &Body, way: Way) -> Took {
             let input = InputFrames {
                 frames: std::slice::from_ref(&frame),
                 pressures: &|frame, to| engine.pressures(frame, to),
+                sensed: &|frame, taxels, to| engine.sensed_alone(frame, taxels, to),
                 plan: engine.plan(),
                 values_read: engine.values_read(),
                 values_sensed: engine.values_sensed(),

@@ -21,6 +21,9 @@ pub const TOUCH: &[u8] = include_bytes!("touch.csv");
 /// computed, not measured.
 pub const MEETING: &[u8] = include_bytes!("meeting.csv");
 
+/// The calibration of [`SENSING_HAND`] in [`MEETING`]: its units, the range of its distance sensors, and when it slips; TOML.
+pub const MEETING_CALIBRATION: &str = include_str!("sensing-hand.toml");
+
 /// What the bundled bodies are called.
 pub const BODIES: [&str; 4] = ["hand", "mat", "humanoid", "sensing-hand"];
 

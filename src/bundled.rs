@@ -2,7 +2,7 @@
 //!
 //! What each of them is, and the recipe that makes it, is in `bodies/README.md`.
 
-pub use somatic_bodies::{BODIES, HAND, HUMANOID, MAT, MEETING, SENSING_HAND, TOUCH, body};
+pub use somatic_bodies::{BODIES, HAND, HUMANOID, MAT, MEETING, MEETING_CALIBRATION, SENSING_HAND, TOUCH, body};
 
 #[cfg(test)]
 mod tests {

@@ -80,6 +80,7 @@ class TouchFlags(_Flags):
     NOISE_UNKNOWN = 1 << 18
     UNSURE = 1 << 19
     YOUNG_FIT = 1 << 20
+    STILL = 1 << 21
 
 
 Flags.__module__ = TouchFlags.__module__ = "somatic_touch"

@@ -577,6 +577,7 @@ def render(
     to_s: float | None = None,
     rate_hz: float = 12.0,
     calibration: Calibration | None = None,
+    letter: Literal["pressure", "shear", "temperature", "proximity"] | None = None,
     views: Sequence[_View] = ...,
     fields: Sequence[str] = ...,
     uv: str | None = None,

@@ -3,7 +3,6 @@
 use pyo3::prelude::*;
 use somatic::field::FieldSet;
 use somatic::internal::scene::choose_fields;
-use somatic::internal::signal::Receptor;
 use somatic::picture::{self, Moment, Moments, Options, Picture, Times, TouchPicture, View};
 use somatic::scene::Coordinates;
 use somatic::{BackendKind, Engine, Error, Frame, Outputs, Scene};
@@ -23,7 +22,7 @@ pub(crate) fn draw(py: Python<'_>, wish: Wish<'_>) -> PyResult<PyPicture> {
     let mut raised = None;
     let times = match (wish.at_s, wish.from_s, wish.to_s) {
         (Some(t_s), ..) => Times::At(t_s),
-        (None, None, None) => Times::MostPressed,
+        (None, None, None) => Times::Most,
         (None, from_s, to_s) => Times::Span {
             from_s: from_s.unwrap_or(f64::NEG_INFINITY),
             to_s: to_s.unwrap_or(f64::INFINITY),
@@ -94,9 +93,13 @@ impl Wish<'_> {
         let options =
             Options { size: self.size, views, fields: chosen, look_at: self.look_at.clone(), edges: self.edges };
         if let Some(read) = read {
+            let named = self.letter.as_deref().map(picture::shown_letter).transpose().map_err(|e| e.at("letter"))?;
+            let letter = named.unwrap_or_else(|| picture::usual_letter(body, &set.fields));
+            let letters = picture::letters_of(body, &set.fields, letter);
+            let has_pressure = letters.iter().any(|letter| letter.receptor.is_of_pressure());
+            let scene = Scene::default().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor).letters(letters);
             let touches = somatic::touch::Options::default();
-            let scene = Scene::default().outputs(Outputs::TOTAL).touches(touches).coordinates(Coordinates::Anchor);
-            let scene = scene.letters(picture::letters_of(body, &set.fields, Receptor::Sustained));
+            let scene = if has_pressure { scene.touches(touches) } else { scene };
             let options_of_engine = somatic::Options::default().scene(scene).backend(BackendKind::Cpu).batch(1);
             let options_of_engine = match self.calibration {
                 Some(calibration) => options_of_engine.calibration(calibration.inner.clone()),
@@ -105,7 +108,7 @@ impl Wish<'_> {
             let mut engine = Engine::new(body, options_of_engine)?;
             engine.set_channels(&read.channels)?;
             let frames = read.frames(raised);
-            let moments = Moments::compute(&mut engine, body, (Receptor::Sustained, times), &read.name, frames)?;
+            let moments = Moments::compute(&mut engine, body, (letter, times), &read.name, frames)?;
             return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));
         }
         let picture = match &self.uv {

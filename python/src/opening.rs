@@ -193,20 +193,22 @@ impl Opening {
             Ok((options, spec))
         };
         let bundled_touch = match &text[..] {
-            "hand" => Some(bundled::TOUCH),
-            "sensing-hand" => Some(bundled::MEETING),
+            "hand" => Some((bundled::TOUCH, None)),
+            "sensing-hand" => Some((bundled::MEETING, Some(bundled::MEETING_CALIBRATION))),
             _ => None,
         };
-        if let Some(bytes) = bundled_touch.filter(|_| body.is_none()) {
+        if let Some((bytes, calibration)) = bundled_touch.filter(|_| body.is_none()) {
             let touch = move || -> somatic::Result<Box<dyn Source + Send>> {
                 Ok(Box::new(CsvSource::from_reader("bundled touch", bytes, None, None)?))
             };
             let source =
                 if cut == Cut::WHOLE { touch() } else { Replay::new(touch, cut).map(|cut| Box::new(cut) as _) };
             let source = source.or_raise(py)?;
-            let body = Some(Py::new(py, PyBody::bundled_or_file(&text).or_raise(py)?)?);
-            let (name, file) = ("bundled touch".to_owned(), PathBuf::new());
-            return Ok(Self { name, file, source, body, calibration: None });
+            let body = PyBody::bundled_or_file(&text).or_raise(py)?;
+            let calibration = calibration.map(|text| PyCalibration::of_text(text, &body)).transpose().or_raise(py)?;
+            let calibration = calibration.map(|calibration| Py::new(py, calibration)).transpose()?;
+            let (name, file, body) = ("bundled touch".to_owned(), PathBuf::new(), Some(Py::new(py, body)?));
+            return Ok(Self { name, file, source, body, calibration });
         }
         let (options, spec) = made().or_raise(py)?;
         let given = body.as_ref().map(Py::get);

@@ -79,6 +79,7 @@ pub(crate) struct Wish<'a> {
     pub(crate) body: &'a PyBody,
     pub(crate) recording: Option<&'a PyRecording>,
     pub(crate) calibration: Option<&'a PyCalibration>,
+    pub(crate) letter: Option<String>,
     pub(crate) at_s: Option<f64>,
     pub(crate) from_s: Option<f64>,
     pub(crate) to_s: Option<f64>,
@@ -103,8 +104,8 @@ pub(crate) enum SizeOfPicture {
 ///
 /// `what` is a `Body`, or a `Recording` whose body is known. Of a body the taxels have the colours of their `fields` (globs); `uv` draws
 /// the chart of one field instead; `ids` labels taxels, `edges` connects neighbours on the skin. Of a recording they have the colours of
-/// their pressures under `calibration` (by default its own), and each touch of the body has its mark: at the time `at_s`, by default where
-/// most is pressed, or from `from_s` to `to_s` as an animation with `rate_hz` pictures a second. `views` are sides, such as 'front' and
+/// their pressures under `calibration` (by default its own), or of `letter`: 'shear', 'temperature' or 'proximity'; and each touch of the body has its mark: at the time `at_s`, by default where
+/// there is most to see, or from `from_s` to `to_s` as an animation with `rate_hz` pictures a second. `views` are sides, such as 'front' and
 /// 'top', or 'all'; `look_at` is a field or link that fills the picture; `size` is the width, or width and height at most, in pixels.
 ///
 /// It needs a wheel with the GPU, and an adapter; a software one such as Mesa's lavapipe will do.
@@ -116,7 +117,7 @@ pub(crate) enum SizeOfPicture {
 ///     ...
 /// somatic_touch.UsageError: a picture is of a Body or a Recording; this is a str
 #[pyfunction]
-#[pyo3(signature = (what, *, at_s = None, from_s = None, to_s = None, rate_hz = 12.0, calibration = None, views = Vec::new(), fields = Vec::new(), uv = None, look_at = None, ids = false, edges = false, size = SizeOfPicture::Width(1600)))]
+#[pyo3(signature = (what, *, at_s = None, from_s = None, to_s = None, rate_hz = 12.0, calibration = None, letter = None, views = Vec::new(), fields = Vec::new(), uv = None, look_at = None, ids = false, edges = false, size = SizeOfPicture::Width(1600)))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn render(
     py: Python<'_>,
@@ -126,6 +127,7 @@ pub(crate) fn render(
     to_s: Option<f64>,
     rate_hz: f64,
     calibration: Option<&Bound<'_, PyCalibration>>,
+    letter: Option<String>,
     views: Vec<String>,
     fields: Vec<String>,
     uv: Option<String>,
@@ -151,6 +153,7 @@ pub(crate) fn render(
         ("from_s", from_s.is_some()),
         ("to_s", to_s.is_some()),
         ("calibration", calibration.is_some()),
+        ("letter", letter.is_some()),
     ];
     if let Some((key, _)) = of_touch.into_iter().find(|(_, given)| *given && recording.is_none()) {
         return Err(usage(py, format!("{key} is about a touch; give a Recording")));
@@ -173,6 +176,7 @@ pub(crate) fn render(
         body: body.get(),
         recording,
         calibration: calibration.as_ref().map(Py::get),
+        letter,
         at_s,
         from_s,
         to_s,

@@ -14,11 +14,11 @@ use somatic::internal::limits::{self, MAX_SYSTEM_BYTES};
 use somatic::internal::output::OutputFolder;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::shape::Shape;
-use somatic::{BackendKind, Body, ChosenBackend, Engine, Error, Frame, Outputs, Result};
+use somatic::{BackendKind, Body, ChosenBackend, Engine, Error, Frame, Outputs, Receptor, Result};
 
 use super::bar::Bar;
 use super::interrupt::stop_soon_on_signal;
-use super::scene::{one_of, output, outputs_or_usual};
+use super::scene::{letter, one_of, output, outputs_or_usual};
 use super::stdio::{DONE, print, say};
 use super::words::count;
 
@@ -27,6 +27,7 @@ Examples:
   somatic bench                                               a whole robot, one frame a call
   somatic bench --sensors 7560 --fields 600 --members 24 --frames 9984 --backend cpu
   somatic bench --outputs centroid,orientation --json         these alone, as JSON
+  somatic bench --letters sustained,shear                     what three axes cost beside one
   somatic bench --sensors 100000 --wide 100000 --dump arrays  a field over all; check it by a program
 
 A rate counts each sensor of each field in each frame: memberships per second.";
@@ -78,6 +79,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "OUTPUT,...", value_delimiter = ',', value_parser = output)]
     outputs: Vec<Outputs>,
 
+    /// Compute every field from each of these letters, and the same skin from pressures alone in turns with it.
+    ///
+    /// For shear the sensors have three axes. For temperature and proximity every sensor has a taxel more, in its fields.
+    #[arg(long, value_name = "LETTER,...", value_delimiter = ',', value_parser = letter(),
+        conflicts_with = "dump")]
+    letters: Vec<Receptor>,
+
     /// Number of calls to measure [default: as many as fit into 2 s, at most 20000].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     calls: Option<u32>,
@@ -103,7 +111,8 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
     let shape = arguments.shape();
     let outputs = outputs_or_usual(&arguments.outputs);
     shape.check()?;
-    check_memory(&shape, outputs)?;
+    shape.check_letters(&arguments.letters)?;
+    check_memory(&shape, outputs, arguments.letters.len())?;
     let files = match &arguments.dump {
         None => None,
         Some(folder) => {
@@ -113,36 +122,94 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
         }
     };
     let stop = stop_soon_on_signal()?;
-    let body = shape.body();
-    let mut frames = shape.frames();
-    let mut engine = shape.engine(&body, arguments.backend, outputs)?;
+    let mut skins = vec![Skin::new(&shape, &arguments.letters, arguments.backend, outputs)?];
     if let Some(folder) = files {
-        write_first_call(folder, &shape, &body, &frames, &mut engine)?;
+        write_first_call(folder, &shape, &mut skins[0])?;
     }
-    let times = measure(&mut engine, &shape, &mut frames, arguments.calls, &stop)?;
-    let ChosenBackend { name, device, .. } = engine.backend();
-    let rate = shape.memberships() as f64 / times.median_s;
-    print(&match arguments.json {
-        true => {
-            let us = |seconds: f64| (seconds * 1e9).round() / 1e3;
-            let (median, p99) = (us(times.median_s), us(times.p99_s));
-            let line = json!({
-                "backend": name, "adapter": device, "us_median": median, "us_p99": p99, "rate": rate.round(),
-            });
-            format!("{line}\n")
-        }
-        false => {
-            let calls = count(times.calls as u64, "call");
-            let (median, p99) = (time(times.median_s), time(times.p99_s));
-            let each_ns = 1e9 / rate;
-            format!(
-                "{}\n{name}: {device}\nmedian {median}, 99 % within {p99}, of {calls}\n{} memberships/s, {each_ns:.3} ns each\n",
-                words(&shape),
-                short(rate),
-            )
-        }
-    })?;
+    if !arguments.letters.is_empty() {
+        skins.push(Skin::new(&shape, &[], arguments.backend, outputs)?);
+    }
+    let times = measure(&mut skins, &shape, arguments.calls, &stop)?;
+    let ChosenBackend { name, device, .. } = skins[0].engine.backend();
+    let report = Report { shape, letters: &arguments.letters, backend: name, device, times: &times };
+    print(&if arguments.json { report.json() } else { report.text() })?;
     Ok(DONE)
+}
+
+/// A skin that is measured.
+struct Skin {
+    body: Body,
+    frames: Vec<Frame>,
+    engine: Engine,
+}
+
+impl Skin {
+    fn new(shape: &Shape, letters: &[Receptor], backend: BackendKind, outputs: Outputs) -> Result<Self> {
+        let body = shape.body_for(letters);
+        let engine = shape.engine_for(&body, letters, backend, outputs)?;
+        Ok(Self { frames: shape.frames_for(&body), body, engine })
+    }
+
+    /// How long the next call takes, s.
+    fn call(&mut self, shape: &Shape) -> Result<f64> {
+        shape.advance(&mut self.frames);
+        let start = Instant::now();
+        black_box(self.engine.process(black_box(&self.frames))?);
+        Ok(start.elapsed().as_secs_f64())
+    }
+}
+
+/// What is printed.
+struct Report<'a> {
+    shape: Shape,
+    letters: &'a [Receptor],
+    backend: &'a str,
+    device: String,
+    /// Of the skin with its letters, and of that with pressures alone if letters are given.
+    times: &'a [Times],
+}
+
+impl Report<'_> {
+    /// Memberships per second.
+    fn rate(&self) -> f64 {
+        (self.shape.memberships() * self.letters.len().max(1) as u128) as f64 / self.times[0].median_s
+    }
+
+    /// How many times as long a call takes as one with pressures alone, and that one's time, s.
+    fn beside_pressure(&self) -> Option<(f64, f64)> {
+        let [with_letters, alone] = self.times else { return None };
+        Some((with_letters.median_s / alone.median_s, alone.median_s))
+    }
+
+    fn json(&self) -> String {
+        let us = |seconds: f64| (seconds * 1e9).round() / 1e3;
+        let mut line = json!({
+            "backend": self.backend, "adapter": self.device, "us_median": us(self.times[0].median_s),
+            "us_p99": us(self.times[0].p99_s), "rate": self.rate().round(),
+        });
+        if let Some((_, alone_s)) = self.beside_pressure() {
+            line["letters"] = self.letters.iter().map(ToString::to_string).collect();
+            line["us_median_pressure"] = us(alone_s).into();
+        }
+        format!("{line}\n")
+    }
+
+    fn text(&self) -> String {
+        let [calls, median, p99] = {
+            let of = &self.times[0];
+            [count(of.calls as u64, "call"), time(of.median_s), time(of.p99_s)]
+        };
+        let (skin, rate) = (words(&self.shape, self.letters), self.rate());
+        let (backend, device, each_ns) = (self.backend, &self.device, 1e9 / rate);
+        let beside = self
+            .beside_pressure()
+            .map(|(ratio, alone_s)| format!("{ratio:.2} times as long as pressures alone, median {}\n", time(alone_s)));
+        format!(
+            "{skin}\n{backend}: {device}\nmedian {median}, 99 % within {p99}, of {calls}\n{}{} memberships/s, {each_ns:.3} ns each\n",
+            beside.unwrap_or_default(),
+            short(rate),
+        )
+    }
 }
 
 impl Arguments {
@@ -153,8 +220,9 @@ impl Arguments {
 }
 
 /// Refuses what memory has no room for, before it is asked for.
-fn check_memory(shape: &Shape, outputs: Outputs) -> Result<()> {
-    let needed = shape.bytes(outputs);
+fn check_memory(shape: &Shape, outputs: Outputs, letters: usize) -> Result<()> {
+    // Each letter takes about what the skin does, and the same with pressures alone stands beside them.
+    let needed = shape.bytes(outputs) * if letters > 0 { letters as u128 + 1 } else { 1 };
     let gib = |bytes: u128| bytes as f64 / (1_u64 << 30) as f64;
     match available_bytes() {
         Some(free) if needed > free => Err(Error::usage(format!(
@@ -179,16 +247,10 @@ fn available_bytes() -> Option<u128> {
 }
 
 /// The first call of all: its percepts have no frame before, as those of whoever computes the same.
-fn write_first_call(
-    folder: OutputFolder,
-    shape: &Shape,
-    body: &Body,
-    frames: &[Frame],
-    engine: &mut Engine,
-) -> Result<()> {
-    let backend = engine.backend().name;
-    let percepts = engine.process(frames)?;
-    dump::write(folder, shape, body, frames, percepts, backend)
+fn write_first_call(folder: OutputFolder, shape: &Shape, skin: &mut Skin) -> Result<()> {
+    let backend = skin.engine.backend().name;
+    let percepts = skin.engine.process(&skin.frames)?;
+    dump::write(folder, shape, &skin.body, &skin.frames, percepts, backend)
 }
 
 /// How long calls took, s.
@@ -207,56 +269,51 @@ impl Times {
     }
 }
 
-fn measure(
-    engine: &mut Engine,
-    shape: &Shape,
-    frames: &mut [Frame],
-    calls: Option<u32>,
-    stop: &AtomicBool,
-) -> Result<Times> {
+/// How long calls take on each of `skins`, in turns.
+fn measure(skins: &mut [Skin], shape: &Shape, calls: Option<u32>, stop: &AtomicBool) -> Result<Vec<Times>> {
     let mut bar = Bar::new("measuring");
     let start = Instant::now();
     loop {
-        shape.advance(frames);
-        black_box(engine.process(black_box(frames))?);
+        skins.iter_mut().try_for_each(|skin| skin.call(shape).map(drop))?;
         if start.elapsed() >= WARM_UP || stop.load(Ordering::Relaxed) {
             break;
         }
     }
     let most = calls.map_or(ENOUGH, |calls| calls as usize);
     let start = Instant::now();
-    let mut seconds = Vec::with_capacity(most.min(ENOUGH));
-    while seconds.len() < most && !stop.load(Ordering::Relaxed) {
-        let so_far = start.elapsed();
-        if calls.is_none() && seconds.len() >= FEWEST && so_far >= LONG_ENOUGH {
+    let mut seconds = vec![Vec::with_capacity(most.min(ENOUGH)); skins.len()];
+    loop {
+        let (done, so_far) = (seconds[0].len(), start.elapsed());
+        let is_enough = done >= most || (calls.is_none() && done >= FEWEST && so_far >= LONG_ENOUGH);
+        if is_enough || stop.load(Ordering::Relaxed) {
             break;
         }
-        let by_count = seconds.len() as f64 / most as f64;
+        let by_count = done as f64 / most as f64;
         let by_time = so_far.as_secs_f64() / LONG_ENOUGH.as_secs_f64();
         bar.show(if calls.is_some() { by_count } else { by_count.max(by_time) });
-        shape.advance(frames);
-        let call = Instant::now();
-        black_box(engine.process(black_box(frames))?);
-        seconds.push(call.elapsed().as_secs_f64());
+        for (skin, seconds) in skins.iter_mut().zip(&mut seconds) {
+            seconds.push(skin.call(shape)?);
+        }
     }
     drop(bar);
-    if seconds.is_empty() {
+    if seconds[0].is_empty() {
         return Err(Error::failed("stopped before a call was measured"));
     }
     if stop.load(Ordering::Relaxed) {
-        say(&format!("stopped after {}", count(seconds.len() as u64, "call")));
+        say(&format!("stopped after {}", count(seconds[0].len() as u64, "call")));
     }
-    Ok(Times::from_seconds(seconds))
+    Ok(seconds.into_iter().map(Times::from_seconds).collect())
 }
 
-fn words(shape: &Shape) -> String {
+fn words(shape: &Shape, letters: &[Receptor]) -> String {
     let wide = match shape.wide {
         0 => String::new(),
         wide => format!(" and one of {wide}"),
     };
     let (fields, members) = (count(shape.fields as u64, "field"), count(shape.members as u64, "sensor"));
     let frames = count(shape.frames as u64, "frame");
-    format!("{fields} of {members}{wide}, out of {}; {frames} a call", shape.sensors)
+    let letters: String = letters.iter().map(|letter| format!("{letter}, ")).collect();
+    format!("{fields} of {members}{wide}, out of {}; {letters}{frames} a call", shape.sensors)
 }
 
 fn time(seconds: f64) -> String {
@@ -293,6 +350,8 @@ mod tests {
         assert_eq!([2.5e-6, 0.0125, 3.0].map(time), ["2.50 µs", "12.50 ms", "3.00 s"]);
         assert_eq!([12_345.0, 4.2e7, 2.345e9].map(short), ["12.345 k", "42.0 M", "2.35 G"]);
         let shape = Shape { sensors: 40, fields: 9, members: 1, wide: 40, local: false, frames: 1, seed: 1 };
-        assert_eq!(words(&shape), "9 fields of 1 sensor and one of 40, out of 40; 1 frame a call");
+        assert_eq!(words(&shape, &[]), "9 fields of 1 sensor and one of 40, out of 40; 1 frame a call");
+        let told = words(&shape, &[Receptor::Sustained, Receptor::Shear]);
+        assert_eq!(told, "9 fields of 1 sensor and one of 40, out of 40; sustained, shear, 1 frame a call");
     }
 }

@@ -166,11 +166,12 @@ impl Doubts {
         ))
     }
 
-    /// A warning if all taxels of most fields are pressed all the time.
+    /// A warning if all taxels of most fields of pressures are pressed all the time.
     fn of_rest(&self, plan: &Plan) -> Option<String> {
         let pressed = self.where_in_body(|seen| seen.came && !seen.rested);
+        let is_pressed = |field: &usize| plan.letters()[plan.letter_of(*field)].receptor.is_of_pressure();
         let many: Vec<(usize, usize)> = (0..plan.fields().len())
-            .filter(|&field| plan.letters()[plan.letter_of(field)].receptor.is_of_pressure())
+            .filter(is_pressed)
             .map(|field| self.among(plan, field, &pressed))
             .filter(|(_, all)| *all >= MIN_FIELD_TAXELS)
             .collect();

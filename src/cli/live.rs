@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use console::{Term, style};
 use somatic::internal::plain;
+use somatic::signal::Letter;
 use somatic::{Body, ChosenBackend, Engine, Outputs, Percept, Percepts};
 
 use super::screen::Screen;
@@ -231,7 +232,11 @@ impl Table {
         let has_pressure = (0..plan.letters().len()).any(is_of_pressure);
         let row = |field: usize| FieldRow {
             is_touch: !has_pressure || is_of_pressure(plan.letter_of(field)),
-            name: plain::line(&plan.label(field)).into_owned(),
+            // What is in columns is of pressures, unless it is marked otherwise.
+            name: match plan.letters()[plan.letter_of(field)] == Letter::default() {
+                true => plain::line(plan.fields().nth(field).map_or("", |field| field.name)).into_owned(),
+                false => plain::line(&plan.label(field)).into_owned(),
+            },
             latest: None,
             touched_at: None,
             frames_touched: 0,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
-use somatic::internal::plot::{Gathered, Gatherer, outputs_for, png, svg};
+use somatic::internal::plot::{Gathered, Gatherer, outputs_for, png, svg, wanted_of};
 use somatic::internal::run::left_out;
 use somatic::internal::scene::AskedOutputs;
 use somatic::internal::scene_file::seconds;
@@ -92,7 +92,10 @@ pub(super) struct Arguments {
 
 fn plot_outputs_help() -> String {
     let names: Vec<&str> = COLUMNS.iter().map(|column| column.name).collect();
-    format!("Plot these quantities over time: {} [default: load and area]", names.join(", "))
+    format!(
+        "Plot these quantities over time: {} [default: load and area, or what taxels measure that are not pressed]",
+        names.join(", ")
+    )
 }
 
 pub(super) fn plot(arguments: &Arguments) -> Result<u8> {
@@ -151,7 +154,10 @@ fn gather(asked: &Setup, wanted: Outputs, stop: &AtomicBool, to: &Path) -> Resul
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let mut source = input.open(&Channel::all_of(&body), asked)?;
     source.report_stale();
-    let mut engine = Engine::new(&body, asked.options(&body, &ids, RECORDED_BATCH)?)?;
+    let wanted = wanted_of(&body, wanted);
+    let mut options = asked.options(&body, &ids, RECORDED_BATCH)?;
+    options.scene.outputs = outputs_for(wanted);
+    let mut engine = Engine::new(&body, options)?;
     engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     let p_unit = engine.plan().common_quantity().map_or(Unit::P.symbol(), Quantity::symbol);
     let gatherer = Gatherer::new(&input.name, &body, &engine, wanted, !asked.fields.is_empty())?;

@@ -12,7 +12,7 @@ use somatic::internal::setup::{Input, Setup, Tell};
 use somatic::scene::file::SceneFile;
 use somatic::source::SourceSpec;
 
-pub(super) use self::flags::{LIVE, first, grouped, one_of};
+pub(super) use self::flags::{LIVE, first, grouped, letter, one_of};
 pub(super) use self::in_flags::{in_flags, words_of_flags};
 pub(super) use self::outputs::{output, outputs_or_usual};
 pub(super) use self::run_flags::RunFlags;

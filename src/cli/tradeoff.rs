@@ -17,7 +17,7 @@ use somatic::internal::tradeoff::{
 };
 use somatic::{BackendKind, Engine, Error, OutputPath, Result};
 
-use self::measured::{in_words, measure_options, missed, played, recording};
+use self::measured::{in_words, measure_options, missed, nothing_to_choose, played, recording};
 use self::settled::driver;
 pub(super) use self::settled::{Settled, settled};
 use super::bar::Bar;
@@ -39,7 +39,8 @@ Examples:
 
 Methods are compared with the truth: of touches simulated on the body, under the layer that the
 calibration names in [layer], or of the source if it is a simulation. Options of rounding are compared
-with the reference. Combinations take turns, so that a machine that slows down slows all of them.
+with the reference. Shear, temperature and proximity are the same with every option: only what they cost
+is reported. Combinations take turns, so that a machine that slows down slows all of them.
 The front has those that no other combination beats: none is as true and faster. Results are kept.
 With them `somatic run` and `somatic plan` choose the backend and the options that a scene leaves
 open, on the same recording or live.";
@@ -127,7 +128,7 @@ fn tradeoff_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
     });
     drop(bar);
     let mut report = report?;
-    report.left_out.extend(software().filter(|_| options.backend == BackendKind::Auto));
+    report.left_out.extend(software().filter(|_| options.backend == BackendKind::Auto && !report.rows.is_empty()));
     // A run that was cut short, or with knobs that are held, is not what others would measure.
     if !stop.load(Ordering::Relaxed)
         && options.scene.knobs == somatic::scene::Knobs::default()
@@ -143,7 +144,13 @@ fn tradeoff_asked(arguments: &Arguments, asked: &Setup) -> Result<u8> {
         say("interrupted: that is what was measured until then; nothing is picked, drawn or kept");
         return Ok(FAILED);
     }
+    if report.rows.is_empty() && !target.is_empty() {
+        return Err(nothing_to_choose(&target));
+    }
     let pick = if target.is_empty() { None } else { target.pick(&report, way) };
+    if report.rows.is_empty() && plot.is_some() {
+        return Err(Error::usage("there is nothing to draw: no letter is made of pressures").at("--plot"));
+    }
     if let Some(plot) = plot {
         plot.draw(|| plot_svg(&report), || plot_png(&report))?;
     }
@@ -194,7 +201,26 @@ fn text(report: &Report, all: bool) -> String {
     for way in CallMode::ALL {
         text += &rounding(report, way, all);
     }
-    text
+    text + &letters(report)
+}
+
+/// What letters cost that the host makes, of which nothing is to be traded.
+fn letters(report: &Report) -> String {
+    if report.letters.is_empty() {
+        return String::new();
+    }
+    let of_way = |way: CallMode| report.letters.iter().filter(move |cost| cost.way == way);
+    let ways: Vec<CallMode> = CallMode::ALL.into_iter().filter(|&way| of_way(way).next().is_some()).collect();
+    let headings: Vec<String> =
+        ways.iter().flat_map(|way| [format!("{}, µs", way.word()), "of a frame".to_owned()]).collect();
+    let mut table = plain(headings.iter().map(String::as_str).chain(["letter"]), 0..2 * ways.len());
+    for first in of_way(ways[0]) {
+        let costs = ways.iter().filter_map(|&way| of_way(way).find(|cost| cost.letter == first.letter));
+        let cells = costs.flat_map(|cost| [number(cost.us), format!("{:.0} %", 100.0 * cost.share)]);
+        table.add_row(cells.chain([first.letter.clone()]));
+    }
+    let what = "the host makes them in double precision, the same bits with every option: nothing to trade";
+    format!("\n{}: {what}\n{}", style("other letters").bold(), shown(&table))
 }
 
 /// A number, or a dash where nothing was compared.

@@ -1,15 +1,15 @@
 //! Pictures of the chart of a field: its taxels laid flat, in the colours of fields or of pressures.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::colour::{PAPER, linear};
-use super::labels::{self, Labels, Legend, PlacedId, half_of_id};
-use super::shape::Dots;
-use super::touch::{Moment, own_colour};
+use super::labels::{self, Labels, PlacedId, half_of_id};
+use super::shape::{Disc, Dots};
+use super::touch::Moment;
 use super::view::{Arrangement, View};
-use super::{FieldColours, Options, Picture, arranged, checked, counted, fan};
+use super::{FieldColours, Options, Picture, arranged, arrows, checked, counted, fan};
 use crate::backend::gpu::raster::{self, Drawing, Slice};
-use crate::body::Body;
+use crate::body::{Body, Modality};
 use crate::error::{Error, Result};
 use crate::field::Field;
 
@@ -37,6 +37,10 @@ pub struct ChartPicture<'a> {
     about: String,
     /// By place in the chart, the taxel's index in the body, ascending.
     held: Vec<usize>,
+    /// By taxel of the body.
+    modalities: Vec<Modality>,
+    /// By place in the chart, the axes x, y and z of the taxel's link along u and v, as its tangents lie in the chart.
+    link_axes: Vec<[DVec2; 3]>,
     dots: Dots,
     /// What is in sight, m.
     around: Vec<DVec3>,
@@ -58,6 +62,15 @@ impl<'a> ChartPicture<'a> {
         let mut places = vec![DVec3::NAN; body.taxels.len()];
         field.members.iter().for_each(|member| places[member.taxel] = member.place.with_z(0.0));
         let held: Vec<usize> = field.members.iter().map(|member| member.taxel).collect();
+        let link_axes = |&taxel: &usize| {
+            let taxel = &body.taxels[taxel];
+            let anchor_from_link = match field.anchor {
+                Some(anchor) => body.rest_transform(anchor, taxel.link),
+                None => body.links[taxel.link].world_from_link(),
+            };
+            let normal = anchor_from_link.transform_vector3(taxel.normal_in_link);
+            DVec3::AXES.map(|axis| chart.along(anchor_from_link.transform_vector3(axis), normal))
+        };
         // A single taxel is drawn with its area.
         let side = held.iter().map(|&taxel| body.taxels[taxel].area.sqrt()).fold(0.0, f64::max);
         let extent = field.radius_m().max(10.0 * side);
@@ -68,8 +81,17 @@ impl<'a> ChartPicture<'a> {
         let reach = |(&p, &r): (&DVec3, &f64)| [p - MARGIN_RADII * r, p + MARGIN_RADII * r];
         let around = dots.places.iter().zip(&dots.radii).flat_map(reach).chain([DVec3::ZERO]).collect();
         let labelled = held.iter().filter(|_| ids).map(|&taxel| body.taxels[taxel].id.to_string());
-        let ids = labelled.collect();
-        Ok(Self { options, name: field.name.clone(), about, held, dots, around, ids })
+        Ok(Self {
+            options,
+            name: field.name.clone(),
+            about,
+            modalities: body.taxels.iter().map(|taxel| taxel.modality).collect(),
+            link_axes: held.iter().map(link_axes).collect(),
+            ids: labelled.collect(),
+            held,
+            dots,
+            around,
+        })
     }
 
     /// In the colours of `fields`, those of the body.
@@ -95,34 +117,39 @@ impl<'a> ChartPicture<'a> {
         let shown = FieldColours::for_fields(&within, &self.options.fields, &self.dots);
         let slices = |rims: bool| self.dots.slices(&shown.coloured(&within), DVec3::ZERO, rims);
         let title = format!("{}{}", self.name, self.about);
-        self.drawn(&title, shown.key(&within), slices, |_| PAPER, |_| {})
+        Ok(self.drawn(&title, shown.key(&within), slices, |_| PAPER, |_, _| {})?.0)
     }
 
-    /// With the pressures of `moment`; taxels of a touch have a rim of its colour.
+    /// With what taxels read at `moment`, and arrows of tangential forces; taxels of a touch have a rim of its colour.
     ///
     /// # Errors
     /// As [`of_chart`].
     pub fn draw(&self, moment: &Moment<'_>) -> Result<Picture> {
-        let of_body = moment.colours();
-        let colours: Vec<[u8; 3]> = self.held.iter().map(|&taxel| of_body[taxel]).collect();
-        let mut touched = vec![None; self.held.len()];
-        for marked in moment.touches {
-            for place in marked.taxels.iter().filter_map(|taxel| self.held.binary_search(taxel).ok()) {
-                touched[place] = Some(own_colour(&marked.touch));
-            }
-        }
+        let of_body = moment.discs(self.modalities.iter().copied(), !self.ids.is_empty());
+        let discs: Vec<Disc> = self.held.iter().map(|&taxel| of_body[taxel]).collect();
         let time = moment.t_s.map_or(String::new(), |t_s| format!("{t_s:.2} s"));
-        let slices = |rims: bool| self.dots.flat_slices(&colours, &touched, DVec3::ZERO, rims);
-        // The colours of pressure replace all others.
-        self.drawn(
-            &self.name,
-            vec![(None, time)],
-            slices,
-            |place| colours[place],
-            |labels| {
-                moment.legend().into_iter().for_each(|legend| labels.colours(Legend { note: String::new(), ..legend }));
-            },
-        )
+        let slices = |rims: bool| self.dots.flat_slices(&discs, DVec3::ZERO, rims);
+        let radius_m = self.dots.mean_radius();
+        let held = |&&(taxel, _): &&(usize, DVec3)| self.held.binary_search(&taxel).is_ok();
+        let pulled: Vec<(usize, DVec3)> = moment.shear.iter().filter(held).copied().collect();
+        let moment = &Moment { shear: &pulled, ..moment.clone() };
+        let label = |labels: &mut Labels, arrangement: &Arrangement| {
+            moment.legend().into_iter().for_each(|legend| labels.colours(legend));
+            moment.arrow_key(radius_m * arrangement.scale).into_iter().for_each(|key| labels.arrow(key));
+        };
+        // The colours of what taxels read replace those of fields.
+        let (title, key) = (moment.titled(&self.name), vec![(None, time)]);
+        let (mut picture, arrangement) = self.drawn(&title, key, slices, |place| discs[place].colour, label)?;
+        let Some(most) = moment.shear_ends() else { return Ok(picture) };
+        let arrow = |&(taxel, force): &(usize, DVec3)| {
+            let place = self.held.binary_search(&taxel).ok()?;
+            let from = self.dots.places[place];
+            let along: DVec2 = force.to_array().into_iter().zip(self.link_axes[place]).map(|(x, axis)| x * axis).sum();
+            let to = from + along.extend(0.0) * arrows::length(1.0, radius_m, most);
+            Some([from, to].map(|end| arrangement.pixel(0, end)))
+        };
+        arrows::draw(&mut picture.pixels, picture.size, moment.shear.iter().filter_map(arrow))?;
+        Ok(picture)
     }
 
     /// The discs that `slices` gives, with or without rims, over a legend of `key` and what else `label` adds; ids stand on `colour` of
@@ -133,8 +160,8 @@ impl<'a> ChartPicture<'a> {
         key: Vec<(Option<[u8; 3]>, String)>,
         slices: impl Fn(bool) -> Vec<Slice>,
         colour: impl Fn(usize) -> [u8; 3],
-        label: impl Fn(&mut Labels),
-    ) -> Result<Picture> {
+        label: impl Fn(&mut Labels, &Arrangement),
+    ) -> Result<(Picture, Arrangement)> {
         let mut labels = Labels::new(title, self.options.size[0]);
         let views = [View::Front.axes()];
         let (arrangement, size) = arranged(&mut labels, key, self.options.size, &views, &self.around)?;
@@ -150,13 +177,13 @@ impl<'a> ChartPicture<'a> {
         let mut pixels = raster::draw(&drawing)?;
         labels.axes(arrangement.pixel(0, DVec3::ZERO));
         labels.bar(arrangement.scale);
-        label(&mut labels);
+        label(&mut labels, &arrangement);
         labels.draw(&mut pixels, size)?;
         let placed = self.ids.iter().enumerate();
         let placed =
             placed.map(|(place, id)| PlacedId { id, at: self.place_of_id(&arrangement, place), on: colour(place) });
         labels::write_ids(&mut pixels, size, &placed.collect::<Vec<_>>())?;
-        Ok(Picture { size, pixels })
+        Ok((Picture { size, pixels }, arrangement))
     }
 
     /// The pixel that the id of a taxel is about: beside the origin, where the axes would cover it.
@@ -169,5 +196,49 @@ impl<'a> ChartPicture<'a> {
             return [from_x - reach[0], from_y + reach[1]];
         }
         [x, y]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+    use crate::field::FieldSet;
+
+    /// How far what is along an axis of a taxel's link in the chart is from what a step along it does to the taxel's own place there,
+    /// and from having the length of what is tangential in it.
+    fn off(name: &str) -> [f64; 2] {
+        let body = Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
+        let fields = FieldSet::new(&body).unwrap().fields;
+        let index = fields.iter().position(|field| field.name == name).unwrap();
+        let (field, options) = (&fields[index], Options { size: [400, 400], ..Options::default() });
+        let picture = ChartPicture::new(&body, &fields, index, &options, false).unwrap();
+        let (chart, anchor) = (field.chart.as_ref().unwrap(), field.anchor.unwrap());
+        let mut worst = [0.0_f64; 2];
+        for (member, axes) in field.members.iter().zip(&picture.link_axes) {
+            let taxel = &body.taxels[member.taxel];
+            let place = |step: DVec3| {
+                let in_anchor = body.rest_transform(anchor, taxel.link).transform_point3(taxel.position_in_link + step);
+                chart.project(in_anchor - field.origin_in_anchor).truncate()
+            };
+            for (tangent, own) in taxel.tangents_in_link().map(|tangent| {
+                (tangent, tangent.to_array().into_iter().zip(axes).map(|(x, axis)| x * *axis).sum::<DVec2>())
+            }) {
+                let step = place(tangent * 1e-4) - place(DVec3::ZERO);
+                worst[0] = worst[0].max((own - step * 1e4).length());
+                worst[1] = worst[1].max((own.length() - 1.0).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn forces_lie_in_a_chart_as_their_taxels_do_and_keep_their_length() {
+        // A palm is flat: a step along a tangent is a step along it in the chart.
+        let [step, length] = off("hand/palm");
+        assert!(step < 1e-6 && length < 1e-9, "{step}, {length}");
+        // A finger is not: a step is shortened there, and a force is not.
+        let [step, length] = off("hand/midhand/index");
+        assert!(step > 1e-3 && length < 1e-9, "{step}, {length}");
     }
 }

@@ -4,6 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::arrows;
 use super::colour::{PAPER, linear};
 use crate::colours::COLOURS;
 use crate::error::Result;
@@ -50,8 +51,10 @@ pub(super) struct Labels {
     scale: Option<f64>,
     /// Where an origin with its axes goes.
     axes: Option<[f64; 2]>,
-    /// The upper end of the colours of pressure, and its unit.
+    /// The colours of what taxels read, with their ends.
     colours: Option<Legend>,
+    /// The length of an arrow, pixels, and the force that it stands for.
+    arrow: Option<(f64, String)>,
 }
 
 impl Labels {
@@ -64,6 +67,7 @@ impl Labels {
             scale: None,
             axes: None,
             colours: None,
+            arrow: None,
         }
     }
 
@@ -124,6 +128,11 @@ impl Labels {
     /// Adds the colours of what taxels show.
     pub(super) fn colours(&mut self, legend: Legend) {
         self.colours = Some(legend);
+    }
+
+    /// Adds an arrow, pixels long, that stands for a force.
+    pub(super) fn arrow(&mut self, key: (f64, String)) {
+        self.arrow = Some(key);
     }
 
     pub(super) fn axes(&mut self, origin: [f64; 2]) {
@@ -216,6 +225,31 @@ impl Labels {
                 area.draw_text(name, &text(size, INK, HPos::Center), at).map_err(cannot)?;
             }
         }
+        area.present().map_err(cannot)?;
+        drop(area);
+        match &self.arrow {
+            Some((length, force)) => self.draw_arrow(pixels, [width, height], *length, force),
+            None => Ok(()),
+        }
+    }
+
+    /// Draws the arrow that stands for `force` behind the legend's last entry, if there is room before the scale bar.
+    fn draw_arrow(&self, pixels: &mut [u8], size: [u32; 2], length: f64, force: &str) -> Result<()> {
+        let left = match (self.rows().last(), self.key.last()) {
+            (Some((x, _)), Some((_, name))) => x + self.wide(name) + self.scaled(GAP),
+            _ => self.scaled(SIDE),
+        };
+        let (gap, text) = (self.scaled(8), ink::width(force, self.scaled(SIZE))?);
+        let tip = f64::from(left) + length;
+        if tip + f64::from(gap + text) > f64::from(self.end()) {
+            return Ok(());
+        }
+        let middle = size[1].saturating_sub(self.scaled(ROW / 2 + 12));
+        let y = f64::from(middle);
+        arrows::draw(pixels, size, std::iter::once([[f64::from(left), y], [tip, y]]))?;
+        let area = BitMapBackend::with_buffer(pixels, (size[0], size[1])).into_drawing_area();
+        let style = (FAMILY, self.scaled(SIZE)).into_font().color(&INK).pos(Pos::new(HPos::Left, VPos::Center));
+        area.draw_text(force, &style, (tip.round() as i32 + gap as i32, middle as i32)).map_err(cannot)?;
         area.present().map_err(cannot)
     }
 

@@ -1,6 +1,7 @@
 //! Pictures of bodies: from several sides at one scale, each taxel a disc in its field's colour. Drawn on a GPU or a
 //! software adapter, without a window.
 
+mod arrows;
 mod chart;
 mod colour;
 mod drawn;
@@ -20,7 +21,7 @@ use glam::DVec3;
 pub use chart::ChartPicture;
 pub use chart::of_chart;
 pub use drawn::Picture;
-pub use moments::{Moments, Times, letters_of};
+pub use moments::{Moments, Times, letters_of, shown_letter, usual_letter};
 pub use touch::{MarkedTouch, Moment, TouchPicture};
 pub use view::View;
 

@@ -13,14 +13,12 @@ use crate::signal::{Frame, Letter, Quantity, Reading, Receptor};
 
 /// Pictures of an animation at most: each is held in memory.
 const MAX_PICTURES: usize = 1000;
-/// Sides that a touch is shown from, unless others are asked for.
-const MAX_SIDES: usize = 2;
 
 /// The times of a recording that pictures show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Times {
-    /// The one at which most is pressed.
-    MostPressed,
+    /// The first at which there is most to see of the letter: most is pressed or pulled, it is warmest, or something is nearest.
+    Most,
     /// The last frame up to this time, s.
     At(f64),
     /// An animation.
@@ -70,8 +68,8 @@ struct Shown {
 pub struct Moments {
     shown: Vec<Shown>,
     letter: Receptor,
-    /// Of the colours, in SI units: up to the largest pressure of the whole recording, 1 where nothing is pressed; of other letters those
-    /// of the calibration, or all that was read.
+    /// Of the colours, in SI units: up to the largest pressure or tangential force of the whole recording, 1 where there is none; of
+    /// other letters those of the calibration, or all that was read.
     ends: [f64; 2],
     quantity: Quantity,
 }
@@ -100,11 +98,11 @@ impl Moments {
         let of_skin: Vec<usize> = (0..body.taxels.len()).filter(is_of_skin).collect();
         let mut trails = TouchTrails::default();
         let (from_s, to_s) = match times {
-            Times::MostPressed => (f64::NEG_INFINITY, f64::INFINITY),
+            Times::Most => (f64::NEG_INFINITY, f64::INFINITY),
             Times::At(t_s) => (f64::NEG_INFINITY, t_s),
             Times::Span { from_s, to_s, .. } => (from_s, to_s),
         };
-        let (mut shown, mut max_pressure) = (Vec::<Shown>::new(), 0.0_f64);
+        let (mut shown, mut max_force) = (Vec::<Shown>::new(), 0.0_f64);
         let (mut next_s, mut most) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         let mut list = Vec::new();
         for frame in frames {
@@ -115,13 +113,17 @@ impl Moments {
             engine.pressures(&frame, &mut list);
             engine.sensed(&frame, &senses, &mut sensed);
             sensed.iter().for_each(|value| ranges.see(value));
-            let sum: f64 = list.iter().map(|&(_, pressure)| pressure).sum();
-            max_pressure = list.iter().map(|&(_, pressure)| pressure).fold(max_pressure, f64::max);
+            let forces = || forces_of(letter, &list, &sensed);
+            max_force = forces().fold(max_force, f64::max);
+            let to_see = match letter {
+                Receptor::Temperature | Receptor::Proximity => extreme(letter, &sensed),
+                _ => forces().sum(),
+            };
             if !(from_s..=to_s).contains(&frame.t_s) {
                 continue;
             }
             let is_due = match times {
-                Times::MostPressed => sum > most,
+                Times::Most => to_see > most,
                 Times::At(_) => true,
                 // A picture may be early by less than recordings tell times apart.
                 Times::Span { .. } => frame.t_s >= next_s - 1e-6,
@@ -129,7 +131,7 @@ impl Moments {
             if !is_due {
                 continue;
             }
-            most = sum;
+            most = to_see;
             match times {
                 Times::Span { .. } if shown.len() == MAX_PICTURES => {
                     let what = format!("over {MAX_PICTURES} pictures; choose a shorter part or a lower rate");
@@ -138,7 +140,7 @@ impl Moments {
                 Times::Span { rate_hz, .. } => {
                     next_s = if next_s.is_finite() { next_s } else { frame.t_s } + 1.0 / rate_hz;
                 }
-                Times::MostPressed | Times::At(_) => shown.clear(),
+                Times::Most | Times::At(_) => shown.clear(),
             }
             let touches = found.map_or_else(Vec::new, |found| marked(found, &trails, &of_skin));
             shown.push(Shown { t_s: frame.t_s, touches, ..read(body, letter, &list, &sensed) });
@@ -151,7 +153,7 @@ impl Moments {
         let known = match letter {
             Receptor::Temperature => calibrated.celsius.or(ranges.celsius),
             Receptor::Proximity => calibrated.distance_m.or(ranges.distance_m).map(|[_, most]| [0.0, most]),
-            _ => Some([0.0, max_pressure]),
+            _ => Some([0.0, max_force]),
         };
         let ends = match known.unwrap_or_default() {
             [least, most] if least < most => [least, most],
@@ -160,7 +162,7 @@ impl Moments {
         Ok(Self { shown, letter, ends, quantity })
     }
 
-    /// Draws them on `body`, by default from the two sides that face the touch most; `progress` gets the share that is done and
+    /// Draws them on `body`, by default from the one or two sides that show most of the touch, or of what is shown; `progress` gets the share that is done and
     /// says whether to go on.
     ///
     /// # Errors
@@ -175,13 +177,17 @@ impl Moments {
     ) -> Result<Vec<Picture>> {
         let mut options = options.clone();
         if options.views.is_empty() {
-            let looks = |taxel: &usize| self.shown.iter().any(|shown| shown.pressed[*taxel]);
+            let is_force = !matches!(self.letter, Receptor::Temperature | Receptor::Proximity);
+            let is_to_see = |shown: &Shown, taxel: usize| match is_force {
+                true => shown.pressed[taxel],
+                false => shown.values[taxel].is_some_and(f64::is_finite),
+            };
+            let looks = |taxel: &usize| self.shown.iter().any(|shown| is_to_see(shown, *taxel));
             let normals = (0..body.taxels.len()).filter(looks).map(|taxel| {
                 let taxel = &body.taxels[taxel];
                 body.links[taxel.link].body_from_link.transform_vector3(taxel.normal_in_link)
             });
-            options.views = View::best(&normals.collect::<Vec<_>>());
-            options.views.truncate(MAX_SIDES);
+            options.views = View::two_best(&normals.collect::<Vec<_>>());
         }
         let picture = TouchPicture::new(body, fields, &options, ids)?;
         self.drawn(|moment| picture.draw(moment), progress)
@@ -190,7 +196,7 @@ impl Moments {
     /// Draws them on the chart of field `index` of `fields`; else as [`Moments::draw`].
     ///
     /// # Errors
-    /// As [`super::of_chart`]; or `progress` has ended it.
+    /// As [`super::of_chart`]; the field has no taxels of the letter; or `progress` has ended it.
     pub fn draw_chart(
         &self,
         body: &Body,
@@ -199,6 +205,11 @@ impl Moments {
         ids: bool,
         progress: impl FnMut(f64) -> bool,
     ) -> Result<Vec<Picture>> {
+        let field = &fields[index];
+        if !field.members.iter().any(|member| self.letter.reads(body.taxels[member.taxel].modality)) {
+            let what = format!("no taxel of field `{}` measures what letter `{}` shows", field.name, self.letter);
+            return Err(Error::usage(format!("{what}; choose another field or letter")).at(&body.name));
+        }
         let picture = ChartPicture::new(body, fields, index, options, ids)?;
         self.drawn(|moment| picture.draw(moment), progress)
     }
@@ -228,19 +239,66 @@ impl Moments {
     }
 }
 
+/// The letter that a word names; pressure itself is called so, too.
+///
+/// # Errors
+/// It names none, or changes, which are not drawn.
+pub fn shown_letter(word: &str) -> Result<Receptor> {
+    match word {
+        "pressure" => Ok(Receptor::Sustained),
+        word => match word.parse()? {
+            Receptor::Change => {
+                Err(Error::usage("changes are not drawn; give pressure, shear, temperature or proximity"))
+            }
+            receptor => Ok(receptor),
+        },
+    }
+}
+
+/// The letter that is shown of `body` unless another is asked for: pressure, or else what its taxels in `fields` measure.
+#[must_use]
+pub fn usual_letter(body: &Body, fields: &[Field]) -> Receptor {
+    let all = [Receptor::Sustained, Receptor::Temperature, Receptor::Proximity];
+    all.into_iter().find(|letter| has_taxels(body, fields, *letter)).unwrap_or_default()
+}
+
+/// Whether a taxel of `body` in `fields` measures what `letter` is made of.
+fn has_taxels(body: &Body, fields: &[Field], letter: Receptor) -> bool {
+    fields.iter().flat_map(|field| &field.members).any(|member| letter.reads(body.taxels[member.taxel].modality))
+}
+
 /// The letters that an engine must read for pictures of `letter`: that one, pressures for touches, and shear for arrows, where the
 /// `fields` of `body` have such taxels.
 #[must_use]
 pub fn letters_of(body: &Body, fields: &[Field], letter: Receptor) -> Vec<Letter> {
-    let has = |receptor: Receptor| {
-        fields.iter().flat_map(|field| &field.members).any(|member| receptor.reads(body.taxels[member.taxel].modality))
-    };
     let read = [Receptor::Sustained, Receptor::Shear, Receptor::Temperature, Receptor::Proximity];
     let is_read = |receptor: &Receptor| match receptor {
-        Receptor::Sustained | Receptor::Shear => has(*receptor) || *receptor == letter,
+        Receptor::Sustained | Receptor::Shear => has_taxels(body, fields, *receptor) || *receptor == letter,
         other => *other == letter,
     };
     read.into_iter().filter(is_read).map(|receptor| Letter { receptor, ..Letter::default() }).collect()
+}
+
+/// The sizes of the forces that `letter` is made of: `list` has pressures by id, `sensed` all else.
+fn forces_of<'a>(
+    letter: Receptor,
+    list: &'a [(u32, f64)],
+    sensed: &'a [SensedValue],
+) -> impl Iterator<Item = f64> + 'a {
+    let is_shear = letter == Receptor::Shear;
+    let pressures = list.iter().filter(move |_| !is_shear).map(|&(_, pressure)| pressure);
+    let pulls = sensed.iter().filter(move |value| is_shear && value.receptor == letter);
+    pressures.chain(pulls.map(|value| libm::hypot(value.shear[0], value.shear[1])))
+}
+
+/// How warm the warmest of `sensed` is, or how near the nearest, in a number that grows with it.
+fn extreme(letter: Receptor, sensed: &[SensedValue]) -> f64 {
+    let own = sensed.iter().filter(|value| value.receptor == letter).filter_map(|value| match value.reading {
+        Reading::Value(number, _) if letter == Receptor::Temperature => Some(number),
+        Reading::Value(number, true) => Some(-number),
+        _ => None,
+    });
+    own.fold(f64::MIN, f64::max)
 }
 
 /// What is shown of taxels in a frame: `list` has pressures by id, `sensed` all else.

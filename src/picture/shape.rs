@@ -31,6 +31,16 @@ const MAX_SLICES: usize = 8;
 /// Taxels nearer than this are coincident, m.
 const COINCIDENT_M: f64 = 1e-6;
 
+/// How the disc of a taxel is drawn that shows what it reads.
+#[derive(Clone, Copy)]
+pub(super) struct Disc {
+    pub(super) colour: [u8; 3],
+    /// The colour of the wide rim of a taxel that is part of a touch.
+    pub(super) touched: Option<[u8; 3]>,
+    /// The share of its radius that is drawn.
+    pub(super) share: f64,
+}
+
 /// The discs of taxels.
 pub(super) struct Dots {
     /// In the body at rest, m.
@@ -107,26 +117,22 @@ impl Dots {
         pairs
     }
 
-    /// The discs in `colours`, relative to `middle`, unlit: a colour is what the legend says. Those that `touched` has a colour for have a
-    /// wide rim of it.
-    pub(super) fn flat_slices(
-        &self,
-        colours: &[[u8; 3]],
-        touched: &[Option<[u8; 3]>],
-        middle: DVec3,
-        rims: bool,
-    ) -> Vec<Slice> {
-        let mut slices = Vec::with_capacity(2 * colours.len());
-        for (taxel, (&colour, touched)) in colours.iter().zip(touched).enumerate() {
+    /// The `discs` relative to `middle`, unlit: a colour is what the legend says.
+    pub(super) fn flat_slices(&self, discs: &[Disc], middle: DVec3, rims: bool) -> Vec<Slice> {
+        let mut slices = Vec::with_capacity(2 * discs.len());
+        for (taxel, &Disc { colour, touched, share }) in discs.iter().enumerate() {
+            // A lift is in radii of the slice: the disc stays in front.
             match touched {
-                // A lift is in radii of the slice: the disc stays in front.
                 Some(rim) => {
-                    slices.push(self.slice(taxel, middle, (TOUCHED_RIM, LIFT / TOUCHED_RIM), *rim, (0.0, TAU)));
+                    let wide = TOUCHED_RIM * share;
+                    slices.push(self.slice(taxel, middle, (wide, LIFT / wide), rim, (0.0, TAU)));
                 }
-                None if rims => slices.push(self.slice(taxel, middle, (RIM, LIFT), colour::RIM, (0.0, TAU))),
+                None if rims => {
+                    slices.push(self.slice(taxel, middle, (RIM * share, LIFT / share), colour::RIM, (0.0, TAU)));
+                }
                 None => {}
             }
-            let slice = self.slice(taxel, middle, (1.0, LIFT + 0.1), colour, (0.0, TAU));
+            let slice = self.slice(taxel, middle, (share, (LIFT + 0.1) / share), colour, (0.0, TAU));
             slices.push(Slice { colour: [slice.colour[0], slice.colour[1], slice.colour[2], 0.0], ..slice });
         }
         slices

@@ -7,9 +7,10 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::colour::{PALETTE, PAPER, RIM, linear};
 use super::edges::{Lines, seen};
 use super::labels::{INK, Labels, Legend, PlacedId, half_of_id, short, write_ids};
-use super::{Options, Picture, Prepared, stem};
+use super::shape::Disc;
+use super::{Options, Picture, Prepared, arrows, stem};
 use crate::backend::gpu::raster;
-use crate::body::Body;
+use crate::body::{Body, Modality};
 use crate::colours::{COLOURS, distance_colours, pressure_colours, temperature_colours};
 use crate::error::Result;
 use crate::field::Field;
@@ -32,9 +33,8 @@ const TRAIL_WIDTH: u32 = 3;
 const OLDEST_OPACITY: f64 = 0.15;
 /// Radius of a mark, in radii of a usual taxel.
 const MARK_RADII: f64 = 0.9;
-/// An arrow of the highest force of the scale is so many taxels' widths long; shorter ones than this, pixels, are left out.
-const WIDTHS_AT_MOST: f64 = 3.0;
-const SHORTEST_ARROW: f64 = 3.0;
+/// Taxels that measure something else than what is shown are dots of this share of their radius.
+const OTHER_SHARE: f64 = 0.45;
 /// Marks are drawn in views that the touch faces by at least this cosine.
 const MIN_FACING: f64 = 0.15;
 
@@ -107,22 +107,18 @@ impl<'a> TouchPicture<'a> {
     /// As [`super::of_body`].
     pub fn draw(&self, moment: &Moment<'_>) -> Result<Picture> {
         let Prepared { size, middle, arrangement, dots, views, .. } = &self.prepared;
-        let taxels = moment.colours();
         let usual = self.prepared.usual_radius();
         let mut drawing = self.prepared.drawing(linear(PAPER));
-        let mut touched = vec![None; taxels.len()];
-        for marked in moment.touches {
-            marked.taxels.iter().for_each(|&taxel| touched[taxel] = Some(own_colour(&marked.touch)));
-        }
-        drawing.slices = dots.flat_slices(&taxels, &touched, *middle, usual > 2.0);
+        let discs = moment.discs(self.body.taxels.iter().map(|taxel| taxel.modality), !self.labelled.is_empty());
+        drawing.slices = dots.flat_slices(&discs, *middle, usual > 2.0);
         let mut pixels = raster::draw(&drawing)?;
-        let of_taxel = |taxel: usize| [taxels[taxel], touched[taxel].unwrap_or(RIM)];
+        let of_taxel = |taxel: usize| [discs[taxel].colour, discs[taxel].touched.unwrap_or(RIM)];
         self.prepared.outlines.draw(of_taxel, *size, &mut pixels)?;
         if let Some(lines) = &self.edges {
             lines.draw(*size, &mut pixels)?;
         }
 
-        let mut labels = Labels::new(&title(self.body), size[0]);
+        let mut labels = Labels::new(&moment.titled(&title(self.body)), size[0]);
         labels.key(vec![(None, moment.t_s.map_or(String::new(), |t_s| format!("{t_s:.2} s")))], *size);
         for (view, placed) in views.iter().zip(&arrangement.views) {
             let [left, top, width, _] = placed.part;
@@ -130,15 +126,16 @@ impl<'a> TouchPicture<'a> {
         }
         labels.bar(arrangement.scale);
         moment.legend().into_iter().for_each(|legend| labels.colours(legend));
+        moment.arrow_key(usual).into_iter().for_each(|key| labels.arrow(key));
         labels.draw(&mut pixels, *size)?;
-        self.write_ids(&taxels, &mut pixels)?;
+        self.write_ids(&discs, &mut pixels)?;
         self.draw_shear(moment, &mut pixels)?;
         self.mark(moment, &mut pixels)?;
         Ok(Picture { size: *size, pixels })
     }
 
     /// Writes the ids of the taxels that a view sees, as far as they fit into its part of the picture.
-    fn write_ids(&self, colours: &[[u8; 3]], pixels: &mut [u8]) -> Result<()> {
+    fn write_ids(&self, discs: &[Disc], pixels: &mut [u8]) -> Result<()> {
         let Prepared { size, middle, arrangement, dots, .. } = &self.prepared;
         let ids: Vec<String> = self.body.taxels.iter().map(|taxel| taxel.id.to_string()).collect();
         let mut placed = Vec::new();
@@ -146,7 +143,7 @@ impl<'a> TouchPicture<'a> {
             for taxel in (0..ids.len()).filter(|&taxel| labelled[taxel]) {
                 let at = arrangement.pixel(index, dots.places[taxel] - *middle);
                 if arrangement.views[index].holds_all(at, half_of_id(&ids[taxel])) {
-                    placed.push(PlacedId { id: &ids[taxel], at, on: colours[taxel] });
+                    placed.push(PlacedId { id: &ids[taxel], at, on: discs[taxel].colour });
                 }
             }
         }
@@ -156,8 +153,8 @@ impl<'a> TouchPicture<'a> {
     /// Draws an arrow for each tangential force, on the taxels that look towards the eye.
     fn draw_shear(&self, moment: &Moment<'_>, pixels: &mut [u8]) -> Result<()> {
         let Some(most) = moment.shear_ends() else { return Ok(()) };
-        let Prepared { size: [width, height], middle, arrangement, dots, views, .. } = &self.prepared;
-        let area = BitMapBackend::with_buffer(pixels, (*width, *height)).into_drawing_area();
+        let Prepared { size, middle, arrangement, dots, views, .. } = &self.prepared;
+        let mut seen = Vec::new();
         for (index, view) in views.iter().enumerate() {
             let towards = view.axes()[2];
             let pixel = |place: DVec3| arrangement.pixel(index, place - *middle);
@@ -165,19 +162,14 @@ impl<'a> TouchPicture<'a> {
                 let link = self.body.taxels[taxel].link;
                 let along = self.body.links[link].body_from_link.transform_vector3(force);
                 let from = dots.places[taxel];
-                let ends = [from, from + along * (2.0 * WIDTHS_AT_MOST * dots.radii[taxel] / most)].map(pixel);
+                let ends = [from, from + along * arrows::length(1.0, dots.mean_radius(), most)].map(pixel);
                 let facing = dots.normals[taxel].dot(towards);
-                if facing < MIN_FACING || !arrangement.views[index].holds(ends[0].map(|x| x.round() as i32).into()) {
-                    continue;
-                }
-                for line in arrow(ends) {
-                    for (colour, width) in [(BLACK, 4), (WHITE, 2)] {
-                        area.draw(&PathElement::new(line.clone(), colour.stroke_width(width))).map_err(cannot)?;
-                    }
+                if facing >= MIN_FACING && arrangement.views[index].holds(ends[0].map(|x| x.round() as i32).into()) {
+                    seen.push(ends);
                 }
             }
         }
-        area.present().map_err(cannot)
+        arrows::draw(pixels, *size, seen.into_iter())
     }
 
     /// Draws the marks of the touches.
@@ -240,51 +232,56 @@ impl Moment<'_> {
         }
     }
 
-    /// By the body's taxels, the colours of what they read.
-    pub(super) fn colours(&self) -> Vec<[u8; 3]> {
+    /// By the body's taxels, which measure `modalities`, what is drawn of each. One that measures something else than the letter is a
+    /// small grey dot, unless its id `is_labelled`.
+    pub(super) fn discs(&self, modalities: impl Iterator<Item = Modality>, is_labelled: bool) -> Vec<Disc> {
         let colours = self.map();
         let [least, most] = self.ends.unwrap_or([0.0, 1.0]);
         let is_temperature = self.letter == Receptor::Temperature;
-        let colour = |value: &Option<f64>| match *value {
+        let colour = |value: Option<f64>| match value {
             // White is in the middle of temperatures.
             None if is_temperature => IDLE,
             None => UNUSED,
             Some(value) if (value <= 0.0 && !is_temperature) || value.is_infinite() => IDLE,
             Some(value) => colours[((value - least) / (most - least) * 255.0).round().clamp(0.0, 255.0) as usize],
         };
-        self.values.iter().map(colour).collect()
+        let disc = |(value, modality): (&Option<f64>, Modality)| {
+            if self.letter.reads(modality) {
+                return Disc { colour: colour(*value), touched: None, share: 1.0 };
+            }
+            Disc { colour: IDLE, touched: None, share: if is_labelled { 1.0 } else { OTHER_SHARE } }
+        };
+        let mut discs: Vec<Disc> = self.values.iter().zip(modalities).map(disc).collect();
+        for marked in self.touches {
+            marked.taxels.iter().for_each(|&taxel| discs[taxel].touched = Some(own_colour(&marked.touch)));
+        }
+        discs
+    }
+
+    /// A picture's title: `name`, and what is shown of it if that is not pressure.
+    pub(super) fn titled(&self, name: &str) -> String {
+        if self.letter.is_of_pressure() { name.to_owned() } else { format!("{name} · {}", self.letter) }
     }
 
     /// The legend of the colours, if there is one.
     pub(super) fn legend(&self) -> Option<Legend> {
-        let note = match (self.letter, self.shear_ends()) {
-            (_, Some(most)) => {
-                format!("arrow as long as a taxel is wide: {} {}", short(most / WIDTHS_AT_MOST), self.unit)
-            }
-            (Receptor::Proximity, _) => "grey: nothing near".to_owned(),
-            _ => String::new(),
-        };
+        let is_distance = self.letter == Receptor::Proximity;
+        let note = if is_distance { "grey: nothing in range".to_owned() } else { String::new() };
         Some(Legend { colours: self.map(), ends: self.ends?, unit: self.unit.to_owned(), note })
     }
 
+    /// If there are arrows of forces, one that stands for a round force: its length, pixels, on taxels of `radius` pixels, and the force.
+    pub(super) fn arrow_key(&self, radius: f64) -> Option<(f64, String)> {
+        let most = self.shear_ends()?;
+        let force = arrows::round_force(most);
+        Some((arrows::length(force, radius, most), format!("{} {}", short(force), self.unit)))
+    }
+
     /// The force that the longest arrow stands for, if there are arrows.
-    fn shear_ends(&self) -> Option<f64> {
+    pub(super) fn shear_ends(&self) -> Option<f64> {
         let is_force = matches!(self.letter, Receptor::Sustained | Receptor::Shear);
         self.ends.map(|[_, most]| most).filter(|_| is_force && !self.shear.is_empty())
     }
-}
-
-/// The lines of an arrow, pixels; none where it is too short to have a direction.
-fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<Vec<(i32, i32)>> {
-    let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
-    let size = libm::hypot(dx, dy);
-    if size < SHORTEST_ARROW {
-        return Vec::new();
-    }
-    let head = (0.4 * size).min(9.0) / size;
-    let wing = |side: f64| [to[0] - head * (dx + side * dy), to[1] - head * (dy - side * dx)];
-    let point = |[x, y]: [f64; 2]| (x.round() as i32, y.round() as i32);
-    vec![vec![point(from), point(to)], [wing(0.6), to, wing(-0.6)].map(point).to_vec()]
 }
 
 /// A touch keeps its colour as long as it lasts.

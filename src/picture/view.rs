@@ -8,6 +8,8 @@ use crate::backend::gpu::raster::Eye;
 const MARGIN: f64 = 14.0;
 /// A view is left out if it shows less than this share of the best one.
 const MIN_VISIBLE_SHARE: f64 = 0.02;
+/// A second view of a touch shows at least this share of what the first one does.
+const SECOND_SHARE: f64 = 0.3;
 
 words! {"view",
     /// A view of a body, which stands upright, +y up, and faces +z; its left is +x.
@@ -49,12 +51,7 @@ impl View {
     /// Without taxels front, back, left and right.
     #[must_use]
     pub fn best(normals: &[DVec3]) -> Vec<Self> {
-        let seen = |view: Self| -> f64 {
-            let towards = view.axes()[2];
-            normals.iter().map(|normal| normal.dot(towards).max(0.0)).sum()
-        };
-        let mut sides: Vec<(f64, Self)> = Self::ALL[..6].iter().map(|&view| (seen(view), view)).collect();
-        sides.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let sides = Self::by_seen(normals);
         let most = sides[0].0;
         if most == 0.0 {
             return Self::ALL[..4].to_vec();
@@ -63,6 +60,32 @@ impl View {
             sides[..4].iter().filter(|(seen, _)| *seen > MIN_VISIBLE_SHARE * most).map(|&(_, view)| view).collect();
         let room = best.len() < 4;
         Self::ALL.iter().copied().filter(|view| best.contains(view) || (room && *view == Self::ThreeQuarter)).collect()
+    }
+
+    /// The side that shows most of the taxels with these normals, and a second one, also three-quarter, if that shows a good part of
+    /// them. Without taxels front and back.
+    #[must_use]
+    pub(super) fn two_best(normals: &[DVec3]) -> Vec<Self> {
+        let sides = Self::by_seen(normals);
+        if sides[0].0 == 0.0 {
+            return Self::ALL[..2].to_vec();
+        }
+        let is_second = |&(seen, _): &(f64, Self)| seen >= SECOND_SHARE * sides[0].0;
+        let aslant = (Self::ThreeQuarter.seen(normals), Self::ThreeQuarter);
+        let second = [sides[1], aslant].into_iter().find(is_second);
+        std::iter::once(sides[0].1).chain(second.map(|(_, view)| view)).collect()
+    }
+
+    /// The six sides with how much each shows of the taxels with these normals, the most first.
+    fn by_seen(normals: &[DVec3]) -> Vec<(f64, Self)> {
+        let mut sides: Vec<(f64, Self)> = Self::ALL[..6].iter().map(|&view| (view.seen(normals), view)).collect();
+        sides.sort_by(|a, b| b.0.total_cmp(&a.0));
+        sides
+    }
+
+    fn seen(self, normals: &[DVec3]) -> f64 {
+        let towards = self.axes()[2];
+        normals.iter().map(|normal| normal.dot(towards).max(0.0)).sum()
     }
 }
 
@@ -217,6 +240,11 @@ mod tests {
         assert_eq!(View::best(&[]), View::ALL[..4]);
         let round: Vec<DVec3> = [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].into();
         assert_eq!(View::best(&round), View::ALL[..4]);
+        // Of a touch, the two that show most of it, or one.
+        assert_eq!(View::two_best(&[DVec3::NEG_Y, DVec3::NEG_Y, DVec3::X]), [View::Bottom, View::Left]);
+        assert_eq!(View::two_best(&[DVec3::NEG_Y; 9]), [View::Bottom]);
+        assert_eq!(View::two_best(&[DVec3::Y; 9]), [View::Top, View::ThreeQuarter]);
+        assert_eq!(View::two_best(&[]), [View::Front, View::Back]);
     }
 
     #[test]

@@ -30,6 +30,21 @@ pub fn outputs_for(wanted: Outputs) -> Outputs {
     panels | Outputs::TOTAL | Outputs::CENTROID
 }
 
+/// The quantities that are plotted of `body`: those that are `wanted`; else none, which stands for load and area, or if no taxel is
+/// pressed what they measure.
+#[must_use]
+pub fn wanted_of(body: &Body, wanted: Outputs) -> Outputs {
+    let has = |receptor: Receptor| body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
+    if !wanted.is_empty() || has(Receptor::Sustained) {
+        return wanted;
+    }
+    let usual = [
+        (Receptor::Temperature, Outputs::TEMPERATURE | Outputs::WARMEST | Outputs::COLDEST),
+        (Receptor::Proximity, Outputs::NEAREST | Outputs::APPROACH_SPEED),
+    ];
+    usual.into_iter().filter(|(receptor, _)| has(*receptor)).fold(Outputs::empty(), |all, (_, own)| all | own)
+}
+
 /// What is plotted of one recording.
 #[derive(Clone, Debug)]
 pub struct Gathered {
@@ -261,8 +276,20 @@ impl Gatherer {
         }
     }
 
-    /// The fields whose lines are drawn: those that were asked for; else the topmost, and below a single one its children.
+    /// The fields whose lines are drawn: those that were asked for; else the topmost, and below a single one its children; and of a
+    /// quantity that none of these has, such as one in a chart, the first field that has it.
     fn lines(&self) -> Vec<usize> {
+        let mut lines = self.upper_lines();
+        for column in 0..self.columns.len() {
+            let has = |&field: &usize| self.fields[field].series[column].iter().any(|series| series.range().is_some());
+            if lines.len() < MAX_LINES && !lines.iter().any(has) {
+                lines.extend((0..self.fields.len()).find(has));
+            }
+        }
+        lines
+    }
+
+    fn upper_lines(&self) -> Vec<usize> {
         let all = 0..self.fields.len();
         if self.are_named {
             return self.heaviest(all.collect(), MAX_LINES);

@@ -15,4 +15,4 @@ mod series;
 mod ticks;
 
 pub use draw::{png, svg};
-pub use gather::{Gathered, Gatherer, outputs_for};
+pub use gather::{Gathered, Gatherer, outputs_for, wanted_of};

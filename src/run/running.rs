@@ -245,6 +245,7 @@ impl Run {
         let input = InputFrames {
             frames,
             pressures: &|frame, to| engine.pressures(frame, to),
+            sensed: &|frame, taxels, to| engine.sensed_alone(frame, taxels, to),
             plan: engine.plan(),
             values_read: engine.values_read(),
             values_sensed: engine.values_sensed(),

@@ -150,6 +150,7 @@ impl SceneFile {
     /// # Errors
     /// A usage error: a grid, a pitch or a unit is none, or a key of text is not written so.
     pub fn export_options(&self) -> Result<VendorOptions> {
+        let map = self.map.as_deref().or_else(|| self.sources.iter().find_map(SourceSpec::usual_map));
         Ok(VendorOptions {
             format: self.format,
             rate_hz: self.rate_hz,
@@ -159,7 +160,7 @@ impl SceneFile {
             layout: self.layout.clone(),
             skip_bad: self.skip_bad,
             text: self.text.options()?,
-            map: self.map.as_deref().map(ArrayMap::named).transpose().map_err(|e| e.at("`map`"))?,
+            map: map.map(ArrayMap::named).transpose().map_err(|e| e.at("`map`"))?,
         })
     }
 }

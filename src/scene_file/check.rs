@@ -20,13 +20,14 @@ impl SceneFile {
             ));
         }
         let has_messages = |source: &SourceSpec| {
-            use SourceSpec::{Mcap, Modbus, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
-            matches!(source, Mcap(_) | Modbus(_) | Ndjson(_) | Ros2 { .. } | Ros2Mcap(_) | Stdin | Text(_))
+            use SourceSpec::{Mcap, Modbus, Ndjson, Paxini, Ros2, Ros2Mcap, Stdin, Text};
+            let is_live = matches!(source, Modbus(_) | Paxini { .. } | Ros2 { .. } | Stdin | Text(_));
+            is_live || matches!(source, Mcap(_) | Ndjson(_) | Ros2Mcap(_))
         };
         let fits_none = self.sources.is_empty() || !self.sources.iter().all(has_messages);
         if self.map.is_some() && fits_none {
             return Err(Error::usage(
-                "`map` is for ROS 2 bags and topics, NDJSON, lines of JSON, or Modbus; add `source = \"ros2-mcap:BAG\"`, or leave it out",
+                "`map` is for ROS 2 bags and topics, NDJSON, lines of JSON, Modbus, or PaXini; add `source = \"ros2-mcap:BAG\"`, or leave it out",
             ));
         }
         let has_no_bad = |source: &SourceSpec| {

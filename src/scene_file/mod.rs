@@ -63,8 +63,8 @@ pub struct SceneFile {
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
-    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with `map`. Standard input: - for NDJSON, csv:- for CSV. Several
-    /// recordings go into one table with a column `recording`, each from its own beginning.
+    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with `map`. Sensors of PaXini: paxini:PORT. Standard input: -
+    /// for NDJSON, csv:- for CSV. Several recordings go into one table with a column `recording`, each from its own beginning.
     #[serde(rename = "source", deserialize_with = "words")]
     #[cfg_attr(feature = "cli", schemars(with = "OneOrMany"))]
     pub sources: Vec<SourceSpec>,
@@ -249,9 +249,10 @@ pub struct SceneFile {
     )]
     pub text: TextKeys,
 
-    /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, tactile-state, xela or xela-ros2.
+    /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, paxini, tactile-state,
+    /// xela or xela-ros2.
     ///
-    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. All of them but tactile-state and mujoco are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, Modbus and PaXini. All of them but tactile-state and mujoco are untested.
     pub map: Option<String>,
 
     /// Zenoh's own configuration, JSON5, for zenoh: sources and sinks [default: this computer alone, on port 7447].

@@ -15,7 +15,7 @@ pub fn attachments(setup: &Setup, body: &Body, scene: Option<&Path>) -> Result<V
     let recording = setup.recording();
     let inherited = match recording {
         Some(recording) => attached::body(recording)?,
-        None => setup.export_body()?,
+        None => made_body(setup)?,
     };
     let (name, bytes) = match inherited {
         Some(body) => body,
@@ -29,4 +29,16 @@ pub fn attachments(setup: &Setup, body: &Body, scene: Option<&Path>) -> Result<V
         files.push((SCENE.to_owned(), toml, text(scene)?));
     }
     Ok(files)
+}
+
+/// The body that was made for what is read, where none is named.
+fn made_body(setup: &Setup) -> Result<Option<(String, Vec<u8>)>> {
+    if let Some(body) = setup.export_body()? {
+        return Ok(Some(body));
+    }
+    let made = match setup.text_body()? {
+        Some(body) => Some(body),
+        None => setup.mapped_body()?,
+    };
+    Ok(made.map(|(name, bytes)| (file_name(&name), bytes)))
 }

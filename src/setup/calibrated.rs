@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::overlaid::{How, overlaid};
 use super::{Setup, attached};
 use crate::body::{Body, Modality};
+use crate::bundled::MEETING_CALIBRATION;
 use crate::error::{Error, Result};
 use crate::limits::{self, MAX_TOML_BYTES};
 use crate::signal::Calibration;
@@ -29,9 +30,16 @@ impl Setup {
     /// The text of the calibration that is used, and what it comes with: the named one, laid over the own one of an export or
     /// a recording. A simulation's own is replaced.
     pub(crate) fn calibration_text(&self) -> Result<Option<(PathBuf, String)>> {
-        let Some(path) = &self.calibration else { return self.own_calibration() };
+        let Some(path) = &self.calibration else { return self.calibration_found() };
         let given = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
         Ok(Some((path.clone(), self.over_own(path, given)?)))
+    }
+
+    /// The calibration where none is named: the one that comes with what is read, or with the bundled touch.
+    fn calibration_found(&self) -> Result<Option<(PathBuf, String)>> {
+        let is_meeting = self.sources.is_empty() && self.body.as_deref() == Some("sensing-hand");
+        let bundled = || (PathBuf::from("sensing-hand.toml"), MEETING_CALIBRATION.to_owned());
+        Ok(self.own_calibration()?.or_else(|| is_meeting.then(bundled)))
     }
 
     /// The calibration `given`, at `path`, laid over the one that comes with what is read.
@@ -60,7 +68,7 @@ impl Setup {
         };
         let calibration = match &self.calibration {
             Some(path) => Some(load(path)?),
-            None => self.own_calibration()?.map(parse).transpose()?,
+            None => self.calibration_found()?.map(parse).transpose()?,
         };
         if let (Some(calibration), [source @ SourceSpec::Sim(_)]) = (&calibration, &self.sources[..]) {
             calibration.check_body(&body.name).map_err(|_| {

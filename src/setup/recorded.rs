@@ -24,7 +24,7 @@ impl Setup {
     pub(crate) fn text_body(&self) -> Result<Option<(String, Vec<u8>)>> {
         let made = self.text(|text| (text.body.clone(), text.about_body.clone()))?;
         let Some((body, about)) = made.filter(|_| self.body.is_none()) else { return Ok(None) };
-        self.tell.say(&about);
+        self.tell.once(&about);
         Ok(Some(("text".to_owned(), body?)))
     }
 

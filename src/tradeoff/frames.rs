@@ -1,5 +1,7 @@
 //! Frames to measure on.
 
+use std::time::Duration;
+
 use crate::signal::Frame;
 use crate::source::Truth;
 
@@ -14,4 +16,34 @@ pub struct TestFrames {
     pub frames: Vec<Frame>,
     /// Per frame; empty if unknown.
     pub truth: Vec<Vec<Truth>>,
+}
+
+/// Time of a turn of what is measured beside others, about.
+pub(super) const TURN_TIME: Duration = Duration::from_micros(1500);
+
+/// Calls of some frames each, which are repeated with continuing times.
+pub(super) struct Calls {
+    pub(super) calls: Vec<Vec<Frame>>,
+    times_s: Vec<Vec<f64>>,
+    period_s: f64,
+}
+
+impl Calls {
+    pub(super) fn new(frames: &[Frame], at_once: usize) -> Self {
+        let calls: Vec<Vec<Frame>> = frames.chunks(at_once).map(<[Frame]>::to_vec).collect();
+        let times_s = calls.iter().map(|call| call.iter().map(|frame| frame.t_s).collect()).collect();
+        let times = || frames.iter().map(|frame| frame.t_s);
+        let (first, last) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+        let step = if frames.len() > 1 { (last - first) / (frames.len() - 1) as f64 } else { 0.0 };
+        Self { calls, times_s, period_s: last - first + if step > 0.0 { step } else { 0.01 } }
+    }
+
+    /// Call `index` in pass `passes`.
+    pub(super) fn at(&mut self, index: usize, passes: u32) -> &[Frame] {
+        let later = self.period_s * f64::from(passes);
+        for (frame, t_s) in self.calls[index].iter_mut().zip(&self.times_s[index]) {
+            frame.t_s = t_s + later;
+        }
+        &self.calls[index]
+    }
 }

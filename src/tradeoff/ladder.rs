@@ -2,6 +2,7 @@
 
 use crate::percept::{Outputs, TouchOutputs};
 use crate::scene::Plan;
+use crate::signal::Letter;
 
 /// Stages that are timed together, and the outputs of a plan that ends with them.
 #[derive(Clone, Debug)]
@@ -10,23 +11,39 @@ pub struct Rung {
     pub outputs: Outputs,
     /// What is given of touches, where these are among them.
     pub touches: Option<TouchOutputs>,
+    /// The letters of all up to here: those of pressures, and others from their own stages on.
+    pub letters: Vec<Letter>,
     /// Which of [`Plan::explain`] they are; what is timed is shown at the last.
     pub stages: std::ops::Range<usize>,
 }
 
 /// The plans that `plan` is made of, each with one stage more that is asked for. What only serves others comes with the
-/// first of those that it serves; calibration comes with contact.
+/// first of those that it serves; calibration comes with contact. Where no letter is of pressures, all else comes with the first letter.
 #[must_use]
 pub fn ladder(plan: &Plan) -> Vec<Rung> {
     let mut rungs: Vec<Rung> = Vec::new();
+    let of_letters = TouchOutputs::SHEAR | TouchOutputs::TEMPERATURE;
     let (mut outputs, mut touches) = (Outputs::empty(), None);
+    let (mut letters, others): (Vec<Letter>, Vec<Letter>) =
+        plan.letters().iter().partition(|letter| letter.receptor.is_of_pressure());
     let explained = plan.explain();
     for (index, stage) in explained.iter().enumerate() {
         let asked = plan.outputs() & stage.gives;
         let is_contact = stage.name == "contact";
+        let own = others.iter().find(|letter| letter.receptor.to_string() == stage.name);
+        if letters.is_empty() {
+            if own.is_none() {
+                continue;
+            }
+            outputs = plan.outputs() - Outputs::OF_OTHER_LETTERS;
+        }
+        letters.extend(own);
+        let asked_of = |of_stage: TouchOutputs| plan.touch_outputs().map(|outputs| outputs & of_stage);
         let of_touches = match stage.name {
-            "touches" => plan.touch_outputs().map(|outputs| outputs - TouchOutputs::FIT),
-            "fit" => plan.touch_outputs(),
+            "touches" => asked_of(TouchOutputs::all() - TouchOutputs::FIT - of_letters),
+            "fit" => asked_of(TouchOutputs::all() - of_letters),
+            "shear" => touches.zip(asked_of(TouchOutputs::SHEAR)).map(|(before, own)| before | own),
+            "temperature" => touches.zip(asked_of(TouchOutputs::TEMPERATURE)).map(|(before, own)| before | own),
             _ => None,
         };
         if !(stage.runs && (is_contact || of_touches.is_some() || !asked.is_empty())) {
@@ -35,7 +52,7 @@ pub fn ladder(plan: &Plan) -> Vec<Rung> {
         touches = of_touches.or(touches);
         outputs |= if is_contact && asked.is_empty() { Outputs::TOTAL } else { asked };
         let first = rungs.last().map_or(0, |rung| rung.stages.end);
-        rungs.push(Rung { outputs, touches, stages: first..index + 1 });
+        rungs.push(Rung { outputs, touches, letters: letters.clone(), stages: first..index + 1 });
     }
     rungs
 }
@@ -46,6 +63,7 @@ mod tests {
     use crate::backend::BackendKind;
     use crate::engine::{Engine, Options};
     use crate::scene::Scene;
+    use crate::signal::Receptor;
     use crate::{bundled, touch};
     use somatic_engine::shape::Shape;
 
@@ -69,6 +87,32 @@ mod tests {
             let what = |rung: &Rung| (rung.outputs, rung.touches);
             assert!(rungs.windows(2).all(|pair| what(&pair[0]) != what(&pair[1])));
         }
+    }
+
+    #[test]
+    fn each_letter_that_the_host_makes_is_a_rung_with_what_touches_have_of_it() {
+        let body = crate::Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
+        let plan = |letters: &[Receptor]| {
+            let scene = Scene::default().letters(Letter::all_of(letters, &[]));
+            let scene = if letters.is_empty() { scene.touches(touch::Options::default()) } else { scene };
+            Engine::new(&body, Options::default().scene(scene).backend(BackendKind::Reference)).unwrap().plan().clone()
+        };
+        let whole = plan(&[]);
+        let rungs = ladder(&whole);
+        let named = |rung: &Rung| whole.explain()[rung.stages.end - 1].name;
+        let last: Vec<&str> = rungs[rungs.len() - 4..].iter().map(named).collect();
+        assert_eq!(last, ["touches", "shear", "temperature", "proximity"]);
+        let letters: Vec<usize> = rungs.iter().map(|rung| rung.letters.len()).collect();
+        assert_eq!(letters[letters.len() - 4..], [1, 2, 3, 4]);
+        let touches = |back: usize| rungs[rungs.len() - back].touches.unwrap();
+        assert!(!touches(4).intersects(TouchOutputs::SHEAR | TouchOutputs::TEMPERATURE));
+        assert_eq!(touches(3), touches(4) | TouchOutputs::SHEAR);
+        assert_eq!(Some(touches(1)), whole.touch_outputs());
+        // Alone, the first letter has all that comes before it.
+        let alone = plan(&[Receptor::Temperature, Receptor::Proximity]);
+        let rungs = ladder(&alone);
+        assert_eq!(rungs.iter().map(|rung| rung.letters.len()).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!((rungs[0].stages.start, rungs[1].outputs), (0, alone.outputs()));
     }
 
     #[test]

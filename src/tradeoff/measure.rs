@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::errors::{ChartGeometry, ErrorSamples, Errors, rank};
 use super::fits;
+use super::frames::{Calls, TURN_TIME};
 use super::truth::{OfTouches, Truths};
 use super::{CallMode, Combination, Measurement, Report, SimulatedTouches, TestFrames};
 use crate::backend::BackendKind;
@@ -15,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::field::{FieldSet, Recharted};
 use crate::percept::{Flags, Outputs, Percepts};
 use crate::scene::{Charts, Knobs, OrientationBy, Scene};
-use crate::signal::{Frame, Letter, Receptor};
+use crate::signal::Receptor;
 
 /// Settings of a measurement.
 #[derive(Clone, Debug)]
@@ -30,8 +31,6 @@ pub struct MeasureOptions {
     pub backends: Vec<BackendKind>,
 }
 
-/// Time of a turn of one combination, about.
-const TURN_TIME: Duration = Duration::from_micros(1500);
 /// Minimum number of rounds; the first one warms up.
 const MIN_ROUNDS: usize = 4;
 
@@ -52,34 +51,7 @@ struct Trial {
     truth: Option<OfTouches>,
 }
 
-/// Calls of some frames each, which are repeated with continuing times.
-struct Calls {
-    calls: Vec<Vec<Frame>>,
-    times_s: Vec<Vec<f64>>,
-    period_s: f64,
-}
-
-impl Calls {
-    fn new(frames: &[Frame], at_once: usize) -> Self {
-        let calls: Vec<Vec<Frame>> = frames.chunks(at_once).map(<[Frame]>::to_vec).collect();
-        let times_s = calls.iter().map(|call| call.iter().map(|frame| frame.t_s).collect()).collect();
-        let times = || frames.iter().map(|frame| frame.t_s);
-        let (first, last) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
-        let step = if frames.len() > 1 { (last - first) / (frames.len() - 1) as f64 } else { 0.0 };
-        Self { calls, times_s, period_s: last - first + if step > 0.0 { step } else { 0.01 } }
-    }
-
-    /// Call `index` in pass `passes`.
-    fn at(&mut self, index: usize, passes: u32) -> &[Frame] {
-        let later = self.period_s * f64::from(passes);
-        for (frame, t_s) in self.calls[index].iter_mut().zip(&self.times_s[index]) {
-            frame.t_s = t_s + later;
-        }
-        &self.calls[index]
-    }
-}
-
-/// Measures all combinations of knobs for `options` on `body`; knobs that `options` sets stay fixed.
+/// Measures all combinations of knobs for `options` on `body`, whose letters are of pressures; knobs that `options` sets stay fixed.
 ///
 /// Times, and errors against the reference, are of `played`. Errors against the truth are of `played` too where it has one, else
 /// of `touches` where there are some.
@@ -97,7 +69,6 @@ pub fn measure(
     measure_options: &MeasureOptions,
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Report> {
-    let options = &of_pressure(options);
     // Once, as geodesic charts may take seconds.
     let charted = all_charts(body, options)?;
     let geometries = geometries(body, options, &charted)?;
@@ -203,22 +174,10 @@ fn take_turns(
     Ok(())
 }
 
-/// The same for the letters of pressure alone: the others are made alike whatever is traded.
-fn of_pressure(options: &Options) -> Options {
-    let scene = options.scene.clone();
-    let mut letters = scene.letters.clone();
-    letters.retain(|letter| letter.receptor.is_of_pressure());
-    if letters.is_empty() {
-        letters.push(Letter::default());
-    }
-    let outputs = scene.outputs - Outputs::OF_OTHER_LETTERS;
-    options.clone().scene(scene.letters(letters).outputs(outputs))
-}
-
 /// Whether contacts can be fitted to touches.
 fn can_fit(options: &Options) -> bool {
-    let letters = &options.scene.letters;
-    let has_touches = letters.is_empty() || letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
+    let asked = &options.scene.letters;
+    let has_touches = asked.is_empty() || asked.iter().any(|letter| letter.receptor == Receptor::Sustained);
     has_touches && options.calibration.as_ref().is_some_and(|calibration| calibration.layer.is_some())
 }
 
@@ -311,7 +270,7 @@ impl Trial {
         right: &ReferencePercepts,
     ) -> Result<()> {
         let by = self.combination.knobs.orientation_by;
-        let letters = self.engine.plan().letters().len();
+        let letter_count = self.engine.plan().letters().len();
         let mut frame = 0;
         for call in 0..calls.calls.len() {
             let percepts = self.engine.process(calls.at(call, 0))?;
@@ -322,9 +281,9 @@ impl Trial {
                     frame += 1;
                     continue;
                 }
-                for field in (0..percepts.fields()).step_by(letters) {
+                for field in (0..percepts.fields()).step_by(letter_count) {
                     let mut got = percepts.get(index, field);
-                    got.field = field / letters;
+                    got.field = field / letter_count;
                     self.errors.add(geometry, authored, &got, &right.percepts.get(frame, field), by);
                 }
                 frame += 1;
@@ -371,6 +330,7 @@ impl Trial {
 mod tests {
     use super::*;
     use crate::bundled;
+    use crate::signal::Frame;
     use crate::source::{CsvSource, Source as _};
 
     pub(crate) fn touch() -> TestFrames {

@@ -8,6 +8,7 @@ mod errors;
 mod fits;
 mod frames;
 mod ladder;
+mod letters;
 mod measure;
 mod plot;
 mod store;
@@ -24,6 +25,7 @@ use serde::{Deserialize, Serialize};
 pub use errors::{Errors, TrueErrors};
 pub use frames::TestFrames;
 pub use ladder::{Rung, ladder};
+pub use letters::LetterCost;
 pub use measure::{MeasureOptions, measure};
 pub use plot::{plot_png, plot_svg};
 pub use store::{Found, Store, Stored, day};
@@ -290,8 +292,11 @@ pub struct Report {
     pub kept_charts: Vec<String>,
     /// Combinations that were not measured, and why.
     pub left_out: Vec<String>,
-    /// One per combination and way.
+    /// One per combination and way; none if no letter is made of pressures, which all options are about.
     pub rows: Vec<Measurement>,
+    /// What letters cost that the host makes, by way and letter.
+    #[serde(default)]
+    pub letters: Vec<LetterCost>,
 }
 
 impl Report {

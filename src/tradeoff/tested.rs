@@ -1,6 +1,6 @@
 //! What is measured on, as people ask for it: which backends, which frames, which touches.
 
-use super::{CallMode, MeasureOptions, Report, SimulatedTouches, TestFrames, measure};
+use super::{CallMode, MeasureOptions, Report, SimulatedTouches, TestFrames, letters, measure};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::Options;
@@ -103,8 +103,14 @@ pub struct Tested {
 }
 
 impl Tested {
-    /// `played`, or else simulated touches; up to `most` of these.
+    /// `played`, or else simulated touches; up to `most` of these. Where no letter is made of pressures, there are no touches to
+    /// simulate.
     pub fn new(body: &Body, options: &Options, played: Option<TestFrames>, most: usize) -> Result<Self> {
+        if !letters::has_options(body, options)? {
+            let played = played.unwrap_or_else(|| letters::made_up(body));
+            let touches = Err(Error::failed("no letter is made of pressures"));
+            return Ok(Self { played, options: options.clone(), touches });
+        }
         let touches = SimulatedTouches::on(body, options, most);
         match (played, touches) {
             (Some(played), touches) => Ok(Self { played, options: options.clone(), touches }),
@@ -124,8 +130,16 @@ impl Tested {
         measure_options: &MeasureOptions,
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Report> {
+        let costs = letters::letter_costs(body, &self.options, &self.played, measure_options)?;
+        if !letters::has_options(body, &self.options)? {
+            progress(1.0);
+            let (source, frames) = (self.played.source.clone(), self.played.frames.len());
+            return Ok(Report { body: body.name.clone(), source, frames, letters: costs, ..Report::default() });
+        }
         let touches = self.touches.as_ref().ok();
-        let mut report = measure(body, &self.options, &self.played, touches, measure_options, progress)?;
+        let options = letters::of_pressure(&self.options);
+        let mut report = measure(body, &options, &self.played, touches, measure_options, progress)?;
+        report.letters = costs;
         report.left_out.extend(self.touches.as_ref().err().map(|e| format!("against the truth: {e}")));
         Ok(report)
     }

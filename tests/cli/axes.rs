@@ -1,11 +1,14 @@
 //! Taxels with three axes in every file: their three values come back to the bit, by the names `4`, `4.u` and `4.v`.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use super::{done, fails, output, stderr, text_of};
+use serde_json::Value;
+
+use super::{done, fails, frames, output, stderr, text_of};
 
 /// Odd numbers that text and single precision have to the bit; `None` is missing.
 fn value(frame: usize, at: usize) -> Option<f32> {
@@ -145,4 +148,66 @@ fn an_axis_that_a_body_does_not_have_is_named_as_people_write_it() {
     let run = output(&["run", "--body", "hand", "--source", text_of(&path)]);
     let why = stderr(&run);
     assert!(!run.status.success() && why.contains("0.u") && !why.contains("33554432"), "{why}");
+}
+
+#[test]
+fn clouds_of_a_bag_have_what_every_kind_of_taxel_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = format!("ros2-mcap:{}", folder.path().join("bag").display());
+    let asked = ["run", "--body", "sensing-hand", "--backend", "reference", "--all-fields", "--sink", "-"];
+    let lines = frames(&done(&[&asked[..], &["--sink", &bag]].concat()));
+    let again = frames(&done(&[&asked[..], &["--source", &bag]].concat()));
+    assert!(lines.len() > 100 && lines.len() == again.len(), "{} and {}", lines.len(), again.len());
+    let percepts = |frame: &Value| frame["fields"].as_array().unwrap().clone();
+    let mut seen = BTreeSet::new();
+    for (sent, read) in lines.iter().zip(&again) {
+        for (sent, read) in percepts(sent).iter().zip(&percepts(read)) {
+            assert_eq!(sent, read, "at {}", sent["t"]);
+            let known = ["shear_vector", "friction", "temperature", "nearest"].map(|key| sent.get(key).map(|_| key));
+            seen.extend(known.into_iter().flatten());
+        }
+    }
+    assert_eq!(seen.len(), 4, "{seen:?}");
+    // A taxel without one of its values says so there, too, and no other value is in its place.
+    let body = folder.path().join("pad.glb");
+    let touch = folder.path().join("touch.csv");
+    fs::write(&touch, "t,0,0.u,0.v,1,1.u,1.v\n0,5,1,2,4,,3\n0.1,5,1,2,4,2,3\n").unwrap();
+    let [messages, map] = messages(folder.path());
+    let from = ["convert", "--map", text_of(&map), text_of(&messages), text_of(&body)];
+    done(&from);
+    let bag = format!("ros2-mcap:{}", folder.path().join("gaps").display());
+    let asked = ["run", "--body", text_of(&body), "--backend", "reference", "--all-fields", "--sink", "-", "--outputs"];
+    let asked = [&asked[..], &["total,shear,shear_vector"]].concat();
+    let lines = frames(&done(&[&asked[..], &["--source", text_of(&touch), "--sink", &bag]].concat()));
+    let again = frames(&done(&[&asked[..], &["--source", &bag]].concat()));
+    let shear = |frame: &Value| {
+        let all = percepts(frame);
+        all.into_iter().find(|percept| percept["letter"] == "shear").unwrap()
+    };
+    for (sent, read) in lines.iter().zip(&again) {
+        assert_eq!(shear(sent), shear(read));
+    }
+    assert!(shear(&lines[0])["flags"].to_string().contains("incomplete"), "{}", shear(&lines[0]));
+    assert_ne!(shear(&lines[0])["shear_vector"], shear(&lines[1])["shear_vector"]);
+}
+
+#[test]
+fn a_recording_of_lines_or_messages_has_the_body_that_was_made_for_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let [lines, map] = messages(folder.path());
+    let (of_map, of_lines) = (folder.path().join("map.mcap"), folder.path().join("lines.mcap"));
+    let asked = ["--backend", "reference", "--all-fields", "--outputs", "total,shear_vector", "--sink", "-"];
+    let sink = |path: &Path| format!("mcap:{}", path.display());
+    let source = format!("ndjson:{}", lines.display());
+    let by_map = ["run", "--source", &source, "--map", text_of(&map), "--sink", &sink(&of_map)];
+    let percepts = done(&[&by_map[..], &asked].concat());
+    let again = |path: &Path| done(&[&["run", "--source", text_of(path)][..], &asked].concat());
+    assert!(percepts.contains("shear_vector") && again(&of_map) == percepts);
+    let rows = "4,4.u,4.v,7,7.u,7.v\n1.5,2,0.5,3,1,-1\n1.25,4,0.5,3,1,-1\n";
+    let by_lines = ["run", "--source", "text:-", "--rate", "100", "--sink", &sink(&of_lines)];
+    let (percepts, said) = fed(rows, &[&by_lines[..], &asked].concat());
+    assert_eq!(said.matches("a body is made").count(), 1, "{said}");
+    assert!(percepts.contains("shear_vector") && again(&of_lines) == percepts);
+    // The recording has it itself: without, the frames are of no bundled body.
+    assert!(done(&["info", text_of(&of_lines)]).contains("text (model/gltf-binary"));
 }

@@ -178,6 +178,25 @@ fn figures_are_json_for_programs_and_lines_for_people() {
 }
 
 #[test]
+fn letters_are_measured_beside_pressures_alone() {
+    let letters = "sustained,shear,temperature,proximity";
+    let text = done(&with(&["--letters", letters, "--frames", "20", "--backend", "reference", "--json"]));
+    let figures: Value = serde_json::from_str(&text).unwrap();
+    let keys: Vec<&String> = figures.as_object().unwrap().keys().collect();
+    assert_eq!(keys, ["backend", "adapter", "us_median", "us_p99", "rate", "letters", "us_median_pressure"]);
+    assert_eq!(figures["letters"].as_array().unwrap().len(), 4);
+    let [median, alone, rate] = ["us_median", "us_median_pressure", "rate"].map(|key| figures[key].as_f64().unwrap());
+    assert!(median > alone && alone > 0.0, "four letters take longer than one: {text}");
+    let memberships = 4.0 * 8.0 * 5.0 * 20.0;
+    assert!((rate * median * 1e-6 - memberships).abs() <= rate * 0.5e-9 + median, "{text}");
+
+    let text = done(&with(&["--letters", "sustained,shear", "--backend", "cpu"]));
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "8 fields of 5 sensors, out of 60; sustained, shear, 1 frame a call");
+    assert!(lines.len() == 5 && lines[3].contains("times as long as pressures alone, median "), "{text}");
+}
+
+#[test]
 fn what_cannot_be_measured_is_one_line() {
     let refused = |more: &[&str], word: &str| {
         let error = fails(2, &with(more));
@@ -193,11 +212,15 @@ fn what_cannot_be_measured_is_one_line() {
     ] {
         assert_eq!(refused(more, word).lines().count(), 1);
     }
+    refused(&["--letters", "shear", "--outputs", "warmest"], "`warmest` is of letter `temperature`");
+    refused(&["--letters", "shaer"], "shear");
+    refused(&["--letters", "shear", "--dump", "x"], "--dump");
     refused(&["--outputs", "centriod"], "did you mean `centroid`?");
     refused(&["--backend", "gpo"], "gpu");
     for (more, word) in [
         (["--sensors", "5", "--members", "6"], "--members 6"),
         (["--sensors", "33554432", "--members", "6"], "16777217"),
+        (["--sensors", "9000000", "--letters", "shear,temperature"], "18000000 taxels"),
     ] {
         let error = fails(2, &[&["bench"], &more[..]].concat());
         assert!(error.contains(word) && error.lines().count() == 1, "{error}");

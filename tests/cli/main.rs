@@ -3,6 +3,8 @@
 mod arduino;
 mod author;
 mod axes;
+#[cfg(unix)]
+mod axes_live;
 mod bags;
 mod bags_db3;
 mod bags_merged;

@@ -224,7 +224,7 @@ fn what_a_map_does_not_fit_is_refused_in_a_line() {
     let why = refused(2, &["run", "--source", &source, "--map", "dex4", "--sink", "-"]);
     assert!(why.contains("did you mean `dex3`?"), "{why}");
     let why = refused(2, &["run", "--source", "csv:a.csv", "--map", "dex3", "--sink", "-"]);
-    assert!(why.contains("--map is for ROS 2 bags and topics, NDJSON, lines of JSON, or Modbus"), "{why}");
+    assert!(why.contains("--map is for ROS 2 bags and topics, NDJSON, lines of JSON, Modbus, or PaXini"), "{why}");
     // A message that is cut short is left out and counted.
     let mut cut = messages();
     cut[1].3.truncate(200);

@@ -195,3 +195,50 @@ fn a_ball_that_slides_in_mujoco_pulls_where_it_slides() {
     let first = turned[0]["fields"].as_array().unwrap().iter().find_map(|field| field["shear_direction"].as_f64());
     assert!((first.unwrap() - directions[0]).abs() > 0.3);
 }
+
+/// A `<tactile>` sensor gives speeds of slip, without a sign: a direction between both tangents is told, and others are mirrored into it.
+#[test]
+fn a_ball_that_slides_over_a_tactile_mesh_in_mujoco_slips_where_it_slides() {
+    let python = match python_with("mujoco", "import mujoco") {
+        Ok(python) => python,
+        Err(why) => return skip("MUJOCO", why),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (frames, map) = (folder.path().join("slide.ndjson"), folder.path().join("tactile.toml"));
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mujoco/tactile.py");
+    let output = Command::new(python).args([script, text_of(&frames)]).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let truth: Vec<(f64, f64, f64, bool)> = serde_json::from_slice(&output.stdout).unwrap();
+    let source = format!("ndjson:{}", frames.display());
+    // Direction, and the centroid.
+    let found = |axes: &str| -> Vec<(f64, f64, f64)> {
+        let text = format!("values = ['normal', 'first', 'second']\naxes = '{axes}'\ngrid = '17x17'\npitch = '4mm'\n");
+        std::fs::write(&map, text).unwrap();
+        let asked = ["--map", text_of(&map), "--backend", "reference", "--outputs", "centroid,shear_direction"];
+        let lines = done(&[&["run", "--source", &source][..], &asked].concat());
+        let of_frame = |frame: &Value| {
+            let letter = |name: &str| {
+                frame["fields"].as_array().unwrap().iter().find(|field| field["letter"] == name).unwrap().clone()
+            };
+            let centroid = &letter("sustained")["centroid"];
+            let direction = letter("shear")["shear_direction"].as_f64().expect("something slips");
+            (direction, centroid[0].as_f64().unwrap(), centroid[1].as_f64().unwrap())
+        };
+        super::frames(&lines).iter().map(of_frame).collect()
+    };
+    let off_deg = |one: f64, other: f64| (one - other).sin().atan2((one - other).cos()).abs().to_degrees();
+    // The sensor's second tangent points against n × t.
+    let right = found("n,u,-v");
+    assert_eq!((right.len(), truth.len()), (7, 7));
+    for (&(direction, u, v), &(slid, x, y, is_told)) in right.iter().zip(&truth) {
+        let off = off_deg(direction, slid);
+        assert_eq!(off < 3.0, is_told, "{direction} is {off}° from {slid}");
+        assert!((u - x).hypot(v - y) < 1e-3, "({u}, {v}) m and ({x}, {y}) m");
+    }
+    assert_eq!(truth.iter().filter(|(.., is_told)| *is_told).count(), 4);
+    // With its axes exchanged, or with the other sign, no direction is right.
+    for axes in ["n,-v,u", "n,u,v"] {
+        let wrong = found(axes).into_iter().zip(&truth).filter(|(_, (.., is_told))| *is_told);
+        assert!(wrong.into_iter().all(|((direction, ..), (slid, ..))| off_deg(direction, *slid) > 3.0), "{axes}");
+    }
+}

@@ -156,3 +156,184 @@ fn letters_that_cannot_be_drawn_are_refused() {
     let hand = ["render", "hand", "--source", bundled, "--letter", "temperature", "-o", text_of(&to)];
     assert!(fails(2, &hand).contains("letter `temperature` has no taxels"));
 }
+
+/// The colours of the chart of a field of the bundled meeting, or none where no adapter answers.
+fn chart(field: &str, letter: &str, at: &[&str]) -> Option<Vec<[u8; 3]>> {
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("chart.png");
+    let from = ["render", "sensing-hand", "--source", MEETING, "--calibration", CALIBRATION, "--size", "600"];
+    let output = output(&[&from[..], &["--uv", field, "--letter", letter, "-o", text_of(&to)], at].concat());
+    let said = stderr(&output);
+    if said.contains("no GPU driver answers") {
+        skip("GPU", "no adapter answers");
+        return None;
+    }
+    assert_eq!((output.status.code(), said.as_str()), (Some(0), ""));
+    Some(pixels(&to))
+}
+
+const MEETING: &str = concat!("csv:", env!("CARGO_MANIFEST_DIR"), "/bodies/meeting.csv");
+const CALIBRATION: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/sensing-hand.toml");
+const BLACK: [u8; 3] = [0; 3];
+
+#[test]
+fn charts_have_arrows_of_tangential_forces_that_point_where_they_pull() {
+    let Some(dragged) = chart("hand/midhand/index", "shear", &["--at", "4.8s"]) else { return };
+    let resting = chart("hand/midhand/index", "shear", &["--at", "4.1s"]).unwrap();
+    // Before the finger is dragged the legend alone has an arrow.
+    let rows = |picture: &[[u8; 3]]| {
+        let black = picture.iter().enumerate().filter(|(_, pixel)| **pixel == BLACK);
+        black.map(|(at, _)| at / 600).collect::<Vec<_>>()
+    };
+    let (pulled, before) = (rows(&dragged), rows(&resting));
+    assert!(!before.is_empty() && pulled.len() > 3 * before.len(), "{} and {} pixels", pulled.len(), before.len());
+    // The shear is along −v, as percepts have it too. An arrow's head is at its lower end, and is wider than its tail.
+    let of_arrows: Vec<usize> = pulled.into_iter().filter(|row| !before.contains(row)).collect();
+    let [top, bottom] = [of_arrows.iter().min().unwrap(), of_arrows.iter().max().unwrap()];
+    let wide = |from: usize, to: usize| of_arrows.iter().filter(|row| (from..to).contains(row)).count();
+    assert!(wide(bottom - 12, bottom + 1) > wide(*top, top + 13), "{top} to {bottom}");
+    let line =
+        done(&["run", "--body", "sensing-hand", "--outputs", "shear", "--fields", "hand/midhand/index", "--sink", "-"]);
+    let frame = super::frames(&line).into_iter().find(|frame| frame["t"] == 4.8).unwrap();
+    let shear = frame["fields"].as_array().unwrap().iter().find_map(|field| field["shear"].as_array()).unwrap();
+    let [u, v] = [0, 1].map(|axis| shear[axis].as_f64().unwrap());
+    assert!(v < -0.5 && u.abs() < 0.1 * -v, "({u}, {v}) N");
+}
+
+#[test]
+fn charts_have_the_colours_of_their_letter_and_dots_for_other_taxels() {
+    let Some(temperatures) = chart("hand/palm", "temperature", &[]) else { return };
+    let shares = |map: [[u8; 3]; 256], picture: &[[u8; 3]]| {
+        (0..256).filter(|&index| count(picture, map[index]) > 500).map(|index| index as f64 / 255.0).collect::<Vec<_>>()
+    };
+    // By default when it is warmest: most of the palm is in the upper half of the map.
+    let warm = shares(temperature_colours(), &temperatures);
+    assert!(warm.len() >= 4 && warm.iter().all(|share| *share > 0.6), "{warm:?}");
+    assert!(shares(distance_colours(), &temperatures).is_empty(), "and of no other letter");
+    assert_eq!(count(&temperatures, BLACK), 0, "no arrows");
+    let distances = chart("hand/palm", "proximity", &[]).unwrap();
+    let near = shares(distance_colours(), &distances);
+    assert!(!near.is_empty() && near.iter().all(|share| *share < 0.1), "{near:?}");
+    // What measures something else is grey in both, and small: less of the picture than in one with ids.
+    let grey = |picture: &[[u8; 3]]| count(picture, [0xD6, 0xD6, 0xD4]);
+    let named = chart("hand/palm", "temperature", &["--ids"]).unwrap();
+    assert!(grey(&temperatures) > 500 && 2 * grey(&temperatures) < grey(&named));
+    let why = ["render", "sensing-hand", "--source", MEETING, "--uv", "hand/palm", "--letter", "shear", "-o", "no.png"];
+    assert!(fails(2, &why).contains("no taxel of field `hand/palm` measures what letter `shear` shows"));
+}
+
+#[test]
+fn pictures_are_of_the_time_at_which_there_is_most_to_see_of_their_letter() {
+    let same = |letter: &str, at: &str| {
+        let Some(usual) = chart("hand/midhand/index", letter, &[]) else { return true };
+        usual == chart("hand/midhand/index", letter, &["--at", at]).unwrap()
+    };
+    assert!(same("shear", "4.86s"));
+    // Most is pressed while nothing pulls.
+    assert!(same("pressure", "1.9s") && !same("shear", "1.9s"));
+}
+
+/// A skin of temperature taxels alone, and a recording in which they warm up.
+fn warm_pad() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let rows: String = (0..4)
+        .map(|n| {
+            format!("{n},pad,{},{},0,0,0,1,1.6e-5,temperature\n", 0.005 * f64::from(n % 2), 0.005 * f64::from(n / 2))
+        })
+        .collect();
+    std::fs::write(at("skin.csv"), format!("id,link,x,y,z,nx,ny,nz,area,modality\n{rows}")).unwrap();
+    let warmer = |n: i32| format!("{},{},{},25,26\n", 0.1 * f64::from(n), 24.0 + 0.1 * f64::from(n), 24.5);
+    std::fs::write(at("warm.csv"), format!("t,0,1,2,3\n{}", (0..40).map(warmer).collect::<String>())).unwrap();
+    done(&["author", "--csv-skin", text_of(&at("skin.csv")), "-o", text_of(&at("pad.glb"))]);
+    folder
+}
+
+#[test]
+fn a_skin_of_temperatures_alone_is_planned_compared_drawn_and_has_nothing_to_trade() {
+    let folder = warm_pad();
+    let [body, warm, plot] = ["pad.glb", "warm.csv", "plot.svg"].map(|name| folder.path().join(name));
+    let (body, warm) = (text_of(&body), text_of(&warm));
+    for source in [&["--source", warm][..], &[]] {
+        let bill = done(&[&["plan", "--json", "--body", body][..], source].concat());
+        let bill: serde_json::Value = serde_json::from_str(&bill).unwrap();
+        assert_eq!([&bill["taxels"], &bill["of_taxels"], &bill["fields"], &bill["of_fields"]], [4, 4, 1, 1]);
+        let timed = bill["stages"].as_array().unwrap().iter().filter(|stage| stage["us"].is_number());
+        assert_eq!(timed.map(|stage| stage["stage"].as_str().unwrap()).collect::<Vec<_>>(), ["temperature"]);
+    }
+    // Every value counts, and temperatures that are never 0 are no pressures at rest.
+    let folder_out = folder.path().join("out.csv");
+    let run = output(&[
+        "run",
+        "--verify",
+        "--body",
+        body,
+        "--source",
+        warm,
+        "--sink",
+        &format!("csv:{}", text_of(&folder_out)),
+    ]);
+    let said = stderr(&run);
+    assert!(run.status.success() && said.contains("warmest_taxel") && !said.contains("pressed"), "{said}");
+    assert!(said.contains("in 40 percepts") && said.contains(" 0 different"), "{said}");
+    done(&["plot", "--body", body, warm, "-o", text_of(&plot)]);
+    assert!(std::fs::read_to_string(&plot).unwrap().contains("warmest [°C]"));
+    let trade = done(&["tradeoff", "--body", body, "--source", warm, "--seconds", "0.1"]);
+    assert!(trade.contains("nothing to trade") && trade.contains("100 %") && !trade.contains("combination"), "{trade}");
+    for (command, code) in [("tradeoff", 2), ("run", 2)] {
+        let wish = [command, "--body", body, "--source", warm, "--within", "3 mm", "--sink", "csv:no.csv"];
+        let why = fails(code, &wish);
+        assert!(
+            why.contains("nothing to choose for 3 mm") && why.contains("--within") && why.lines().count() == 1,
+            "{why}"
+        );
+    }
+    let to = folder.path().join("no.svg");
+    assert!(
+        fails(2, &["tradeoff", "--body", body, "--plot", text_of(&to), "--seconds", "0.1"]).contains("nothing to draw")
+    );
+}
+
+#[test]
+fn a_plan_and_a_trade_tell_what_each_letter_costs() {
+    let bill = |letters: &[&str]| -> serde_json::Value {
+        let asked = ["plan", "--json", "--body", "sensing-hand", "--backend", "cpu"];
+        serde_json::from_str(&done(&[&asked[..], letters].concat())).unwrap()
+    };
+    let all = bill(&[]);
+    let stage = |bill: &serde_json::Value, name: &str| {
+        bill["stages"].as_array().unwrap().iter().find(|stage| stage["stage"] == name).unwrap().clone()
+    };
+    for letter in ["shear", "temperature", "proximity"] {
+        assert!(stage(&all, letter)["us"].is_number(), "{letter}: {all}");
+    }
+    assert_eq!((&all["taxels"], &all["fields"], &all["of_fields"]), (&53.into(), &23.into(), &23.into()));
+    // A letter that is not asked for does not run, and it is not said that there are no taxels.
+    let two = bill(&["--letters", "sustained,temperature"]);
+    assert!(stage(&two, "temperature")["us"].is_number() && stage(&two, "shear")["runs"] == false);
+    assert_eq!(stage(&two, "shear")["why"], "no letter is `shear`");
+    assert_eq!((&two["taxels"], &two["of_fields"]), (&49.into(), &15.into()));
+    let trade = |letters: &[&str]| -> Vec<String> {
+        let asked =
+            ["tradeoff", "--json", "--body", "sensing-hand", "--backend", "cpu", "--seconds", "0.1", "--frames", "40"];
+        let report: serde_json::Value = serde_json::from_str(&done(&[&asked[..], letters].concat())).unwrap();
+        assert!(report["rows"].as_array().unwrap().len() > 10);
+        let costs = report["letters"].as_array().unwrap().iter();
+        costs.map(|cost| format!("{} {}", cost["way"].as_str().unwrap(), cost["letter"].as_str().unwrap())).collect()
+    };
+    let both = |way: &str| ["shear", "temperature", "proximity"].map(|letter| format!("{way} {letter}"));
+    assert_eq!(trade(&[]), [both("live"), both("batch")].concat());
+    assert!(trade(&["--letters", "sustained"]).is_empty());
+}
+
+#[test]
+fn the_bundled_meeting_is_read_in_its_own_units() {
+    let header = |more: &[&str]| {
+        let asked = ["run", "--body", "sensing-hand", "--outputs", "total,slip_ratio", "--sink", "csv:-"];
+        done(&[&asked[..], more].concat()).lines().next().unwrap().to_owned()
+    };
+    assert!(header(&[]).contains("total [N]"));
+    assert_eq!(header(&[]), header(&["--calibration", CALIBRATION]));
+    // From its file it is a table like any other.
+    assert!(header(&["--source", MEETING]).contains("total [count]"));
+}

@@ -16,7 +16,7 @@ use serde_json::Value;
 use super::{frames, somatic, stderr, text_of};
 
 /// A pseudo-terminal: this end of it, and the name of the other one.
-fn pty() -> (File, String) {
+pub fn pty() -> (File, String) {
     let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     // No program that is started holds it open.
     rustix::io::fcntl_setfd(&end, rustix::io::FdFlags::CLOEXEC).unwrap();
@@ -43,14 +43,14 @@ fn wait_until_open(end: &File) {
 }
 
 /// A board on a pseudo-terminal that sends `line(n)` again and again, once somebody listens, until it is dropped.
-struct Board {
-    name: String,
+pub struct Board {
+    pub name: String,
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<u64>>,
 }
 
 impl Board {
-    fn start(every: Duration, line: impl Fn(u64) -> Vec<u8> + Send + 'static) -> Self {
+    pub fn start(every: Duration, line: impl Fn(u64) -> Vec<u8> + Send + 'static) -> Self {
         let (mut device, name) = pty();
         let (stop, stopped) = channel::<()>();
         let thread = thread::spawn(move || {

@@ -6,6 +6,7 @@ mod batches;
 mod blender;
 mod blocks;
 mod bodies;
+mod body_shear;
 mod body_touches;
 mod change;
 mod common;

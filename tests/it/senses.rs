@@ -265,6 +265,75 @@ fn what_is_missing_or_out_of_range_is_said_and_the_rest_counts() {
 }
 
 #[test]
+fn what_is_lost_for_a_while_is_no_motion_and_what_tells_nothing_counts_nothing() {
+    let body = skin(3);
+    for kind in backends() {
+        let mut engine = engine(&body, kind, Scene::default());
+        for index in 0..40 {
+            let mut frame = TOUCH.frame(&engine, 0.05 * f64::from(index));
+            // The nearest and the warmest taxel now and then, and all of both kinds in one frame.
+            let all = (WARM..WARM + SIDE * SIDE).chain(NEAR..NEAR + SIDE * SIDE);
+            let lost: Vec<u32> = match index {
+                0 => Vec::new(),
+                20 => all.collect(),
+                _ if index % 3 == 0 => vec![WARM + 4, NEAR + 12],
+                _ => Vec::new(),
+            };
+            for id in lost {
+                frame.values[engine.index_of(&id.to_string()).unwrap()] = RawValue::MISSING;
+            }
+            let percepts: Vec<Percept> = engine.process_one(&frame).unwrap().frame(0).collect();
+            let (warm, near) = (percepts[2], percepts[3]);
+            if index == 20 {
+                assert!(warm.temperature.is_none() && near.covered.is_none(), "{near:?}");
+                assert_eq!(near.flags, Flags::INCOMPLETE | Flags::NO_CONTACT);
+                continue;
+            }
+            if index >= 10 {
+                let (rate, speed) = (warm.temperature_rate.unwrap(), near.approach_speed.unwrap());
+                assert!(rate.abs() < 1e-9 && speed.abs() < 1e-9, "{kind:?} {index}: {rate} K/s, {speed} m/s");
+            }
+        }
+    }
+}
+
+#[test]
+fn one_taxel_has_no_torsion_and_two_have_no_gradient() {
+    let body = skin(3);
+    let mut engine = engine(&body, BackendKind::Reference, Scene::default());
+    let mut frame = TOUCH.frame(&engine, 0.0);
+    for i in (0..SIDE * SIDE).filter(|i| *i != 12) {
+        frame.values[engine.index_of(&i.to_string()).unwrap()] = RawValue::new(0.0);
+    }
+    for i in (0..SIDE * SIDE).filter(|i| *i != 3 && *i != 12) {
+        frame.values[engine.index_of(&(WARM + i).to_string()).unwrap()] = RawValue::MISSING;
+    }
+    let percepts: Vec<Percept> = engine.process_one(&frame).unwrap().frame(0).collect();
+    assert!(
+        percepts[1].torsion.is_none() && percepts[1].flags.contains(Flags::ONE_TAXEL) && percepts[1].shear.is_some()
+    );
+    assert!(percepts[2].temperature_gradient.is_none() && percepts[2].flags.contains(Flags::COINCIDENT));
+}
+
+#[test]
+fn shear_whose_calibration_does_not_say_what_it_is_made_of_is_refused() {
+    let (body, ids) = (skin(1), (0..SIDE * SIDE).collect::<Vec<_>>());
+    let made = |calibration: &str, outputs: Outputs| {
+        let calibration = Calibration::parse(calibration, &ids).unwrap();
+        let options = Options::default().scene(Scene::default().outputs(outputs)).calibration(Some(calibration));
+        Engine::new(&body, options.backend(BackendKind::Reference)).map(|_| ()).map_err(|e| e.to_string())
+    };
+    let curve = "[curve.c]\nraw = [0, 10]\np = [0, 1]\n[all]\ncurve = \"c\"\n";
+    let why = made(curve, Outputs::USUAL).unwrap_err();
+    assert!(why.contains("taxel 0 has a curve") && why.contains("`gain` in [shear]"), "{why}");
+    made(&format!("{curve}[shear]\ngain = 0.1\n"), Outputs::USUAL).unwrap();
+    made(curve, Outputs::TOTAL).unwrap();
+    let why = made("", Outputs::SLIP_RATIO).unwrap_err();
+    assert!(why.contains("give `slips_at`"), "{why}");
+    made("[shear]\nslips_at = 0.5\n", Outputs::SLIP_RATIO).unwrap();
+}
+
+#[test]
 fn letters_are_those_that_are_asked_for_and_each_needs_its_taxels() {
     let letters = |receptors: &[Receptor]| Letter::all_of(receptors, &[]);
     let body = skin(3);

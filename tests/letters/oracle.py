@@ -49,13 +49,27 @@ class Value:
 
 
 class Slope:
-    """The line of least squares through the last `window` seconds, of which samples nearer than a 128th replace the newest."""
+    """The line of least squares through the last `window` seconds and the last sample before them, of which samples nearer than a
+    128th replace the newest. What is sampled is moved by members alone that have a value before and after."""
 
     def __init__(self, window):
-        self.window, self.kept = window, deque()
+        self.window, self.kept, self.level, self.before = window, deque(), 0.0, {}
 
     def clear(self):
         self.kept.clear()
+        self.before = {}
+
+    def follow(self, t, now, of, size):
+        """`now` has the members' values, and `of` makes one of some of them, or None."""
+        both = [member for member in now if member in self.before]
+        was, value = of({member: self.before[member] for member in both}), of({member: now[member] for member in both})
+        if was is None or value is None:
+            self.kept.clear()
+            self.level = of(now)
+        else:
+            self.level += value - was
+        self.before = now
+        return self.take(t, self.level, size)
 
     def take(self, t, value, size):
         if self.kept and t <= self.kept[-1][0]:
@@ -63,7 +77,7 @@ class Slope:
         if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] < self.window / 128:
             self.kept.pop()
         self.kept.append((t, value, size))
-        while t - self.kept[0][0] > self.window * (1 + 1e-9):
+        while len(self.kept) > 1 and t - self.kept[1][0] >= self.window * (1 - 1e-9):
             self.kept.popleft()
         if t - self.kept[0][0] < self.window / 2:
             return None
@@ -154,7 +168,6 @@ def temperatures(recording, field, frames):
         flags = flags_of(missing[frame], faulty[frame], field)
         there = np.flatnonzero(~missing[frame] & ~faulty[frame])
         if len(there) == 0:
-            slope.clear()
             yield {}, flags | {"no_contact"}, False
             continue
         flags |= {"out_of_range"} if not inside[frame, there].all() else set()
@@ -178,7 +191,12 @@ def temperatures(recording, field, frames):
                 found["temperature_gradient"] = Value(gradient, 10 * size / np.sqrt(least / weights.sum()))
             elif share > 0.999e-6:
                 found["temperature_gradient"] = None
-        found["temperature_rate"] = slope.take(t, mean, size)
+            else:
+                flags |= {"coincident"}
+        elif field.chart:
+            flags |= {"coincident"}
+        weighted = lambda of: sum(field.weights[m] * c for m, c in of.items()) / sum(field.weights[m] for m in of) if of else None
+        found["temperature_rate"] = slope.follow(t, dict(zip(there, celsius)), weighted, size)
         yield found, flags | (set() if found["temperature_rate"] else {"no_previous"}), True
 
 
@@ -191,8 +209,12 @@ def distances(recording, field, frames):
         if frames.restarts[frame]:
             slope.clear()
         flags = flags_of(missing[frame], faulty[frame], field)
+        reads = ~missing[frame] & ~faulty[frame]
+        if not reads.any():
+            yield {}, flags | {"no_contact"}, False
+            continue
         with np.errstate(invalid="ignore"):
-            there = np.flatnonzero(~missing[frame] & ~faulty[frame] & inside[frame] & (values[frame] <= reach))
+            there = np.flatnonzero(reads & inside[frame] & (values[frame] <= reach))
         found = {"covered": Value(len(there))}
         if len(there) == 0:
             slope.clear()
@@ -208,7 +230,10 @@ def distances(recording, field, frames):
         if field.chart:
             weights = 1 / metres**2
             found["proximity_centroid"] = Value((weights[:, None] * field.places[there]).sum(axis=0) / weights.sum(), 1)
-        rate = slope.take(t, metres.min(), 1e-3)
+        # Those that read that nothing is near are there, too.
+        now = {member: np.inf for member in np.flatnonzero(reads)} | dict(zip(there, metres))
+        least = lambda of: min(of.values()) if of and np.isfinite(min(of.values())) else None
+        rate = slope.follow(t, now, least, 1e-3)
         found["approach_speed"] = rate and Value(-rate.value, rate.size)
         yield found, flags | (set() if rate else {"no_previous"}), True
 
@@ -261,12 +286,15 @@ def shears(recording, field, frames):
         size, pull = (weights * terms.sum(axis=0)).sum(), (weights * p).sum()
         vector = (weights[:, None] * in_space).sum(axis=0)
         friction = np.linalg.norm(vector) / pull
-        found = {"shear_vector": Value(vector, size), "friction": Value(friction, size / pull)}
-        if np.isnan(newtons[there]).any():
+        found = {"shear_vector": Value(vector, size)}
+        # What presses counts in the force, whether it is known how it pulls or not.
+        presses = np.flatnonzero(pressed)
+        if np.isnan(newtons[presses]).any():
             flags |= {"no_unit"}
         else:
-            force = newtons[there, None] * (in_space - p[:, None] * field.normals[there])
-            found["force_vector"] = Value(force.sum(axis=0), (newtons[there] * (terms.sum(axis=0) + p)).sum())
+            normal = -(newtons * np.where(pressed, pressure, 0))[presses, None] * field.normals[presses]
+            force = (newtons[there, None] * in_space).sum(axis=0) + normal.sum(axis=0)
+            found["force_vector"] = Value(force, (newtons[there] * terms.sum(axis=0)).sum() + np.abs(normal).sum())
         if field.chart:
             flat = along[0][:, None] * field.along[0][there] + along[1][:, None] * field.along[1][there]
             total, places = (weights[:, None] * flat).sum(axis=0), field.places[there]
@@ -274,14 +302,21 @@ def shears(recording, field, frames):
             arms = places - centre
             torsion = (weights * (arms[:, 0] * flat[:, 1] - arms[:, 1] * flat[:, 0])).sum()
             reach = np.abs(places).max() + 1e-3
-            found |= {"shear": Value(total, size), "torsion": Value(torsion, 4 * size * reach)}
-            length, sizes = np.linalg.norm(total), (weights * np.linalg.norm(flat, axis=1)).sum()
-            if length > 1e-9 * sizes:
+            found |= {"shear": Value(total, size)}
+            if len(there) > 1:
+                found["torsion"] = Value(torsion, 4 * size * reach)
+            else:
+                flags |= {"one_taxel"}
+            length = np.linalg.norm(total)
+            # Raw values are rounded to single precision.
+            friction, sizes = length / pull, 2.0**-24 * (weights * np.abs(along).sum(axis=0)).sum()
+            if length > 1.000001 * sizes:
                 found["shear_direction"] = Value(np.arctan2(total[1], total[0]), 4 * max(1, size / length))
-            elif sizes == 0 or length == 0:
+            elif length < 0.999999 * sizes or sizes == 0:
                 flags |= {"still"}
             else:
                 found["shear_direction"] = None
+        found["friction"] = Value(friction, size / pull)
         if np.isnan(noise[there]).any():
             flags |= {"noise_unknown"}
         else:

@@ -33,6 +33,8 @@ const near = (a, b, bound = 1e-6) => assert.ok(Math.abs(a - b) <= bound, `${a} i
 
 test("lengths are millimetres and angles degrees", () => {
   assert.equal(withUnit(0.0123, "m", "Pa"), "12.3 mm");
+  assert.equal(withUnit(Math.fround(1e-4), "m", "Pa"), "0.100 mm");
+  assert.equal(withUnit(9e-5, "m", "Pa"), "90 µm");
   assert.equal(withUnit(Math.PI / 2, "rad", "Pa"), "90.0°");
   assert.equal(withUnit(1500, "P", "Pa"), "1.50 kPa");
   assert.equal(withUnit(1500, "P", "count"), "1500 counts");

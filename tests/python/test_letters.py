@@ -309,6 +309,8 @@ def test_touches_have_their_shear() -> None:
     length = np.linalg.norm(values[0, :, 1:].astype(float).sum(axis=0))
     assert np.linalg.norm(shear[0]) == pytest.approx(length, rel=1e-5)
     assert p.touches.unit("shear") == "N" and p.touches["friction"][0] == pytest.approx(length / values[0, :, 0].sum(), rel=1e-4)
+    assert np.linalg.norm(p.touches["shear_in_chart"][0]) == pytest.approx(length, rel=1e-5)
+    assert p.touches["slip_ratio"][0] == 2 * p.touches["friction"][0]
     assert np.array_equal(p.touches.to_pandas()[["shear_x", "shear_y", "shear_z"]], shear)
 
 

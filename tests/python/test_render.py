@@ -54,6 +54,20 @@ def test_a_picture_is_the_command_s(somatic, hand: st.Body, touch: st.Recording,
         assert np.array_equal(picture.pixels[3, ..., :3], np.asarray(image.convert("RGB")))
 
 
+@pytest.mark.once
+@pytest.mark.parametrize("letter", ["shear", "temperature", None])
+def test_a_letter_is_drawn_as_the_command_draws_it(somatic, tmp_path: pathlib.Path, letter: str | None) -> None:
+    flags = [] if letter is None else ["--letter", letter]
+    source, calibration = ROOT / "bodies" / "meeting.csv", ROOT / "bodies" / "sensing-hand.toml"
+    somatic("render", "sensing-hand", "--source", source, "--calibration", calibration, "--size", "500", "-o", tmp_path / "theirs.png", *flags)
+    picture = st.render(st.read("sensing-hand"), letter=letter, size=500)  # type: ignore[arg-type]
+    assert picture._repr_png_() == (tmp_path / "theirs.png").read_bytes()
+    with pytest.raises(st.UsageError, match="letter"):
+        st.render(st.read("sensing-hand"), letter="warmth")  # type: ignore[arg-type]
+    with pytest.raises(st.UsageError, match="letter is about a touch"):
+        st.render(st.Body.bundled("sensing-hand"), letter="shear")
+
+
 def test_a_picture_is_an_array(hand: st.Body, tmp_path: pathlib.Path) -> None:
     picture = st.render(hand, size=300)
     width, height = picture.size

@@ -14,6 +14,7 @@ mod on_skin;
 mod options;
 mod place;
 mod post;
+mod pulls;
 mod self_contacts;
 mod skin_fits;
 mod skin_sigmas;
@@ -317,7 +318,8 @@ impl Engine {
     }
 
     /// Puts into `to`, in place of what it holds, what pressed on each link in the last frame, whatever touches it is of, in the body's
-    /// order: its total, and its wrench in the link's frame where that is known. A controller takes this off what it measures.
+    /// order: its total, and its wrench in the link's frame. A controller takes this off what it measures. The wrench is absent if a
+    /// pressed taxel has no unit or no area, or has three axes of which one is missing or faulty.
     /// Nothing unless [`Scene::touches`](crate::scene::Scene::touches) asks for touches.
     ///
     /// ```
@@ -342,7 +344,7 @@ impl Engine {
     pub fn presses_on_links(&self, to: &mut Vec<LinkShare>) {
         to.clear();
         if let Some(on_skin) = &self.on_skin {
-            on_skin.on_links(to);
+            on_skin.on_links(&self.plan, self.values_sensed(), to);
         }
     }
 

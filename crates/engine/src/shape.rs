@@ -1,5 +1,7 @@
 //! A made-up skin of any size, to measure speed on: `somatic bench` and `benches/` share it.
 
+mod letters;
+
 use std::collections::BTreeMap;
 
 use glam::{DAffine3, DVec3};

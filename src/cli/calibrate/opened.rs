@@ -51,7 +51,7 @@ impl Opened {
 /// The robot that is named, or that of the source. A source without one is not taken to be of the bundled hand.
 fn body_of(setup: &Setup, input: &Input) -> Result<Body> {
     let has_own = match &input.spec {
-        Some(SourceSpec::Vendor(_) | SourceSpec::Text(_) | SourceSpec::Sim(_)) => true,
+        Some(SourceSpec::Vendor(_) | SourceSpec::Text(_) | SourceSpec::Sim(_) | SourceSpec::Paxini { .. }) => true,
         Some(SourceSpec::Mcap(path)) => attached::body(path)?.is_some(),
         _ => setup.map.is_some(),
     };

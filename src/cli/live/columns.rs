@@ -148,7 +148,9 @@ impl Layout {
         let mut text = fitted(name, self.name, false);
         if let Some(said) = percept.and_then(|percept| said(percept, scale.unit.factor, scale.unit.name)) {
             let room = self.columns.iter().map(|column| column.width + GAP).sum::<usize>() + self.flags;
-            text += &clipped(&format!("  {said}"), room);
+            // Not in columns: a long name has half of their room.
+            let wide = console::measure_text_width(name).clamp(self.name, self.name + room / 2);
+            text = fitted(name, wide, false) + &clipped(&format!("  {said}"), room + self.name - wide);
             return if touched { text } else { style(text).dim().to_string() };
         }
         for column in &self.columns {

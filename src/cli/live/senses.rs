@@ -16,8 +16,12 @@ pub(super) fn said(percept: &Percept, factor: f64, unit: &str) -> Option<String>
     } else if let Some(nearest) = percept.nearest {
         vec![
             Some(format!("{} mm away", millimetres(nearest))),
-            percept.covered.map(|covered| format!("near {covered}")),
-            percept.approach_speed.map(|speed| format!("{:+.0} mm/s nearer", (speed * 1e3).round() + 0.0)),
+            percept.covered.map(|covered| format!("{covered} in range")),
+            percept.approach_speed.map(|speed| {
+                let mm_per_s = (speed * 1e3).round();
+                let way = if mm_per_s < 0.0 { "going" } else { "coming" };
+                if mm_per_s == 0.0 { "still".to_owned() } else { format!("{way} at {:.0} mm/s", mm_per_s.abs()) }
+            }),
         ]
     } else {
         let force = percept.shear_vector.map(|force| force.iter().map(|x| x * x).sum::<f64>().sqrt());
@@ -25,6 +29,7 @@ pub(super) fn said(percept: &Percept, factor: f64, unit: &str) -> Option<String>
             force.map(|force| format!("shear {} {unit}", number(force * factor)).trim_end().to_owned()),
             percept.shear_direction.map(|direction| format!("at {:.0}°", direction.to_degrees())),
             percept.friction.map(|friction| format!("friction {friction:.2}")),
+            percept.slip_ratio.map(|ratio| format!("{:.0} % of slipping", 100.0 * ratio)),
         ]
     };
     let said: Vec<String> = parts.into_iter().flatten().collect();

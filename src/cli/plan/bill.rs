@@ -1,11 +1,15 @@
 //! What a scene costs: counted and measured.
 
-use somatic::internal::scene::PlannedStage;
+use std::collections::BTreeSet;
+
+use somatic::field::{Field, FieldSet};
+use somatic::internal::scene::{PlannedStage, SensedTaxels};
 use somatic::internal::setup::Setup;
 use somatic::internal::setup::{Input, RECORDED_BATCH};
+use somatic::internal::signal::{Channel, Letter};
 use somatic::internal::tradeoff::{Combination, ladder};
 use somatic::scene::OrientationBy;
-use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Result, TouchOutputs, touch};
+use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Plan, Result, TouchOutputs, touch};
 
 use super::timed::{Played, measured, pressed};
 use crate::cli::tradeoff::{Settled, settled};
@@ -62,9 +66,10 @@ impl Bill {
         let plan = engine.plan();
         let knobs = Combination { backend: kind, knobs: plan.knobs() };
         let rungs = ladder(plan);
-        let made = |outputs: Outputs, of_touches: Option<TouchOutputs>| -> Result<Engine> {
+        let made = |outputs: Outputs, of_touches: Option<TouchOutputs>, letters: &[Letter]| -> Result<Engine> {
             let mut options = options.clone().backend(kind);
             options.scene.outputs = outputs;
+            options.scene.letters = letters.to_vec();
             let touches = options.scene.touches.unwrap_or_default();
             options.scene.touches = of_touches.map(|outputs| touch::Options { outputs, ..touches });
             let fits = of_touches.is_some_and(|outputs| outputs.intersects(TouchOutputs::FIT));
@@ -77,9 +82,10 @@ impl Bill {
         };
         let planned = plan.explain().into_iter();
         let mut stages: Vec<Stage> = planned.map(|planned| Stage { planned, measured_us: None }).collect();
-        let mut engines = rungs.iter().map(|rung| made(rung.outputs, rung.touches)).collect::<Result<Vec<_>>>()?;
-        let compared =
-            (kind != BackendKind::Reference).then(|| made(plan.outputs(), plan.touch_outputs())).transpose()?;
+        let mut engines =
+            rungs.iter().map(|rung| made(rung.outputs, rung.touches, &rung.letters)).collect::<Result<Vec<_>>>()?;
+        let whole = || made(plan.outputs(), plan.touch_outputs(), plan.letters());
+        let compared = (kind != BackendKind::Reference).then(whole).transpose()?;
         engines.extend(compared);
         let (mut played, on) = played(asked, recorded, body, batch, &mut engines)?;
         let mut compared = (kind != BackendKind::Reference).then(|| engines.pop()).flatten();
@@ -98,8 +104,8 @@ impl Bill {
         let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;
         Ok(Self {
             body: body.name.clone(),
-            taxels: [plan.channels(), body.taxels.len()],
-            fields: [plan.fields().len(), body.fields.len() * plan.letters().len()],
+            taxels: [taxels_read(plan, body), body.taxels.len()],
+            fields: [plan.fields().len(), fields_of_letters(plan, body)?],
             memberships: plan.memberships(),
             bytes: [plan.bytes_up(), plan.bytes_down()],
             backend,
@@ -113,6 +119,22 @@ impl Bill {
             network,
         })
     }
+}
+
+/// How many of the taxels of `body` a letter of `plan` reads.
+fn taxels_read(plan: &Plan, body: &Body) -> usize {
+    let sensed = SensedTaxels::new(plan, body);
+    let read: BTreeSet<usize> = plan.body_taxels.iter().copied().chain(sensed.all().map(|(taxel, ..)| taxel)).collect();
+    read.len()
+}
+
+/// How many fields of `body` have taxels of each letter of `plan`, all letters together.
+fn fields_of_letters(plan: &Plan, body: &Body) -> Result<usize> {
+    let set = FieldSet::new(body)?;
+    let has = |field: &Field, letter: &Letter| {
+        field.members.iter().any(|member| letter.receptor.reads(body.taxels[member.taxel].modality))
+    };
+    Ok(plan.letters().iter().map(|letter| set.fields.iter().filter(|field| has(field, letter)).count()).sum())
 }
 
 /// The frames that `engines` are measured on, and what they are, in words.
@@ -139,7 +161,7 @@ fn played(
         }
     }
     if frames.is_empty() {
-        frames = pressed(body.taxels.len(), batch);
+        frames = pressed(Channel::all_of(body).len(), batch);
     }
     Ok((Played { calls: frames.chunks(batch).map(<[Frame]>::to_vec).collect() }, on))
 }

@@ -7,7 +7,9 @@ use somatic::field::Field;
 use somatic::internal::scene_file::{hertz, seconds};
 use somatic::internal::setup::Setup;
 use somatic::internal::signal::{Channel, Receptor};
-use somatic::picture::{Moment, Moments, Options, Picture, Times, TouchPicture, letters_of};
+use somatic::picture::{
+    Moment, Moments, Options, Picture, Times, TouchPicture, letters_of, shown_letter, usual_letter,
+};
 use somatic::scene::Coordinates;
 use somatic::scene::file::SceneFile;
 use somatic::{BackendKind, Body, Engine, Error, Frame, Outputs, Result, Scene};
@@ -29,13 +31,13 @@ pub(super) struct Flags {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
 
-    /// What taxels are coloured by: pressure, shear, temperature or proximity [default: pressure].
+    /// What taxels are coloured by: pressure, shear, temperature or proximity [default: pressure if there is any].
     ///
     /// Taxels with three axes have arrows of their tangential forces with pressure and shear.
-    #[arg(long, value_name = "LETTER", value_parser = letter)]
+    #[arg(long, value_name = "LETTER", value_parser = shown_letter)]
     letter: Option<Receptor>,
 
-    /// The time to show, such as 2.9s [default: when most is pressed].
+    /// The time to show, such as 2.9s [default: when most is pressed or pulled, or it is warmest, or nearest].
     ///
     /// A bare number is in seconds.
     #[arg(long, value_name = "TIME", value_parser = seconds, conflicts_with_all = ["from", "to"])]
@@ -100,7 +102,7 @@ impl Flags {
     ) -> Result<Vec<u8>> {
         let times = match (self.at, self.from, self.to) {
             (Some(t_s), ..) => Times::At(t_s),
-            (None, None, None) => Times::MostPressed,
+            (None, None, None) => Times::Most,
             (None, from, to) => Times::Span {
                 from_s: from.unwrap_or(f64::NEG_INFINITY),
                 to_s: to.unwrap_or(f64::INFINITY),
@@ -117,12 +119,12 @@ impl Flags {
         let engine_options = asked.options(body, &taxels, 1)?;
         // Pictures are of the body at rest, and show touches whatever else is computed.
         let scene: Scene = engine_options.scene.clone().outputs(Outputs::TOTAL).coordinates(Coordinates::Anchor);
-        let letter = self.letter.unwrap_or_default();
+        let letter = self.letter.unwrap_or_else(|| usual_letter(body, fields));
         let letters = letters_of(body, fields, letter);
         let has_pressure = letters.iter().any(|letter| letter.receptor == Receptor::Sustained);
         let touches = scene.touches.unwrap_or_default();
         let scene = scene.letters(letters);
-        let scene = if has_pressure { scene.touches(touches) } else { scene };
+        let scene = scene.touches(has_pressure.then_some(touches));
         let mut engine = Engine::new(body, engine_options.scene(scene).backend(BackendKind::Cpu))?;
         engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
         let width = source.taxels().len();
@@ -144,19 +146,6 @@ impl Flags {
             None => moments.draw(body, fields, options, ids, progress),
         };
         Picture::animation(&pictures?, times.picture_s())
-    }
-}
-
-/// The letter that a word names; pressure itself is called so, too.
-fn letter(word: &str) -> Result<Receptor> {
-    match word {
-        "pressure" => Ok(Receptor::Sustained),
-        word => match word.parse()? {
-            Receptor::Change => {
-                Err(Error::usage("changes are not drawn; give pressure, shear, temperature or proximity"))
-            }
-            receptor => Ok(receptor),
-        },
     }
 }
 

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use clap::Arg;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use somatic::Error;
+use somatic::{Error, Receptor};
 
 /// Headings of flags that `-h` leaves out.
 pub(super) const COMPUTED: &str = "What is computed";
@@ -23,6 +23,11 @@ pub(in crate::cli) fn grouped(arg: Arg) -> Arg {
 /// `arg` among the flags that come first.
 pub(in crate::cli) fn first(arg: Arg) -> Arg {
     arg.help_heading(None::<&str>).hide_short_help(false)
+}
+
+/// Reads a letter.
+pub(in crate::cli) fn letter() -> impl TypedValueParser<Value = Receptor> {
+    one_of::<Receptor>(&["sustained", "change", "shear", "temperature", "proximity"])
 }
 
 /// Reads one of `words`.

@@ -15,7 +15,7 @@ use somatic::sink::RosTime;
 use somatic::source::VendorFormat;
 use somatic::{BackendKind, Result};
 
-use super::flags::{ACCURACY, COMPUTED, LIVE, OUTPUT, RECORDINGS, ROBOT, one_of};
+use super::flags::{ACCURACY, COMPUTED, LIVE, OUTPUT, RECORDINGS, ROBOT, letter, one_of};
 use super::outputs::outputs_help;
 use crate::cli::text_flags::TextFlags;
 
@@ -35,8 +35,8 @@ pub(in crate::cli) struct RunFlags {
     /// lerobot:DIR[:FEATURE][#EPISODE] for a LeRobot dataset, or a pressure system's export (.csv, .asf, .lst, .asc,
     /// .txt); text also as .gz. Live: one or more serial:PORT[@BAUD], ros2:/TOPIC, or one or more zenoh:KEY for
     /// limbs on other computers. A board that prints numbers: text:PORT[@BAUD], text:tcp://HOST:PORT, text:udp://:PORT or
-    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with --map. Standard input: - for NDJSON, csv:- for CSV. Several
-    /// recordings go into one table with a column `recording`, each from its own beginning.
+    /// text:-. A hand with Modbus TCP: modbus://HOST:PORT with --map. Sensors of PaXini: paxini:PORT. Standard input: -
+    /// for NDJSON, csv:- for CSV. Several recordings go into one table with a column `recording`, each from its own beginning.
     #[arg(id = "source", long = "source", value_name = "SOURCE")]
     pub(in crate::cli) sources: Vec<String>,
 
@@ -86,7 +86,7 @@ pub(in crate::cli) struct RunFlags {
     /// Compute the fields from pressures (sustained), from their change per second (change), from tangential forces
     /// (shear), temperatures or distances (proximity), or once from each [default: sustained, and letters of other taxels].
     #[arg(long, help_heading = COMPUTED, value_name = "LETTER,...", value_delimiter = ',',
-        value_parser = one_of::<Receptor>(&["sustained", "change", "shear", "temperature", "proximity"]))]
+        value_parser = letter())]
     pub(in crate::cli) letters: Vec<Receptor>,
 
     /// Compute from the raw or the linear signal of force-sensing resistors, not the one in the calibration.
@@ -247,9 +247,10 @@ pub(in crate::cli) struct RunFlags {
     #[command(flatten)]
     pub(in crate::cli) text: TextFlags,
 
-    /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, tactile-state, xela or xela-ros2.
+    /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, paxini, tactile-state,
+    /// xela or xela-ros2.
     ///
-    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, and Modbus. All of them but tactile-state and mujoco are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, Modbus and PaXini. All of them but tactile-state and mujoco are untested.
     #[arg(long, help_heading = RECORDINGS, value_name = "FILE")]
     pub(in crate::cli) map: Option<String>,
 

@@ -2,9 +2,10 @@
 
 use somatic::internal::setup::Setup;
 use somatic::internal::setup::{Input, RECORDED_BATCH};
+use somatic::internal::signal::Channel;
 use somatic::internal::tradeoff::{MeasureOptions, Measurement, Pick, Store, Target, TestFrames};
 use somatic::source::{SimulatedSource, SourceSpec};
-use somatic::{Body, Options, Result};
+use somatic::{Body, Error, Options, Result};
 
 use crate::cli::plan::pressed;
 use crate::cli::words::number;
@@ -13,6 +14,13 @@ use crate::cli::words::number;
 pub(super) fn missed(target: &Target, pick: &Pick<'_>) -> Result<String> {
     let combination = pick.row.combination()?;
     Ok(format!("no options meet {}; nearest is {combination}: {}", target.words(), pick.missed.join("; ")))
+}
+
+/// Why nothing can be picked for `target` where no letter is made of pressures.
+pub(super) fn nothing_to_choose(target: &Target) -> Error {
+    let what =
+        format!("nothing to choose for {}: options are for letters of pressure, and there is none", target.words());
+    Error::usage(format!("{what}; leave `within` and `budget` out"))
 }
 
 pub(super) fn measure_options(asked: &Setup, options: &Options, seconds: f64) -> Result<MeasureOptions> {
@@ -51,7 +59,8 @@ pub(super) fn in_words(row: &Measurement) -> String {
 }
 
 /// Frames for a body that nobody has recorded, or cannot be read again: every taxel pressed, each time otherwise.
-pub(super) fn made_up(body: &Body, taxels: Vec<u32>) -> TestFrames {
-    let frames = pressed(body.taxels.len(), 32);
+pub(super) fn made_up(body: &Body) -> TestFrames {
+    let taxels = Channel::all_of(body);
+    let frames = pressed(taxels.len(), 32);
     TestFrames { source: "every taxel pressed".to_owned(), taxels, frames, truth: Vec::new() }
 }

@@ -8,7 +8,7 @@ use somatic::internal::tradeoff::{
 use somatic::scene::Coverage;
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::measured::{in_words, made_up, measure_options, missed, played};
+use super::measured::{in_words, made_up, measure_options, missed, nothing_to_choose, played};
 use crate::cli::stdio::say;
 
 /// Seconds of a brief measurement, and its frames.
@@ -75,18 +75,21 @@ pub(in crate::cli) fn settled(asked: &Setup, input: Option<&Input>, body: &Body,
         None => {
             let again = input.filter(|input| input.is_recording());
             let played = again.map(|input| played(input, asked, body, BRIEF_FRAMES)).transpose()?;
-            let played = played.unwrap_or_else(|| made_up(body, ids.clone()));
+            let played = played.unwrap_or_else(|| made_up(body));
             let brief = measure_options(asked, &options, BRIEF_S)?;
             let mut tested = Tested::new(body, &options, Some(played), BRIEF_FRAMES)?;
             let measured = tested.measure(body, &brief, &mut |_| true).or_else(|_| {
                 // The first frames of a recording may touch nothing.
-                tested.played = made_up(body, ids);
+                tested.played = made_up(body);
                 tested.measure(body, &brief, &mut |_| true)
             })?;
             let when = format!("briefly, just now, on {}", measured.source);
             (measured, when)
         }
     };
+    if report.rows.is_empty() {
+        return Err(nothing_to_choose(&target));
+    }
     let Some(pick) = target.pick(&report, way) else {
         return Err(Error::failed(format!(
             "no measurement meets {}; widen the tolerance or the budget",

@@ -183,6 +183,7 @@ impl<'a> Rows<'a> {
     }
 
     /// The value of `channel` in frame `frame`.
+    #[inline]
     pub(crate) fn value(self, frame: usize, channel: usize) -> RawValue {
         match self {
             Self::Packed { values, channels } => values[frame * channels + channel],

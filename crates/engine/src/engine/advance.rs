@@ -27,16 +27,32 @@ impl Engine {
     /// [`Engine::pressures`].
     pub fn sensed(&self, frame: &Frame, sensed: &SensedTaxels, to: &mut Vec<SensedValue>) {
         to.clear();
-        if sensed.channels().is_empty() {
-            return;
+        if !sensed.channels().is_empty() {
+            to.extend(sensed.read(&self.plan, &self.raw_in(frame), self.values_sensed()));
         }
+    }
+
+    /// The same of any frame, as far as a single frame can tell.
+    pub fn sensed_alone(&self, frame: &Frame, sensed: &SensedTaxels, to: &mut Vec<SensedValue>) {
+        to.clear();
+        if !sensed.channels().is_empty() {
+            let value = |(at, &channel): (&Option<u32>, &usize)| {
+                at.map_or(RawValue::MISSING, |at| self.intake.read(channel, frame.values[at as usize]))
+            };
+            let own: Vec<RawValue> = self.sensed_at.iter().zip(&self.plan.senses.channels).map(value).collect();
+            to.extend(sensed.read(&self.plan, &self.raw_in(frame), &own));
+        }
+    }
+
+    /// The values of `frame` by the plan's channels.
+    fn raw_in(&self, frame: &Frame) -> Vec<RawValue> {
         let mut raw = vec![RawValue::MISSING; self.plan.channels()];
         for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
             if let Some(channel) = self.channel_of_taxel[taxel] {
                 raw[channel as usize] = self.intake.read(taxel, value);
             }
         }
-        to.extend(sensed.read(&self.plan, &raw, self.values_sensed()));
+        raw
     }
 
     /// The values that the last frame's letters beside pressure were made of, by
@@ -285,6 +301,7 @@ impl Engine {
             }
         }
         self.plan.senses.shear = Some(shear);
+        self.plan.calibration_changes += 1;
     }
 
     /// Ends an epoch of drift compensation, and calibrates from now on with its outcome.

@@ -5,16 +5,17 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::links::Links;
+use super::pulls::{Pull, Pulls, tangential_gain};
 use super::spread::{Frames, Now};
 use crate::backend::Step;
 use crate::percept::{Flags, Host, Outputs, Percepts};
 use crate::scene::{Plan, PlanField, SensedMember};
-use crate::signal::{RawValue, Reading, Receptor, SenseCalibration, ShearCalibration, TaxelCalibration};
+use crate::signal::{RawValue, Reading, Receptor, SenseCalibration, ShearCalibration};
 use crate::stage::proximity::{LEAST_M, Near};
-use crate::stage::shear::Pulled;
+use crate::stage::shear::{Pulled, Sums};
 use crate::stage::temperature::Warm;
-use crate::stage::window::Window;
-use crate::stage::{calibrate, force, proximity, shear, temperature};
+use crate::stage::window::Trend;
+use crate::stage::{calibrate, proximity, temperature};
 
 /// The values of the frames of a call that such letters are made of.
 #[derive(Clone, Copy, Default)]
@@ -39,23 +40,6 @@ pub(super) struct Cell<'a> {
     pub(super) frame: usize,
     pub(super) step: &'a Step,
     pub(super) sensed: SensedValues<'a>,
-}
-
-/// Which channels nothing presses in a frame: found when the first field asks, as fields share taxels.
-#[derive(Default)]
-pub(super) struct Quiet(Vec<bool>);
-
-impl Quiet {
-    fn of(&mut self, cell: &Cell<'_>) -> &[bool] {
-        if self.0.is_empty() {
-            let plan = cell.plan;
-            let row = cell.frames.raw.rows.row(cell.frames.offset);
-            let is_quiet =
-                |(channel, raw)| calibrate::is_quiet(raw, &plan.calibrations[channel], plan.curve_of(channel));
-            self.0.extend(row.enumerate().map(is_quiet));
-        }
-        &self.0
-    }
 }
 
 /// The frame that places and directions of a cell are in.
@@ -85,29 +69,31 @@ impl Made<'_> {
 }
 
 impl Cell<'_> {
-    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `quiet` have what the fields of a frame share,
-    /// and `window` what the letter measured before.
+    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `pulls` have what the fields of a frame share,
+    /// and `trend` what the letter measured before.
     pub(super) fn make(
         &self,
         cell: usize,
         percepts: &mut Percepts,
-        (now, quiet): (&mut Now, &mut Quiet),
-        window: &mut Window,
+        (now, pulls): (&mut Now, &mut Pulls),
+        trend: &mut Trend,
     ) {
         percepts.set_present(cell, Outputs::empty());
         let mut made = Made { percepts, cell, flags: Flags::empty(), is_there: false };
         if self.step.restarts() {
-            window.clear();
+            trend.clear();
         }
         let senses = &self.plan.senses;
         match self.plan.letters()[self.field.letter].receptor {
             Receptor::Sustained | Receptor::Change => {}
-            Receptor::Shear => senses.shear.iter().for_each(|shear| self.shear(shear, quiet.of(self), now, &mut made)),
+            Receptor::Shear => {
+                senses.shear.iter().for_each(|by| self.shear(by, pulls, now, &mut made));
+            }
             Receptor::Temperature => {
-                senses.temperature.iter().for_each(|by| self.temperature(by, now, &mut made, window));
+                senses.temperature.iter().for_each(|by| self.temperature(by, now, &mut made, trend));
             }
             Receptor::Proximity => {
-                senses.proximity.iter().for_each(|by| self.proximity(by, now, &mut made, window));
+                senses.proximity.iter().for_each(|by| self.proximity(by, now, &mut made, trend));
             }
         }
         made.flags.set(Flags::NO_CONTACT, !made.is_there);
@@ -115,13 +101,13 @@ impl Cell<'_> {
         made.percepts.flags[cell] = made.flags;
     }
 
-    /// Which frame places of `members` are in.
-    fn frame_of(&self, mut members: impl Iterator<Item = usize>, now: &mut Now) -> Frame {
+    /// Which frame places of members on the links `links_of` are in.
+    fn frame_of(&self, mut links_of: impl Iterator<Item = usize>, now: &mut Now) -> Frame {
         let frame = &self.frames.frames[0];
         let links: &Links = self.frames.links;
         if links.are_posed(frame) {
             let poses = self.frames.poses(0, now);
-            if members.all(|member| poses[self.field.sensed[member].link].is_some()) {
+            if links_of.all(|link| poses[link].is_some()) {
                 return Frame::World;
             }
         }
@@ -143,7 +129,8 @@ impl Cell<'_> {
         now: &mut Now,
         made: &mut Made<'_>,
     ) {
-        let (own, frame) = (&self.field.sensed[member], self.frame_of(std::iter::once(member), now));
+        let (own, frame) =
+            (&self.field.sensed[member], self.frame_of(std::iter::once(self.field.sensed[member].link), now));
         let (position, outward) = match frame {
             Frame::World => {
                 let world = self.world_from_link(own, now);
@@ -162,37 +149,42 @@ impl Cell<'_> {
         }
     }
 
-    /// The members that have a reading, by `read` of its value, and the flags of the others.
+    /// What `read` makes of the values of members that have a reading; the others' flags go into `made`.
     fn readings<T>(
         &self,
         by: &SenseCalibration,
         made: &mut Made<'_>,
         read: impl Fn(&SensedMember, f64, bool, &mut Flags) -> Option<T>,
-    ) -> (Vec<usize>, Vec<T>) {
+    ) -> Readings<T> {
         let row = self.sensed.row(self.frame);
-        let (mut members, mut values) = (Vec::new(), Vec::new());
+        let mut readings = Readings { members: Vec::new(), values: Vec::new(), by_member: Vec::new() };
         for (index, member) in self.field.sensed.iter().enumerate() {
-            match by.of_taxel(member.taxel).read(row[member.values[0]]) {
+            let reading = by.of_taxel(member.taxel).read(row[member.values[0]]);
+            readings.by_member.push(None);
+            match reading {
                 Reading::Missing => made.flags |= Flags::INCOMPLETE,
                 Reading::Faulty => made.flags |= Flags::FAULTY_INPUT,
-                Reading::Value(value, is_in_range) => {
-                    if let Some(value) = read(member, value, is_in_range, &mut made.flags) {
-                        members.push(index);
-                        values.push(value);
+                Reading::Value(number, is_in_range) => match read(member, number, is_in_range, &mut made.flags) {
+                    Some(value) => {
+                        readings.by_member[index] = Some(number);
+                        readings.members.push(index);
+                        readings.values.push(value);
                     }
-                }
+                    // Of proximity: nothing is near.
+                    None => readings.by_member[index] = Some(f64::INFINITY),
+                },
             }
         }
-        (members, values)
+        readings
     }
 
-    fn temperature(&self, by: &SenseCalibration, now: &mut Now, made: &mut Made<'_>, window: &mut Window) {
-        let (members, warm) = self.readings(by, made, |member, celsius, is_in_range, flags| {
-            flags.set(Flags::OUT_OF_RANGE, flags.contains(Flags::OUT_OF_RANGE) || !is_in_range);
-            Some(Warm { weight: member.weight, celsius, place_m: member.place_m })
-        });
+    fn temperature(&self, by: &SenseCalibration, now: &mut Now, made: &mut Made<'_>, trend: &mut Trend) {
+        let Readings { members, values: warm, by_member } =
+            self.readings(by, made, |member, celsius, is_in_range, flags| {
+                flags.set(Flags::OUT_OF_RANGE, flags.contains(Flags::OUT_OF_RANGE) || !is_in_range);
+                Some(Warm { weight: member.weight, celsius, place_m: member.place_m })
+            });
         if warm.is_empty() {
-            window.clear();
             return;
         }
         made.is_there = true;
@@ -216,12 +208,19 @@ impl Cell<'_> {
             made.give(taxel.0, taxel.1, &[f64::from(self.field.sensed[members[found]].id)]);
             self.give_place(members[found], position, None, now, made);
         }
-        if self.field.chart.is_some()
-            && let Some(gradient) = temperature::gradient(&warm)
-        {
-            made.give(Outputs::TEMPERATURE_GRADIENT, Host::TemperatureGradient, &gradient.to_array());
+        if self.field.chart.is_some() {
+            match temperature::gradient(&warm) {
+                Some(gradient) => {
+                    made.give(Outputs::TEMPERATURE_GRADIENT, Host::TemperatureGradient, &gradient.to_array());
+                }
+                None => made.flags |= Flags::COINCIDENT,
+            }
         }
-        match window.take(self.t_s(), mean, by.window_s) {
+        let sensed = &self.field.sensed;
+        let mean_of = |members: &mut dyn Iterator<Item = (usize, f64)>| {
+            temperature::mean_of(members.map(|(member, celsius)| [sensed[member].weight, celsius]))
+        };
+        match trend.take(self.t_s(), &by_member, by.window_s, mean_of) {
             Some(rate) => made.give(Outputs::TEMPERATURE_RATE, Host::TemperatureRate, &[rate]),
             None => made.flags |= Flags::NO_PREVIOUS,
         }
@@ -231,20 +230,24 @@ impl Cell<'_> {
         self.frames.frames[0].t_s
     }
 
-    fn proximity(&self, by: &SenseCalibration, now: &mut Now, made: &mut Made<'_>, window: &mut Window) {
-        let (members, near) = self.readings(by, made, |member, distance_m, is_in_range, flags| {
-            if !is_in_range || distance_m > by.range_m {
-                return None;
-            }
-            if distance_m < LEAST_M {
-                *flags |= Flags::SATURATED;
-            }
-            Some(Near { distance_m: distance_m.max(LEAST_M), place_m: member.place_m })
-        });
+    fn proximity(&self, by: &SenseCalibration, now: &mut Now, made: &mut Made<'_>, trend: &mut Trend) {
+        let Readings { members, values: near, by_member } =
+            self.readings(by, made, |member, distance_m, is_in_range, flags| {
+                if !is_in_range || distance_m > by.range_m {
+                    return None;
+                }
+                if distance_m < LEAST_M {
+                    *flags |= Flags::SATURATED;
+                }
+                Some(Near { distance_m: distance_m.max(LEAST_M), place_m: member.place_m })
+            });
+        if by_member.iter().all(Option::is_none) {
+            return;
+        }
         made.give(Outputs::COVERED, Host::Covered, &[near.len() as f64]);
         let Some(nearest) = proximity::nearest(&near) else {
             made.flags |= Flags::OUT_OF_RANGE;
-            window.clear();
+            trend.clear();
             return;
         };
         made.is_there = true;
@@ -258,129 +261,138 @@ impl Cell<'_> {
             let centroid = proximity::centroid(&near).to_array();
             made.give(Outputs::PROXIMITY_CENTROID, Host::ProximityCentroid, &centroid);
         }
-        match window.take(self.t_s(), distance_m, by.window_s) {
+        let least = |members: &mut dyn Iterator<Item = (usize, f64)>| {
+            let least_m = members.map(|(_, distance_m)| distance_m.max(LEAST_M)).fold(f64::INFINITY, f64::min);
+            least_m.is_finite().then_some(least_m)
+        };
+        match trend.take(self.t_s(), &by_member, by.window_s, least) {
             // From 0, so that what stays has no sign.
             Some(slope) => made.give(Outputs::APPROACH_SPEED, Host::ApproachSpeed, &[0.0 - slope]),
             None => made.flags |= Flags::NO_PREVIOUS,
         }
     }
 
-    /// The members that are pressed and whose tangential forces are known, and what they feel. `quiet` says by channel which need no
-    /// look.
-    fn pulled(&self, by: &ShearCalibration, quiet: &[bool], made: &mut Made<'_>) -> (Vec<usize>, Vec<Pulled>) {
-        let (plan, row) = (self.plan, self.sensed.row(self.frame));
-        let (mut members, mut pulled) = (Vec::new(), Vec::new());
-        for (index, member) in self.field.sensed.iter().enumerate() {
-            let Some(channel) = member.channel.filter(|&channel| !quiet[channel]) else { continue };
-            let (calibration, curve) = (&plan.calibrations[channel], plan.curve_of(channel));
-            let raw = self.frames.raw.rows.value(self.frames.offset, channel);
-            let own = calibrate::reference(raw, calibration, curve);
-            made.flags |= Flags::from_bits_truncate(own.status & !calibrate::UNUSABLE);
-            if own.value <= 0.0 {
-                continue;
-            }
-            let gain = tangential_gain(by, member.taxel, calibration);
-            let [su, sv] = match tangential(by, member.taxel, gain, own.value, member.values.map(|value| row[value])) {
-                Ok(pulls) => pulls,
-                Err(why) => {
-                    made.flags |= why;
-                    continue;
-                }
-            };
-            let [tu, tv] = member.tangents_in_chart;
-            members.push(index);
-            pulled.push(Pulled {
-                weight: member.weight,
-                pressure: own.value,
-                shear: su * tu + sv * tv,
-                // Along its own tangents, until the frame is known.
-                shear_in_space: DVec3::new(su, sv, 0.0),
-                place_m: member.place_m,
-                newtons_per_p: force::newtons_per_p(calibration.quantity, plan.areas[channel]),
-                sigmas: calibration.noise.map(|noise| {
-                    let of_pressure = raw.number().map_or(0.0, |raw| calibrate::sigma(raw, noise, calibration, curve));
-                    [of_pressure, gain.abs() * noise]
-                }),
-                ..Pulled::default()
-            });
-        }
-        (members, pulled)
+    /// The members that are pressed, and what they feel.
+    fn pressed<'m>(&'m self, pulls: &'m Pulls) -> impl Iterator<Item = (&'m SensedMember, &'m Pull)> {
+        self.field.sensed.iter().filter_map(|member| Some((member, pulls.of_channel(member.channel?)?)))
     }
 
-    fn shear(&self, by: &ShearCalibration, quiet: &[bool], now: &mut Now, made: &mut Made<'_>) {
-        let (members, mut pulled) = self.pulled(by, quiet, made);
-        if pulled.is_empty() {
+    /// The sums over the pressed members, with vectors in `frame`.
+    fn sums(&self, pulls: &Pulls, frame: &Frame, now: &mut Now) -> Sums {
+        let mut sums = Sums::default();
+        if !matches!(frame, Frame::World) {
+            for (member, pull) in self.pressed(pulls) {
+                add(&mut sums, member, pull, (&member.tangents_in_anchor, member.normal_in_anchor));
+            }
+            return sums;
+        }
+        let poses = self.frames.poses(0, now);
+        let (mut of_link, mut link) = (Sums::default(), None);
+        let mut end_link = |of_link: &mut Sums, link: Option<usize>| {
+            let world = link.and_then(|link: usize| poses[link]).unwrap_or(DAffine3::IDENTITY);
+            sums.join(&std::mem::take(of_link), |vector| world.transform_vector3(vector));
+        };
+        for (member, pull) in self.pressed(pulls) {
+            if link.is_some_and(|link| link != member.link) {
+                end_link(&mut of_link, link);
+            }
+            link = Some(member.link);
+            add(&mut of_link, member, pull, (&member.tangents_in_link, member.normal_in_link));
+        }
+        end_link(&mut of_link, link);
+        sums
+    }
+
+    fn shear(&self, by: &ShearCalibration, pulls: &mut Pulls, now: &mut Now, made: &mut Made<'_>) {
+        pulls.look(by, &self.frames, self.sensed.row(self.frame));
+        made.flags |= pulls.flags_of(self.field.sensed.iter().filter_map(|member| member.channel));
+        if !pulls.is_pressed() {
+            return;
+        }
+        let frame = self.frame_of(self.pressed(pulls).map(|(member, _)| member.link), now);
+        let found = self.sums(pulls, &frame, now);
+        if found.pull <= 0.0 {
             return;
         }
         made.is_there = true;
-        let frame = self.frame_of(members.iter().copied(), now);
-        for (&index, taxel) in members.iter().zip(&mut pulled) {
-            let member = &self.field.sensed[index];
-            let DVec3 { x: su, y: sv, .. } = taxel.shear_in_space;
-            let ([tu, tv], normal) = match frame {
-                Frame::World => {
-                    let world = self.world_from_link(member, now);
-                    let turned = |direction| world.transform_vector3(direction);
-                    (member.tangents_in_link.map(turned), turned(member.normal_in_link))
-                }
-                _ => (member.tangents_in_anchor, member.normal_in_anchor),
-            };
-            (taxel.shear_in_space, taxel.normal) = (su * tu + sv * tv, normal);
-        }
-        let found = shear::reference(&pulled);
         if matches!(frame, Frame::Nowhere) {
             made.flags |= Flags::NO_POSE;
         } else {
             made.percepts.in_world[made.cell] = matches!(frame, Frame::World);
-            made.give(Outputs::SHEAR_VECTOR, Host::ShearVector, &found.in_space.to_array());
-            match found.force {
+            made.give(Outputs::SHEAR_VECTOR, Host::ShearVector, &found.in_space().to_array());
+            match found.force() {
                 Some(newtons) => made.give(Outputs::FORCE_VECTOR, Host::ForceVector, &newtons.to_array()),
                 None => made.flags |= Flags::NO_UNIT,
             }
         }
         if self.field.chart.is_some() {
-            self.along_chart(&found, made);
+            let DVec2 { x, y } = found.along_chart;
+            made.give(Outputs::SHEAR, Host::Shear, &[x, y]);
+            match found.torsion() {
+                Some(torsion) => made.give(Outputs::TORSION, Host::Torsion, &[torsion]),
+                None => made.flags |= Flags::ONE_TAXEL,
+            }
+            match found.direction() {
+                Some(direction) => made.give(Outputs::SHEAR_DIRECTION, Host::ShearDirection, &[direction]),
+                None => made.flags |= Flags::STILL,
+            }
         }
-        made.give(Outputs::FRICTION, Host::Friction, &[found.friction]);
+        let friction = found.friction(self.field.chart.is_some());
+        made.give(Outputs::FRICTION, Host::Friction, &[friction]);
         if made.percepts.outputs().contains(Outputs::FRICTION_SIGMA) {
-            match found.friction_sigma {
-                Some(sigma) => made.give(Outputs::FRICTION_SIGMA, Host::FrictionSigma, &[sigma]),
+            match self.variances(by, pulls) {
+                Some(variances) => {
+                    made.give(
+                        Outputs::FRICTION_SIGMA,
+                        Host::FrictionSigma,
+                        &[found.friction_sigma(friction, variances)],
+                    );
+                }
                 None => made.flags |= Flags::NOISE_UNKNOWN,
             }
         }
         if let Some(slips_at) = by.slips_at {
-            made.give(Outputs::SLIP_RATIO, Host::SlipRatio, &[found.friction / slips_at]);
+            made.give(Outputs::SLIP_RATIO, Host::SlipRatio, &[friction / slips_at]);
         }
     }
 
-    fn along_chart(&self, found: &shear::Shear, made: &mut Made<'_>) {
-        let DVec2 { x, y } = found.along_chart;
-        made.give(Outputs::SHEAR, Host::Shear, &[x, y]);
-        made.give(Outputs::TORSION, Host::Torsion, &[found.torsion]);
-        match found.direction {
-            Some(direction) => made.give(Outputs::SHEAR_DIRECTION, Host::ShearDirection, &[direction]),
-            None => made.flags |= Flags::STILL,
-        }
+    /// The variances of Σ wP and of Σ ws along its direction, where the noise of all pressed members is known.
+    fn variances(&self, by: &ShearCalibration, pulls: &Pulls) -> Option<[f64; 2]> {
+        let plan = self.plan;
+        let mut known = self.pressed(pulls).filter(|(_, pull)| pull.shear.is_some());
+        known.try_fold([0.0; 2], |[of_pull, of_shear], (member, _)| {
+            let channel = member.channel?;
+            let calibration = &plan.calibrations[channel];
+            let (noise, raw) = (calibration.noise?, self.frames.raw.rows.value(self.frames.offset, channel));
+            let pressure = calibrate::sigma(raw.number()?, noise, calibration, plan.curve_of(channel));
+            let along = by.noise_of(member.taxel).unwrap_or(noise);
+            let shear = tangential_gain(by, member.taxel, calibration).abs() * along;
+            let squared = |sigma: f64| (member.weight * sigma).powi(2);
+            Some([of_pull + squared(pressure), of_shear + squared(shear)])
+        })
     }
 }
 
-/// P for a raw unit of a tangential value of the body's taxel `taxel`.
-pub(super) fn tangential_gain(by: &ShearCalibration, taxel: usize, calibration: &TaxelCalibration) -> f64 {
-    by.gain_of(taxel, calibration.gain, calibration.unit_factor)
+/// What members read, in their order.
+struct Readings<T> {
+    /// Those with a value that counts.
+    members: Vec<usize>,
+    values: Vec<T>,
+    /// Of every member, °C or m; infinite where nothing is in range, `None` where it has no reading.
+    by_member: Vec<Option<f64>>,
 }
 
-/// The tangential forces of the body's taxel `taxel` along t and n × t, where it is pressed by `pressure` and reads `raw`.
-pub(super) fn tangential(
-    by: &ShearCalibration,
-    taxel: usize,
-    gain: f64,
-    pressure: f64,
-    raw: [RawValue; 2],
-) -> Result<[f64; 2], Flags> {
-    let numbers = raw.map(|raw| raw.number().filter(|number| number.abs() <= calibrate::HUGE));
-    let [Some(u), Some(v)] = numbers else {
-        let is_missing = raw.iter().any(|raw| raw.is_missing());
-        return Err(if is_missing { Flags::INCOMPLETE } else { Flags::FAULTY_INPUT });
+/// Adds what `member` feels to `sums`, in whose space it has these tangents and this normal.
+fn add(sums: &mut Sums, member: &SensedMember, pull: &Pull, (tangents, normal): (&[DVec3; 2], DVec3)) {
+    let taxel = Pulled {
+        weight: member.weight,
+        pressure: pull.pressure,
+        shear: pull.shear.unwrap_or_default(),
+        tangents_in_chart: &member.tangents_in_chart,
+        tangents,
+        normal,
+        place_m: member.place_m,
+        newtons_per_p: pull.newtons_per_p,
     };
-    Ok(by.forces(taxel, gain, pressure, [u, v]))
+    if pull.shear.is_some() { sums.add(&taxel) } else { sums.add_normal(&taxel) }
 }

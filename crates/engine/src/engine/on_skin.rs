@@ -11,7 +11,7 @@ use super::self_contacts::SelfContacts;
 use super::skin_fits::{FitTrails, Moment, SkinFits};
 use super::skin_sigmas::SkinSigmas;
 use super::touch_check::TouchCheck;
-use super::touch_senses::TouchSenses;
+use super::touch_senses::{Sensed, TouchSenses};
 use crate::backend::RawBatch;
 use crate::body::Body;
 use crate::field::TaxelGraph;
@@ -79,7 +79,7 @@ impl OnSkin {
         });
         let sigmas = SkinSigmas::new(options.outputs);
         let senses = TouchSenses::new(body, plan, &skin);
-        if fits.is_some() || sigmas.is_some() || senses.is_some() {
+        if fits.is_some() || sigmas.is_some() || senses.as_ref().is_some_and(TouchSenses::needs_taxels) {
             // Which taxels are fitted, vary, or are pulled.
             options.outputs |= TouchOutputs::TAXELS;
         }
@@ -132,9 +132,12 @@ impl OnSkin {
         }
     }
 
-    /// What presses on each link in the last frame, as [`Touches::on_links`] has it.
-    pub(super) fn on_links(&self, out: &mut Vec<LinkShare>) {
+    /// What presses on each link in the last frame, as [`Touches::on_links`] has it, and pulls: `row` has what is read beside pressures.
+    pub(super) fn on_links(&self, plan: &Plan, row: &[RawValue], out: &mut Vec<LinkShare>) {
         self.touches.on_links(out);
+        if let Some(senses) = &self.senses {
+            senses.add_to_links((plan, self.touches.skin()), row, self.touches.pressed(), out);
+        }
     }
 
     /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `stale` has the taxels of the
@@ -172,8 +175,9 @@ impl OnSkin {
             if let Some(sigmas) = &mut self.sigmas {
                 sigmas.add((plan, self.touches.skin()), raw, offset, pressures, &mut found);
             }
-            if let Some(senses) = &self.senses {
-                senses.add(plan, sensed.row(index), pressures, &mut found);
+            if let Some(senses) = &mut self.senses {
+                let sensed = Sensed { raw, offset, row: sensed.row(index), pressures };
+                senses.add((plan, self.touches.skin()), &sensed, &mut found);
             }
             self.poses.clear();
             if !found.touches.is_empty() && links.may_pose(frame) {

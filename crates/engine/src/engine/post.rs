@@ -3,16 +3,17 @@
 use glam::DVec3;
 
 use super::cadence::{self, OnChange};
-use super::letters::{Cell, Quiet, SensedValues};
+use super::letters::{Cell, SensedValues};
 use super::links::Links;
 use super::place;
+use super::pulls::Pulls;
 use super::spread::{Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::percept::{Flags, Host, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField};
 use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
-use crate::stage::window::Window;
+use crate::stage::window::Trend;
 use crate::stage::{difference, filter, force, motion, world_motion};
 
 /// What post-processing keeps from frame to frame.
@@ -23,6 +24,8 @@ pub(super) struct PostState {
     pub(super) last: Option<Percepts>,
     /// The raw values of the last frame by channel, where changes say where fields on several links are touched.
     pub(super) raw_before: Vec<RawValue>,
+    /// Room for what taxels with three axes feel.
+    pub(super) pulls: Pulls,
 }
 
 /// The same of one field.
@@ -36,13 +39,18 @@ pub(super) struct PostFieldState {
     /// Whether the last frame was in contact, so that there is something to release.
     pub(super) contact: bool,
     /// What its letter measures, where the host makes it.
-    pub(super) window: Window,
+    pub(super) trend: Trend,
 }
 
 impl PostState {
     /// The state before the first frame.
     pub(super) fn initial(plan: &Plan) -> Self {
-        Self { fields: vec![PostFieldState::default(); plan.fields.len()], last: None, raw_before: Vec::new() }
+        Self {
+            fields: vec![PostFieldState::default(); plan.fields.len()],
+            last: None,
+            raw_before: Vec::new(),
+            pulls: Pulls::new(plan),
+        }
     }
 }
 
@@ -141,13 +149,14 @@ impl Post<'_> {
         if !own && self.cadence.is_none() {
             return;
         }
-        let (alone, mut now, mut quiet) = (std::slice::from_ref(frame), Now::default(), Quiet::default());
+        let (alone, mut now) = (std::slice::from_ref(frame), Now::default());
+        state.pulls.forget();
         for (number, field) in self.plan.fields.iter().enumerate() {
             let cell = index * self.plan.fields.len() + number;
             if !field.sensed.is_empty() {
                 let frames = self.frames(alone, raw, offset, &state.raw_before);
                 let of = Cell { plan: self.plan, field, frames, frame: index, step, sensed: self.sensed };
-                of.make(cell, percepts, (&mut now, &mut quiet), &mut state.fields[number].window);
+                of.make(cell, percepts, (&mut now, &mut state.pulls), &mut state.fields[number].trend);
                 continue;
             }
             if let Some(cadence) = self.cadence {

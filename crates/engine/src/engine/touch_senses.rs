@@ -1,23 +1,30 @@
 //! What touches are beside pressure: how they pull along the skin, and how warm they are.
 //!
-//! Σs, ‖Σs‖/ΣP and Σ(x − c) × s · n go over the taxels of a touch that have three axes and whose tangential forces are known, x being
-//! where they are on the body at rest, c the touch's position and n its normal. A touch is as warm as the mean of the taxels of
-//! temperature whose nearest pressure taxel on the same link is one of its taxels.
+//! Σs and Σ(x − c) × s · n go over the taxels of a touch that have three axes and whose tangential forces are known, x being
+//! where they are on the body at rest, c the mean of x by P and n the normal of the taxel at which the touch's chart is based. In
+//! that chart each s is turned by the smallest turn that takes its taxel's normal to the chart's; the friction is ‖Σs‖/ΣP of
+//! these. Tangential forces are a part of wrenches, too. A touch is as warm as the mean of the taxels of temperature whose nearest
+//! pressure taxel on the same link is one of its taxels.
 
 use std::collections::BTreeMap;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
-use super::letters::{tangential, tangential_gain};
+use super::pulls::{tangential, tangential_gain};
+use crate::backend::RawBatch;
 use crate::body::{Body, Modality};
-use crate::percept::{Flags, Touch, TouchFlags, TouchFrame};
+use crate::percept::{Flags, LinkShare, Touch, TouchFlags, TouchFrame, TouchOutputs};
 use crate::scene::Plan;
 use crate::signal::{Axis, Channel, RawValue, Reading};
-use crate::stage::force;
+use crate::stage::shear::ROUNDING;
+use crate::stage::{calibrate, force};
 use crate::touch::Skin;
 
 /// How far a taxel of temperature may be from its nearest pressure taxel, in widths of that one's cell.
 const REACH: f64 = 1.5;
+
+/// What touches have of tangential forces.
+const OF_PULLS: TouchOutputs = TouchOutputs::SHEAR.union(TouchOutputs::FRICTION_SIGMA).union(TouchOutputs::WRENCH);
 
 /// A pressure taxel with three axes, on the body at rest.
 #[derive(Clone, Debug)]
@@ -29,17 +36,42 @@ struct PulledTaxel {
     tangents_in_body: [DVec3; 2],
 }
 
+/// What such a taxel feels along the skin.
+#[derive(Clone, Copy, Debug)]
+struct Pull {
+    node: u32,
+    /// P > 0.
+    pressure: f64,
+    /// s on the body at rest.
+    shear: DVec3,
+    /// P for a raw unit of s.
+    gain: f64,
+}
+
+/// The frame of a call that touches are of.
+#[derive(Clone, Copy)]
+pub(super) struct Sensed<'a> {
+    pub(super) raw: &'a RawBatch<'a>,
+    /// Its number in `raw`.
+    pub(super) offset: usize,
+    /// The values that are read beside pressures.
+    pub(super) row: &'a [RawValue],
+    /// P by node.
+    pub(super) pressures: &'a [f64],
+}
+
 /// Finds them.
 #[derive(Debug)]
 pub(super) struct TouchSenses {
+    wanted: TouchOutputs,
     /// By node of the skin.
     pulled: Vec<Option<PulledTaxel>>,
     /// By node, the taxels of temperature nearest to it: place in the body, and where its value is.
     warm: BTreeMap<u32, Vec<[usize; 2]>>,
-    /// By node, where it is on the body at rest, and its normal.
-    nodes: Vec<[DVec3; 2]>,
     /// By link, turns directions of the body at rest into the link.
     link_from_body: Vec<DMat3>,
+    /// Memory: those of a touch.
+    pulls: Vec<Pull>,
 }
 
 impl TouchSenses {
@@ -75,64 +107,156 @@ impl TouchSenses {
         }
         let has_any = pulled.iter().any(Option::is_some) || !warm.is_empty();
         has_any.then(|| Self {
+            wanted: plan.touch_outputs().unwrap_or(TouchOutputs::empty()),
             pulled,
             warm,
-            nodes: skin.taxels().iter().map(|node| [node.position, node.normal]).collect(),
+            pulls: Vec::new(),
             link_from_body: body.links.iter().map(|link| link.body_from_link.matrix3.transpose()).collect(),
         })
     }
 
-    /// Puts them into the touches `found` of a frame, in the frames of their links. `row` has the values
-    /// that are read beside pressures, and `pressures` has P by node.
-    pub(super) fn add(&self, plan: &Plan, row: &[RawValue], pressures: &[f64], found: &mut TouchFrame) {
+    /// Whether touches need lists of their taxels for it.
+    pub(super) fn needs_taxels(&self) -> bool {
+        self.wanted.intersects(OF_PULLS) || !self.warm.is_empty()
+    }
+
+    /// Puts them into the touches `found` of a frame, in the frames of their links, and what pulls into their wrenches.
+    pub(super) fn add(&mut self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, found: &mut TouchFrame) {
         for index in 0..found.touches.len() {
             let nodes = found.taxels(&found.touches[index]);
-            let touch = &found.touches[index];
-            let felt = self.felt(plan, row, pressures, nodes, touch);
-            let temperature = self.temperature(plan, row, nodes);
+            let temperature = self.temperature(plan, sensed.row, nodes);
+            let mut flags = TouchFlags::empty();
+            self.pulls.clear();
+            if self.wanted.intersects(OF_PULLS) {
+                for &node in nodes {
+                    match self.pull(plan, sensed.row, (node, sensed.pressures[node as usize])) {
+                        Some(Ok(pull)) => self.pulls.push(pull),
+                        Some(Err(why)) => flags |= why,
+                        None => {}
+                    }
+                }
+            }
             let touch = &mut found.touches[index];
             touch.temperature_celsius = temperature;
-            touch.flags |= felt.flags;
-            if felt.pull > 0.0 {
-                let turn = self.link_from_body[touch.link as usize];
-                touch.shear = Some(turn * felt.shear);
-                touch.torsion = Some(felt.torsion);
-                touch.friction = Some(felt.shear.length() / felt.pull);
-                touch.force_vector_newton = felt.force.map(|force| turn * force);
+            touch.flags |= flags;
+            if self.pulls.is_empty() {
+                continue;
+            }
+            if self.wanted.contains(TouchOutputs::SHEAR) {
+                self.shear((plan, skin), touch);
+            }
+            if self.wanted.contains(TouchOutputs::FRICTION_SIGMA) {
+                touch.friction_sigma = touch.friction.and_then(|friction| self.friction_sigma(plan, sensed, friction));
+                if touch.friction_sigma.is_none() {
+                    touch.flags |= TouchFlags::NOISE_UNKNOWN;
+                }
+            }
+            if self.wanted.contains(TouchOutputs::WRENCH) {
+                let [from, to] = touch.links.map(|end| end as usize);
+                self.pulls.iter().for_each(|pull| add_to_wrench((plan, skin), pull, &mut found.links[from..to]));
             }
         }
     }
 
-    fn felt(&self, plan: &Plan, row: &[RawValue], pressures: &[f64], nodes: &[u32], touch: &Touch) -> Felt {
-        let mut felt = Felt { force: Some(DVec3::ZERO), ..Felt::default() };
-        let Some(by) = &plan.senses.shear else { return felt };
-        // The touch's place in the body: its chart's base is the taxel nearest to that.
-        let [_, outward] = self.nodes[touch.base as usize];
-        let known = || nodes.iter().filter_map(|&node| Some((node as usize, self.pulled[node as usize].as_ref()?)));
-        let pull: f64 = known().map(|(node, _)| pressures[node]).sum();
-        let middle = known().map(|(node, _)| pressures[node] * self.nodes[node][0]).sum::<DVec3>() / pull;
-        for (node, own) in known() {
-            let calibration = &plan.calibrations[node];
-            let gain = tangential_gain(by, own.taxel, calibration);
-            let values = own.values.map(|value| row[value]);
-            let [su, sv] = match tangential(by, own.taxel, gain, pressures[node], values) {
-                Ok(pulls) => pulls,
-                Err(why) => {
-                    felt.flags |=
-                        if why.contains(Flags::INCOMPLETE) { TouchFlags::INCOMPLETE } else { TouchFlags::FAULTY_INPUT };
-                    continue;
+    /// Adds what pulls at the `pressed` taxels to the wrenches of their links, of which `row` has the values that are read beside
+    /// pressures. A wrench of which a part is missing or faulty is absent, as nothing would say so.
+    pub(super) fn add_to_links(
+        &self,
+        (plan, skin): (&Plan, &Skin),
+        row: &[RawValue],
+        pressed: impl Iterator<Item = (u32, f64)>,
+        links: &mut [LinkShare],
+    ) {
+        for (node, pressure) in pressed {
+            match self.pull(plan, row, (node, pressure)) {
+                Some(Ok(pull)) => add_to_wrench((plan, skin), &pull, links),
+                Some(Err(_)) => {
+                    let link = skin.taxels()[node as usize].link;
+                    links.iter_mut().filter(|share| share.link == link).for_each(|share| share.wrench = None);
                 }
-            };
-            let [tu, tv] = own.tangents_in_body;
-            let [position, normal] = self.nodes[node];
-            let shear = su * tu + sv * tv;
-            felt.pull += pressures[node];
-            felt.shear += shear;
-            felt.torsion += (position - middle).cross(shear).dot(outward);
-            let newtons = force::newtons_per_p(calibration.quantity, plan.areas[node]);
-            felt.force = felt.force.zip(newtons).map(|(sum, each)| sum + each * (shear - pressures[node] * normal));
+                None => {}
+            }
         }
-        felt
+    }
+
+    /// What the taxel of `node` feels along the skin, pressed by P, if it has three axes; or why that is not known.
+    fn pull(&self, plan: &Plan, row: &[RawValue], (node, pressure): (u32, f64)) -> Option<Result<Pull, TouchFlags>> {
+        let by = plan.senses.shear.as_ref()?;
+        let own = self.pulled[node as usize].as_ref()?;
+        let calibration = &plan.calibrations[node as usize];
+        // Touches and fields refuse that; wrenches are then of normal forces.
+        if !by.has_gain(own.taxel, calibration.response) {
+            return None;
+        }
+        let gain = tangential_gain(by, own.taxel, calibration);
+        let values = own.values.map(|value| row.get(value).copied().unwrap_or(RawValue::MISSING));
+        let pulls = tangential(by, own.taxel, gain, pressure, values);
+        Some(match pulls {
+            Ok([su, sv]) => {
+                let [tu, tv] = own.tangents_in_body;
+                Ok(Pull { node, pressure, shear: su * tu + sv * tv, gain })
+            }
+            Err(why) if why.contains(Flags::INCOMPLETE) => Err(TouchFlags::INCOMPLETE),
+            Err(_) => Err(TouchFlags::FAULTY_INPUT),
+        })
+    }
+
+    /// What the taxels of `touch` that are pulled feel together.
+    fn shear(&self, (plan, skin): (&Plan, &Skin), touch: &mut Touch) {
+        let taxel = |pull: &Pull| &skin.taxels()[pull.node as usize];
+        let outward = skin.taxels()[touch.base as usize].normal;
+        let [u, v, up] = skin.chart_axes(touch.base, touch.link);
+        let total: f64 = self.pulls.iter().map(|pull| pull.pressure).sum();
+        let middle = self.pulls.iter().map(|pull| pull.pressure * taxel(pull).position).sum::<DVec3>() / total;
+        let (mut shear, mut torsion, mut size) = (DVec3::ZERO, 0.0, 0.0);
+        let (mut force, mut in_chart) = (Some(DVec3::ZERO), DVec3::ZERO);
+        for pull in &self.pulls {
+            let own = taxel(pull);
+            shear += pull.shear;
+            size += pull.shear.length();
+            torsion += (own.position - middle).cross(pull.shear).dot(outward);
+            in_chart += DQuat::from_rotation_arc(own.normal.normalize(), up) * pull.shear;
+            force = force.zip(newtons_per_p(plan, pull.node)).map(|(sum, newtons)| {
+                let along_normal = pull.pressure * own.normal;
+                sum + newtons * (pull.shear - along_normal)
+            });
+        }
+        let turn = self.link_from_body[touch.link as usize];
+        let friction = in_chart.length() / total;
+        touch.shear = Some(turn * shear);
+        // One taxel has no arm.
+        touch.torsion = (self.pulls.len() > 1).then_some(torsion);
+        touch.flags |= if self.pulls.len() > 1 { TouchFlags::empty() } else { TouchFlags::ONE_TAXEL };
+        touch.friction = Some(friction);
+        touch.slip_ratio = plan.senses.shear.as_ref().and_then(|by| by.slips_at).map(|slips_at| friction / slips_at);
+        touch.force_vector_newton = force.map(|force| turn * force);
+        if touch.flags.contains(TouchFlags::WRAPPED) {
+            return;
+        }
+        let [along_u, along_v] = [in_chart.dot(u), in_chart.dot(v)];
+        touch.shear_in_chart = Some([along_u, along_v]);
+        let is_still = along_u.hypot(along_v) <= ROUNDING * size;
+        touch.shear_direction_rad = (!is_still).then(|| libm::atan2(along_v, along_u));
+        touch.flags.set(TouchFlags::STILL, is_still);
+    }
+
+    /// The standard deviation of the friction, as stage *shear* has it; `None` where a taxel's noise is not known.
+    fn friction_sigma(&self, plan: &Plan, sensed: &Sensed<'_>, friction: f64) -> Option<f64> {
+        let first_slot = plan.touched_from.unwrap_or(0);
+        let (mut pull, mut of_pull, mut of_shear) = (0.0, 0.0, 0.0);
+        for own in &self.pulls {
+            let node = own.node as usize;
+            let calibration = &plan.calibrations[node];
+            let noise = calibration.noise?;
+            let number = sensed.raw.rows.value(sensed.offset, node).number()?;
+            let curve = plan.curve_of(first_slot + node);
+            pull += own.pressure;
+            of_pull += calibrate::sigma(number, noise, calibration, curve).powi(2);
+            let taxel = self.pulled[node].as_ref()?.taxel;
+            let along = plan.senses.shear.as_ref()?.noise_of(taxel).unwrap_or(noise);
+            of_shear += (own.gain * along).powi(2);
+        }
+        Some((of_shear + friction.powi(2) * of_pull).sqrt() / pull)
     }
 
     fn temperature(&self, plan: &Plan, row: &[RawValue], nodes: &[u32]) -> Option<f64> {
@@ -147,12 +271,21 @@ impl TouchSenses {
     }
 }
 
-/// What the taxels of a touch feel together, on the body at rest.
-#[derive(Default)]
-struct Felt {
-    pull: f64,
-    shear: DVec3,
-    torsion: f64,
-    force: Option<DVec3>,
-    flags: TouchFlags,
+/// N for each unit of P at `node`, where that is known.
+fn newtons_per_p(plan: &Plan, node: u32) -> Option<f64> {
+    force::newtons_per_p(plan.calibrations[node as usize].quantity, plan.areas[node as usize])
+}
+
+/// Adds what `pull` does to the wrench of its link among `links`, if that is known.
+fn add_to_wrench((plan, skin): (&Plan, &Skin), pull: &Pull, links: &mut [LinkShare]) {
+    let taxel = &skin.taxels()[pull.node as usize];
+    let share = links.iter_mut().find(|share| share.link == taxel.link);
+    let Some((wrench, newtons)) = share.and_then(|share| share.wrench.as_mut()).zip(newtons_per_p(plan, pull.node))
+    else {
+        return;
+    };
+    let link_from_body = skin.link_from_body(taxel.link);
+    let force = newtons * link_from_body.transform_vector3(pull.shear);
+    wrench.force_newton += force;
+    wrench.torque_newton_m += link_from_body.transform_point3(taxel.position).cross(force);
 }

@@ -11,15 +11,17 @@ bitflags! {
     pub struct Flags: u32 {
         /// The field is not in contact: everything that needs a touch is absent.
         const NO_CONTACT = 1 << 0;
-        /// Only one taxel is pressed: there is no line through two points, and no spread.
+        /// Only one taxel is pressed: there is no line through two points, no spread and no torsion.
         const ONE_TAXEL = 1 << 1;
         /// The second and third farthest points are as good as equally far (R₂ − R₃ ≤ 2⁻¹⁴ R₁): orientation is in doubt.
         const TIE = 1 << 2;
-        /// The points that would define a line fall together: orientation (or axis) is absent.
+        /// The points that would define a line fall together: orientation (or axis) is absent. Or taxels that would define a plane lie
+        /// in a line, or are under three: the gradient is absent.
         const COINCIDENT = 1 << 3;
         /// The pressure spreads equally in all directions (anisotropy under 10⁻³): the axis is absent.
         const ISOTROPIC = 1 << 4;
-        /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion.
+        /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion. Of letter shear:
+        /// nothing pulls along the skin, and there is no direction of shear.
         const STILL = 1 << 5;
         /// A pressed taxel is above its P_max; its value is kept.
         const SATURATED = 1 << 6;

@@ -54,6 +54,8 @@ bitflags! {
         const UNSURE = 1 << 19;
         /// It has had fits for less than 0.2 s without a gap as long: no velocity of the fit.
         const YOUNG_FIT = 1 << 20;
+        /// Its taxels have three axes, and nothing pulls along them: no direction of its shear.
+        const STILL = 1 << 21;
     }
 }
 
@@ -120,12 +122,20 @@ pub struct Touch {
     pub principal_axis_sigma_rad: Option<f64>,
     /// Σs over its taxels that have three axes, in the unit of P.
     pub shear: Option<DVec3>,
+    /// The same along u and v of the touch's chart, in the unit of P.
+    pub shear_in_chart: Option<[f64; 2]>,
+    /// The same as an angle in that chart, in (−π, π], rad.
+    pub shear_direction_rad: Option<f64>,
     /// The force on the skin by those taxels, normal and tangential, N.
     pub force_vector_newton: Option<DVec3>,
-    /// Σ(x − c) × s · n about its position, in the unit of P times m.
+    /// Σ(x − c) × s · n about the mean c of those taxels by P, in the unit of P times m.
     pub torsion: Option<f64>,
-    /// ‖Σs‖ / ΣP of those taxels.
+    /// ‖Σs‖ / ΣP of those taxels, each s turned into the touch's chart.
     pub friction: Option<f64>,
+    /// Standard deviation of that from the noise of the sensors; only on request.
+    pub friction_sigma: Option<f64>,
+    /// Friction over that at which it slips, where the calibration has it.
+    pub slip_ratio: Option<f64>,
     /// Mean of the temperature taxels that are nearest to its taxels, °C.
     pub temperature_celsius: Option<f64>,
     /// Whether its place and directions are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the frame carried a pose of its
@@ -198,14 +208,14 @@ pub struct LinkShare {
     pub link: u32,
     /// ΣP of the touch on it, in the unit of P.
     pub total: f64,
-    /// Force and torque on it, where they are known.
+    /// Force and torque on it, where they are known: of taxels with three axes tangential ones too, as far as these are.
     pub wrench: Option<Wrench>,
 }
 
 /// What presses on a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
-    /// Σ −PᵢAᵢnᵢ in the link's frame, N.
+    /// Σ Aᵢ(−Pᵢnᵢ + sᵢ) in the link's frame, N; s is 0 but of taxels with three axes.
     pub force_newton: DVec3,
     /// Σ xᵢ × Fᵢ about the link's origin in its frame, N m.
     pub torque_newton_m: DVec3,

@@ -136,14 +136,9 @@ impl Plan {
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
             ("fit", self.fits(), (self.channels(), 0), ""),
-            ("shear", senses.shear.is_some(), sensed(Receptor::Shear), "no taxel has three axes"),
-            (
-                "temperature",
-                senses.temperature.is_some(),
-                sensed(Receptor::Temperature),
-                "no taxel measures temperature",
-            ),
-            ("proximity", senses.proximity.is_some(), sensed(Receptor::Proximity), "no taxel measures proximity"),
+            ("shear", senses.shear.is_some(), sensed(Receptor::Shear), "no letter is `shear`"),
+            ("temperature", senses.temperature.is_some(), sensed(Receptor::Temperature), "no letter is `temperature`"),
+            ("proximity", senses.proximity.is_some(), sensed(Receptor::Proximity), "no letter is `proximity`"),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = match name {
@@ -185,6 +180,7 @@ impl Plan {
             "hysteresis" => "the calibration has thresholds",
             "centroid" | "position" => "later stages need it",
             "touches" => "of the whole body",
+            "shear" => "of touches, and in wrenches",
             _ => "others need it",
         }
     }

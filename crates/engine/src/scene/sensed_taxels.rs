@@ -108,7 +108,8 @@ impl SensedTaxels {
         let of_taxel = |(index, taxel): (usize, &crate::body::Taxel)| {
             let letter = [Receptor::Shear, Receptor::Temperature, Receptor::Proximity]
                 .into_iter()
-                .find(|receptor| receptor.reads(taxel.modality))?;
+                .find(|receptor| receptor.reads(taxel.modality))
+                .filter(|&receptor| plan.gives(receptor))?;
             let values = match letter {
                 Receptor::Shear => [Axis::U, Axis::V].map(|axis| place(taxel.id, axis)),
                 _ => [place(taxel.id, Axis::Normal); 2],
@@ -190,6 +191,6 @@ fn pulled(
         return (if is_missing { Reading::Missing } else { Reading::Faulty }, [0.0; 2]);
     };
     let gain = by.gain_of(taxel, calibration.gain, calibration.unit_factor);
-    let forces = by.forces(taxel, gain, own.value, [u, v]);
+    let forces = by.forces(by.rest_of(taxel), gain, own.value, [u, v]);
     (Reading::Value(libm::hypot(forces[0], forces[1]), true), forces)
 }

@@ -3,14 +3,16 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use glam::{DQuat, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use super::Scene;
 use crate::body::{Body, Taxel, listed};
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
 use crate::percept::{Column, Outputs, TouchOutputs};
-use crate::signal::{Axis, Calibration, Channel, Letter, Receptor, SenseCalibration, ShearCalibration};
+use crate::signal::{
+    Axis, Calibration, Channel, Letter, Receptor, SenseCalibration, ShearCalibration, TaxelCalibration,
+};
 
 /// What the host reads of raw values for a plan's letters.
 #[derive(Clone, Debug, Default)]
@@ -19,7 +21,19 @@ pub(crate) struct Senses {
     pub(crate) channels: Vec<usize>,
     pub(crate) temperature: Option<SenseCalibration>,
     pub(crate) proximity: Option<SenseCalibration>,
+    /// Of fields with that letter, and of touches.
     pub(crate) shear: Option<ShearCalibration>,
+    /// Whether touches have shear.
+    pulls_touches: bool,
+}
+
+/// What of the whole body is read for touches.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ForTouches {
+    /// Tangential forces: wrenches are made of them, whatever is asked for.
+    reads_pulls: bool,
+    gives_shear: bool,
+    gives_temperature: bool,
 }
 
 /// A taxel of a field in such a letter.
@@ -133,6 +147,25 @@ pub(super) fn letters_and_outputs(
     Ok((letters, given))
 }
 
+impl ForTouches {
+    /// For touches, if `scene` asks for them, beside fields in `letters`: whoever names letters has no others.
+    pub(super) fn new(body: &Body, scene: &Scene, letters: &[Letter], are_asked: bool) -> Self {
+        let has = |receptor: Receptor| are_asked && body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
+        let gives = |receptor: Receptor| {
+            let is_named = letters.iter().any(|letter| letter.receptor == receptor);
+            has(receptor) && (is_named || scene.letters.is_empty())
+        };
+        Self {
+            reads_pulls: has(Receptor::Shear),
+            gives_shear: gives(Receptor::Shear),
+            gives_temperature: gives(Receptor::Temperature),
+        }
+    }
+}
+
+/// What touches have of shear.
+const OF_SHEAR: TouchOutputs = TouchOutputs::SHEAR.union(TouchOutputs::FRICTION_SIGMA);
+
 fn is_or_are(names: &[String]) -> &'static str {
     if names.len() == 1 { "is" } else { "are" }
 }
@@ -161,53 +194,77 @@ fn without_pressure(scene: &Scene, outputs: Outputs) -> String {
 }
 
 impl Senses {
-    /// For `letters` of the fields `chosen`; with `touches_bring`, touches have what the body's taxels give them whatever the letters are.
+    /// For `letters` of the fields `chosen`, and for touches, which are anywhere on the body.
     pub(super) fn new(
         body: &Body,
         fields: &FieldSet,
         chosen: &[usize],
-        (letters, touches_bring): (&[Letter], bool),
+        letters: &[Letter],
         calibration: &Calibration,
+        for_touches: ForTouches,
     ) -> Self {
-        let is_of_touches = |receptor: Receptor| {
-            touches_bring
-                && matches!(receptor, Receptor::Shear | Receptor::Temperature)
-                && body.taxels.iter().any(|taxel| receptor.reads(taxel.modality))
-        };
-        let is_read =
-            |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor) || is_of_touches(receptor);
+        let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
         let [temperature, proximity, shear] =
             [Receptor::Temperature, Receptor::Proximity, Receptor::Shear].map(is_read);
-        if !(temperature || proximity || shear) {
+        let ForTouches { reads_pulls, gives_shear, gives_temperature } = for_touches;
+        if !(temperature || proximity || shear || reads_pulls || gives_temperature) {
             return Self::default();
         }
         let all = Channel::all_of(body);
         let place = |channel: Channel| all.binary_search(&channel.0).expect("it is a channel of the body");
         let mut channels = BTreeSet::new();
-        let of_fields = chosen.iter().flat_map(|&field| &fields.fields[field].members).map(|member| member.taxel);
-        // Touches are anywhere on the body.
-        let of_touches = (0..body.taxels.len()).filter(|&taxel| {
-            [Receptor::Shear, Receptor::Temperature]
-                .into_iter()
-                .any(|receptor| is_of_touches(receptor) && receptor.reads(body.taxels[taxel].modality))
-        });
-        for taxel in of_fields.chain(of_touches) {
+        let mut read = |taxel: usize, of: [(Receptor, bool); 3]| {
             let taxel = &body.taxels[taxel];
-            if shear && Receptor::Shear.reads(taxel.modality) {
-                channels.extend([Axis::U, Axis::V].map(|axis| place(Channel::of_taxel(taxel.id, axis))));
-            }
-            let is_sensed = (temperature && Receptor::Temperature.reads(taxel.modality))
-                || (proximity && Receptor::Proximity.reads(taxel.modality));
-            if is_sensed {
-                channels.insert(place(Channel::of_taxel(taxel.id, Axis::Normal)));
-            }
-        }
+            let Some((receptor, true)) = of.into_iter().find(|(receptor, _)| receptor.reads(taxel.modality)) else {
+                return;
+            };
+            let axes: &[Axis] = if receptor == Receptor::Shear { &[Axis::U, Axis::V] } else { &[Axis::Normal] };
+            channels.extend(axes.iter().map(|&axis| place(Channel::of_taxel(taxel.id, axis))));
+        };
+        let of_fields =
+            [(Receptor::Shear, shear), (Receptor::Temperature, temperature), (Receptor::Proximity, proximity)];
+        let of_touches =
+            [(Receptor::Shear, reads_pulls), (Receptor::Temperature, gives_temperature), (Receptor::Proximity, false)];
+        let members = chosen.iter().flat_map(|&field| &fields.fields[field].members);
+        members.for_each(|member| read(member.taxel, of_fields));
+        (0..body.taxels.len()).for_each(|taxel| read(taxel, of_touches));
         Self {
             channels: channels.into_iter().collect(),
-            temperature: temperature.then(|| calibration.temperature.clone()),
+            temperature: (temperature || gives_temperature).then(|| calibration.temperature.clone()),
             proximity: proximity.then(|| calibration.proximity.clone()),
-            shear: shear.then(|| calibration.shear.clone()),
+            shear: (shear || reads_pulls).then(|| calibration.shear.clone()),
+            pulls_touches: gives_shear,
         }
+    }
+
+    /// Refuses shear whose calibration does not say what it is made of: of the taxels `body_taxels`, which `calibrations` are of, one
+    /// has a curve and no gain for its tangential values; or `outputs` asks by name for the ratio to a friction that is not known.
+    /// Nothing is refused if only wrenches read them, not touches nor, by `of_fields`, fields.
+    pub(super) fn check_shear(
+        &self,
+        body: &Body,
+        (body_taxels, calibrations): (&[usize], &[TaxelCalibration]),
+        outputs: Outputs,
+        of_fields: bool,
+    ) -> Result<()> {
+        let Some(by) = self.shear.as_ref().filter(|_| of_fields || self.pulls_touches) else { return Ok(()) };
+        let lacks_gain = |taxel: usize, calibration: &TaxelCalibration| {
+            let has_axes = Receptor::Shear.reads(body.taxels[taxel].modality);
+            has_axes && !by.has_gain(taxel, calibration.response)
+        };
+        let found = body_taxels.iter().zip(calibrations).find(|&(&taxel, calibration)| lacks_gain(taxel, calibration));
+        if let Some((&taxel, _)) = found {
+            return Err(Error::usage(format!(
+                "taxel {} has a curve, which is of its normal force: give `gain` in [shear], the unit of P for a raw unit along the skin",
+                body.taxels[taxel].id
+            )));
+        }
+        if outputs.contains(Outputs::SLIP_RATIO) && !outputs.contains(Outputs::USUAL) && by.slips_at.is_none() {
+            return Err(Error::usage(
+                "`slip_ratio` is friction over that at which a touch slips: give `slips_at` in [shear] of the calibration",
+            ));
+        }
+        Ok(())
     }
 
     /// Refuses what is `asked` of touches by name and no letter gives. Whoever asks for everything gets what there is.
@@ -215,22 +272,20 @@ impl Senses {
         if asked == TouchOutputs::all() {
             return Ok(());
         }
-        let of_letters = [(TouchOutputs::SHEAR, Receptor::Shear), (TouchOutputs::TEMPERATURE, Receptor::Temperature)];
-        let lacking =
-            |(output, _): &(TouchOutputs, Receptor)| asked.contains(*output) && !self.of_touches().contains(*output);
-        match of_letters.into_iter().find(lacking) {
-            Some((_, receptor)) => {
-                let is_there = body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
-                let why = why_not(receptor, is_there);
-                Err(Error::usage(format!("`touches.{receptor}` is of letter `{receptor}`, {why}")))
+        let known = self.of_touches() | if self.pulls_touches { OF_SHEAR } else { TouchOutputs::empty() };
+        let of_letters = [(OF_SHEAR, Receptor::Shear), (TouchOutputs::TEMPERATURE, Receptor::Temperature)];
+        for (outputs, receptor) in of_letters {
+            if let Some(name) = (outputs & asked - known).names().next() {
+                let why = why_not(receptor, body.taxels.iter().any(|taxel| receptor.reads(taxel.modality)));
+                return Err(Error::usage(format!("`touches.{name}` is of letter `{receptor}`, {why}")));
             }
-            None => Ok(()),
         }
+        Ok(())
     }
 
     /// What touches have of these letters.
     pub(super) fn of_touches(&self) -> TouchOutputs {
-        let shear = self.shear.as_ref().map_or(TouchOutputs::empty(), |_| TouchOutputs::SHEAR);
+        let shear = if self.pulls_touches { TouchOutputs::SHEAR } else { TouchOutputs::empty() };
         let temperature = self.temperature.as_ref().map_or(TouchOutputs::empty(), |_| TouchOutputs::TEMPERATURE);
         shear | temperature
     }
@@ -259,11 +314,7 @@ impl Senses {
             let normal_in_anchor = anchor_from_link.transform_vector3(taxel.normal_in_link);
             let tangents_in_anchor = tangents_in_link.map(|tangent| anchor_from_link.transform_vector3(tangent));
             let tangents_in_chart = field.chart.as_ref().map_or([DVec2::ZERO; 2], |chart| {
-                let turn = DQuat::from_rotation_arc(normal_in_anchor.normalize(), chart.normal_in_anchor.normalize());
-                tangents_in_anchor.map(|tangent| {
-                    let tangent = turn * tangent;
-                    DVec2::new(tangent.dot(chart.u_in_anchor), tangent.dot(chart.v_in_anchor))
-                })
+                tangents_in_anchor.map(|tangent| chart.along(tangent, normal_in_anchor))
             });
             SensedMember {
                 taxel: member.taxel,

@@ -127,20 +127,32 @@ pub(crate) fn pressure(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>
     value_and_response(raw, taxel, curve).map(|(_, here)| over_dead_band(here, taxel))
 }
 
+/// The P and the flags of [`reference`] without a bound; P is 0 where `raw` cannot be used.
+pub(crate) fn pressure_and_flags(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> (f64, Flags) {
+    let value = match usable(raw, taxel) {
+        Ok(value) => value,
+        Err(flag) => return (0.0, flag),
+    };
+    let nothing = is_tiny(value);
+    let here = response(if nothing { 0.0 } else { value }, taxel, curve);
+    if here.abs() > HUGE {
+        return (0.0, Flags::FAULTY_INPUT);
+    }
+    let [low, high] = taxel.raw_range.map(f64::from);
+    let pressure = over_dead_band(here, taxel);
+    let mut flags = Flags::empty();
+    flags.set(Flags::OUT_OF_RANGE, value < low || value > high);
+    flags.set(Flags::FAULTY_INPUT, nothing || is_tiny(here));
+    flags.set(Flags::SATURATED, pressure > taxel.p_max);
+    (pressure, flags)
+}
+
 /// The raw value that counts, and the P that it has whatever the dead band; none where `raw` cannot be used.
 fn value_and_response(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> Option<(f64, f64)> {
     let value = usable(raw, taxel).ok()?;
     let value = if is_tiny(value) { 0.0 } else { value };
     let here = response(value, taxel, curve);
     (here.abs() <= HUGE).then_some((value, here))
-}
-
-/// Whether [`reference`] gives P = 0 and nothing to say, as for most taxels most of the time.
-pub(crate) fn is_quiet(raw: RawValue, taxel: &TaxelCalibration, curve: Table<'_>) -> bool {
-    let Ok(value) = usable(raw, taxel) else { return false };
-    let here = response(value, taxel, curve);
-    let [low, high] = taxel.raw_range.map(f64::from);
-    here <= taxel.dead_band && (low..=high).contains(&value) && here.abs() <= HUGE && !is_tiny(value) && !is_tiny(here)
 }
 
 fn over_dead_band(pressure: f64, taxel: &TaxelCalibration) -> f64 {
@@ -267,12 +279,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_quiet_has_no_pressure_and_nothing_to_say() {
+    fn pressures_and_flags_are_the_references_without_bounds() {
         let plain = TaxelCalibration {
             baseline: 10.0,
             gain: 0.5,
             dead_band: 2.0,
             raw_range: [0.0, 100.0],
+            p_max: 30.0,
             ..Default::default()
         };
         let masked = TaxelCalibration { mask: true, ..plain };
@@ -281,10 +294,10 @@ mod tests {
         let mut seen = [0; 2];
         for raw in numbers.chain(odd) {
             for taxel in [plain, masked, TaxelCalibration { gain: -0.5, ..plain }] {
-                let quiet = is_quiet(raw, &taxel, Table::default());
+                let (pressure, flags) = pressure_and_flags(raw, &taxel, Table::default());
                 let right = reference(raw, &taxel, Table::default());
-                assert_eq!(quiet, right.value == 0.0 && right.status == 0, "{raw:?} {right:?}");
-                seen[usize::from(quiet)] += 1;
+                assert_eq!((pressure, flags.bits()), (right.value, right.status & !UNUSABLE), "{raw:?} {right:?}");
+                seen[usize::from(right.value == 0.0 && right.status == 0)] += 1;
             }
         }
         assert!(seen.iter().all(|&count| count > 50), "{seen:?}");

@@ -2,10 +2,13 @@
 //!
 //! Over the pressed taxels, at x in the chart with weight w, normal part P > 0 and tangential force s = sᵤ t + sᵥ n × t: the sum
 //! s = Σ wᵢsᵢ, along u and v of the chart and as a vector in space; its direction; the torsion Σ wᵢ(xᵢ − c) × sᵢ · n about the
-//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A tangent
-//! comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost.
+//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP, along the chart where there is one; and the force on the skin,
+//! Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A taxel whose s is not known is in none of these but the force, with its normal
+//! part. A tangent comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost,
+//! as a sum in space loses it where the skin is curved.
 //!
-//! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend.
+//! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend. Each sum goes over the taxels once,
+//! the torsion as Σ wx × s − c × Σ ws, and sums in space are turned into the world link by link.
 //!
 //! **Sigma.** With σₛ and σₚ the standard deviations of s along its own direction and of Σ wP, both of independent noise, that of
 //! the friction f is √(σₛ² + f²σₚ²)/Σ wP.
@@ -13,66 +16,123 @@
 use glam::{DVec2, DVec3};
 
 /// A pressed taxel with its tangential force.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Pulled {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pulled<'a> {
     pub(crate) weight: f64,
     /// P > 0.
     pub(crate) pressure: f64,
-    /// Along u and v of the chart.
-    pub(crate) shear: DVec2,
-    /// In space.
-    pub(crate) shear_in_space: DVec3,
+    /// s along t and n × t.
+    pub(crate) shear: [f64; 2],
+    /// t and n × t along u and v of the chart.
+    pub(crate) tangents_in_chart: &'a [DVec2; 2],
+    /// t and n × t in space.
+    pub(crate) tangents: &'a [DVec3; 2],
     /// In space, outward.
     pub(crate) normal: DVec3,
     /// In the field's chart, m.
     pub(crate) place_m: DVec2,
     /// N for each unit of P, where that is known.
     pub(crate) newtons_per_p: Option<f64>,
-    /// Standard deviations of P and of a tangential force, where the noise is known.
-    pub(crate) sigmas: Option<[f64; 2]>,
 }
 
-/// What a field's shear is.
+/// What a field's shear is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Shear {
+pub(crate) struct Sums {
+    taxels: usize,
+    /// Σ wP.
+    pub(crate) pull: f64,
+    /// Σ ws along u and v of the chart.
     pub(crate) along_chart: DVec2,
-    pub(crate) in_space: DVec3,
-    /// Absent where nothing pulls.
-    pub(crate) direction: Option<f64>,
-    pub(crate) torsion: f64,
-    pub(crate) friction: f64,
-    pub(crate) friction_sigma: Option<f64>,
-    /// N, where it is known.
-    pub(crate) force: Option<DVec3>,
+    /// Σ wPx, and Σ wx × s · n.
+    moment: DVec2,
+    turn: f64,
+    /// Σ w(|sᵤ| + |sᵥ|): what the sums' rounding is a share of.
+    size: f64,
+    space: InSpace,
 }
 
-/// The share of Σ w‖s‖ under which a sum is the rounding of its terms, and has no direction.
-const ROUNDING: f64 = 1e-12;
+/// The sums that are vectors in space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct InSpace {
+    shear: DVec3,
+    force: DVec3,
+    /// For some taxel the force is not known.
+    lacks_force: bool,
+}
 
-/// What is right; `taxels` is not empty.
-pub(crate) fn reference(taxels: &[Pulled]) -> Shear {
-    let pull: f64 = taxels.iter().map(|taxel| taxel.weight * taxel.pressure).sum();
-    let along_chart: DVec2 = taxels.iter().map(|taxel| taxel.weight * taxel.shear).sum();
-    let in_space: DVec3 = taxels.iter().map(|taxel| taxel.weight * taxel.shear_in_space).sum();
-    let size: f64 = taxels.iter().map(|taxel| taxel.weight * taxel.shear.length()).sum();
-    let centroid = taxels.iter().map(|taxel| taxel.weight * taxel.pressure * taxel.place_m).sum::<DVec2>() / pull;
-    let torsion = taxels.iter().map(|taxel| taxel.weight * (taxel.place_m - centroid).perp_dot(taxel.shear)).sum();
-    let friction = in_space.length() / pull;
-    let force = taxels.iter().try_fold(DVec3::ZERO, |sum, taxel| {
-        Some(sum + taxel.newtons_per_p? * (taxel.shear_in_space - taxel.pressure * taxel.normal))
-    });
-    let variances = taxels.iter().try_fold([0.0; 2], |[of_pull, of_shear], taxel| {
-        let [pressure, shear] = taxel.sigmas?.map(|sigma| (taxel.weight * sigma).powi(2));
-        Some([of_pull + pressure, of_shear + shear])
-    });
-    Shear {
-        along_chart,
-        in_space,
-        direction: (along_chart.length() > ROUNDING * size).then(|| along_chart.to_angle()),
-        torsion,
-        friction,
-        friction_sigma: variances.map(|[of_pull, of_shear]| (of_shear + friction.powi(2) * of_pull).sqrt() / pull),
-        force,
+/// The share of [`Sums::size`] that raw values' own rounding to single precision may make of a sum: up to it there is no direction.
+pub(crate) const ROUNDING: f64 = 1.0 / (1_u32 << 24) as f64;
+
+impl Sums {
+    #[inline]
+    pub(crate) fn add(&mut self, taxel: &Pulled<'_>) {
+        let &Pulled { weight, pressure, shear: [su, sv], tangents_in_chart, tangents, normal, place_m, .. } = taxel;
+        let pull = weight * pressure;
+        let along_chart = weight * (su * tangents_in_chart[0] + sv * tangents_in_chart[1]);
+        let in_space = su * tangents[0] + sv * tangents[1];
+        self.taxels += 1;
+        self.pull += pull;
+        self.along_chart += along_chart;
+        self.moment += pull * place_m;
+        self.turn += place_m.perp_dot(along_chart);
+        self.size += weight * (su.abs() + sv.abs());
+        self.space.shear += weight * in_space;
+        match taxel.newtons_per_p {
+            Some(newtons) => self.space.force += newtons * (in_space - pressure * normal),
+            None => self.space.lacks_force = true,
+        }
+    }
+
+    /// Adds a taxel whose tangential force is not known: its normal force is in the force alone. `taxel.shear` does not count.
+    pub(crate) fn add_normal(&mut self, taxel: &Pulled<'_>) {
+        match taxel.newtons_per_p {
+            Some(newtons) => self.space.force -= newtons * taxel.pressure * taxel.normal,
+            None => self.space.lacks_force = true,
+        }
+    }
+
+    /// Takes in what `other` sums up, whose space `turn` turns into this one's.
+    pub(crate) fn join(&mut self, other: &Self, turn: impl Fn(DVec3) -> DVec3) {
+        self.taxels += other.taxels;
+        self.pull += other.pull;
+        self.along_chart += other.along_chart;
+        self.moment += other.moment;
+        self.turn += other.turn;
+        self.size += other.size;
+        self.space.shear += turn(other.space.shear);
+        self.space.force += turn(other.space.force);
+        self.space.lacks_force |= other.space.lacks_force;
+    }
+
+    /// Σ ws in space.
+    pub(crate) fn in_space(&self) -> DVec3 {
+        self.space.shear
+    }
+
+    /// N, where it is known.
+    pub(crate) fn force(&self) -> Option<DVec3> {
+        (!self.space.lacks_force).then_some(self.space.force)
+    }
+
+    /// Of Σ ws in the chart; absent where nothing pulls.
+    pub(crate) fn direction(&self) -> Option<f64> {
+        (self.along_chart.length() > ROUNDING * self.size).then(|| self.along_chart.to_angle())
+    }
+
+    /// Absent where one taxel is pressed: it has no arm.
+    pub(crate) fn torsion(&self) -> Option<f64> {
+        (self.taxels > 1).then(|| self.turn - (self.moment / self.pull).perp_dot(self.along_chart))
+    }
+
+    /// Of a field that has a chart if it is `charted`.
+    pub(crate) fn friction(&self, charted: bool) -> f64 {
+        let size = if charted { self.along_chart.length() } else { self.space.shear.length() };
+        size / self.pull
+    }
+
+    /// The standard deviation of `friction`, from the variances of Σ wP and of Σ ws along its direction.
+    pub(crate) fn friction_sigma(&self, friction: f64, [of_pull, of_shear]: [f64; 2]) -> f64 {
+        (of_shear + friction.powi(2) * of_pull).sqrt() / self.pull
     }
 }
 
@@ -80,55 +140,89 @@ pub(crate) fn reference(taxels: &[Pulled]) -> Shear {
 mod tests {
     use super::*;
 
-    fn at(u: f64, v: f64, pressure: f64, shear: [f64; 2]) -> Pulled {
-        let [x, y] = shear;
+    const PLANE: ([DVec2; 2], [DVec3; 2]) = ([DVec2::X, DVec2::Y], [DVec3::X, DVec3::Y]);
+
+    fn at(u: f64, v: f64, pressure: f64, shear: [f64; 2]) -> Pulled<'static> {
         Pulled {
             weight: 1.0,
             pressure,
-            shear: DVec2::from_array(shear),
-            shear_in_space: DVec3::new(x, y, 0.0),
+            shear,
+            tangents_in_chart: &PLANE.0,
+            tangents: &PLANE.1,
             normal: DVec3::Z,
             place_m: DVec2::new(u, v),
             newtons_per_p: Some(1.0),
-            sigmas: Some([0.1, 0.2]),
         }
+    }
+
+    fn sums_of(taxels: &[Pulled<'_>]) -> Sums {
+        let mut sums = Sums::default();
+        taxels.iter().for_each(|taxel| sums.add(taxel));
+        sums
     }
 
     #[test]
     fn a_drag_has_its_direction_and_no_torsion() {
-        let taxels = [at(0.0, 0.0, 2.0, [0.6, 0.8]), at(0.01, 0.0, 2.0, [0.6, 0.8])];
-        let shear = reference(&taxels);
-        assert!((shear.along_chart - DVec2::new(1.2, 1.6)).length() < 1e-15);
-        assert!((shear.direction.unwrap() - 0.8_f64.atan2(0.6)).abs() < 1e-15);
-        assert!(shear.torsion.abs() < 1e-15 && (shear.friction - 0.5).abs() < 1e-15);
-        assert!((shear.force.unwrap() - DVec3::new(1.2, 1.6, -4.0)).length() < 1e-15);
-        // σₛ² = 2 · 0.04, σₚ² = 2 · 0.01.
+        let sums = sums_of(&[at(0.0, 0.0, 2.0, [0.6, 0.8]), at(0.01, 0.0, 2.0, [0.6, 0.8])]);
+        assert!((sums.along_chart - DVec2::new(1.2, 1.6)).length() < 1e-15);
+        assert!((sums.direction().unwrap() - 0.8_f64.atan2(0.6)).abs() < 1e-15);
+        assert!(sums.torsion().unwrap().abs() < 1e-15 && (sums.friction(true) - 0.5).abs() < 1e-15);
+        assert!((sums.force().unwrap() - DVec3::new(1.2, 1.6, -4.0)).length() < 1e-15);
+        // With σ = 0.1 of each P and 0.2 of each s, σₛ² = 2 · 0.04 and σₚ² = 2 · 0.01.
         let sigma = (0.08_f64 + 0.25 * 0.02).sqrt() / 4.0;
-        assert!((shear.friction_sigma.unwrap() - sigma).abs() < 1e-15);
+        assert!((sums.friction_sigma(0.5, [0.02, 0.08]) - sigma).abs() < 1e-15);
     }
 
     #[test]
     fn a_twist_has_a_torsion_by_its_sense_and_no_direction() {
+        // About a middle that is not the chart's.
         let ring = |sense: f64| {
             let corner = |i: i32| {
                 let angle = f64::from(i) * std::f64::consts::FRAC_PI_2;
                 let (sin, cos) = angle.sin_cos();
-                at(0.01 * cos, 0.01 * sin, 1.0, [-sense * sin, sense * cos])
+                at(0.3 + 0.01 * cos, 0.01 * sin - 0.2, 1.0, [-sense * sin, sense * cos])
             };
-            reference(&(0..4).map(corner).collect::<Vec<_>>())
+            sums_of(&(0..4).map(corner).collect::<Vec<_>>())
         };
         let left = ring(1.0);
-        assert!((left.torsion - 0.04).abs() < 1e-15 && (ring(-1.0).torsion + 0.04).abs() < 1e-15);
-        assert!(left.direction.is_none() && left.friction < 1e-15);
+        assert!((left.torsion().unwrap() - 0.04).abs() < 1e-15 && (ring(-1.0).torsion().unwrap() + 0.04).abs() < 1e-15);
+        assert!(left.direction().is_none() && left.friction(true) < 1e-15);
+    }
+
+    #[test]
+    fn parts_are_turned_and_joined() {
+        let (one, other) = (at(0.0, 0.0, 2.0, [0.6, 0.8]), at(0.01, 0.02, 1.0, [0.3, -0.1]));
+        let mut sums = Sums::default();
+        sums.join(&sums_of(&[one]), |vector| DVec3::new(-vector.y, vector.x, vector.z));
+        sums.join(&sums_of(&[other]), |vector| vector);
+        assert!((sums.in_space() - DVec3::new(-0.8 + 0.3, 0.6 - 0.1, 0.0)).length() < 1e-15);
+        assert!((sums.force().unwrap() - DVec3::new(-0.5, 0.5, -3.0)).length() < 1e-15);
+        let whole = sums_of(&[one, other]);
+        assert!(
+            (sums.torsion().unwrap() - whole.torsion().unwrap()).abs() < 1e-15 && sums.along_chart == whole.along_chart
+        );
     }
 
     #[test]
     fn what_is_not_known_of_a_taxel_is_not_known_of_the_sum() {
-        let taxels = [
-            at(0.0, 0.0, 2.0, [0.6, 0.8]),
-            Pulled { newtons_per_p: None, sigmas: None, ..at(0.01, 0.0, 2.0, [0.6, 0.8]) },
-        ];
-        let shear = reference(&taxels);
-        assert!(shear.force.is_none() && shear.friction_sigma.is_none() && shear.direction.is_some());
+        let taxels = [at(0.0, 0.0, 2.0, [0.6, 0.8]), Pulled { newtons_per_p: None, ..at(0.01, 0.0, 2.0, [0.6, 0.8]) }];
+        let sums = sums_of(&taxels);
+        assert!(sums.force().is_none() && sums.direction().is_some());
+        let mut half_known = sums_of(&taxels[..1]);
+        half_known.add_normal(&at(0.02, 0.0, 3.0, [9.0, 9.0]));
+        assert!((half_known.force().unwrap() - DVec3::new(0.6, 0.8, -5.0)).length() < 1e-15 && half_known.pull == 2.0);
+        assert!(sums_of(&taxels[..1]).torsion().is_none(), "one taxel has no arm");
+    }
+
+    #[test]
+    fn a_drag_around_a_limb_has_the_friction_of_each_of_its_taxels() {
+        let turns = [-1.0, 0.0, 1.0_f64];
+        let tangents = turns.map(|turn| [DVec3::new(turn.cos(), 0.0, -turn.sin()), DVec3::Y]);
+        let tilted = |(turn, tangents)| Pulled { tangents, ..at(0.03 * turn, 0.0, 2.0, [1.0, 0.0]) };
+        let sums = sums_of(&turns.into_iter().zip(&tangents).map(tilted).collect::<Vec<_>>());
+        assert!((sums.friction(true) - 0.5).abs() < 1e-15);
+        // Without a chart it is that of what is left in space.
+        let left = (1.0 + 2.0 * 1.0_f64.cos()) / 6.0;
+        assert!((sums.friction(false) - left).abs() < 1e-15 && left < 0.4);
     }
 }

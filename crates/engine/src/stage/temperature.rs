@@ -22,10 +22,14 @@ const IN_A_LINE: f64 = 1e-6;
 
 /// Σ wT/Σ w, °C; `taxels` is not empty.
 pub(crate) fn mean(taxels: &[Warm]) -> f64 {
-    let [sum, weights] = taxels
-        .iter()
-        .fold([0.0; 2], |[sum, weights], taxel| [sum + taxel.weight * taxel.celsius, weights + taxel.weight]);
-    sum / weights
+    mean_of(taxels.iter().map(|taxel| [taxel.weight, taxel.celsius])).unwrap_or_default()
+}
+
+/// The same of weights and temperatures, if there are any.
+pub(crate) fn mean_of(taxels: impl Iterator<Item = [f64; 2]>) -> Option<f64> {
+    let [sum, weights] =
+        taxels.fold([0.0; 2], |[sum, weights], [weight, celsius]| [sum + weight * celsius, weights + weight]);
+    (weights > 0.0).then(|| sum / weights)
 }
 
 /// The taxel that is first by `goes_before` of two temperatures; the earlier of equal ones.

@@ -1,4 +1,7 @@
 //! How fast a value changes: the slope of the line of least squares through what it was over a window of time.
+//!
+//! Where the value is made of several members, only what members that are there before and after tell moves it: one that is
+//! lost for a while would else look like motion.
 
 use std::collections::VecDeque;
 
@@ -20,7 +23,8 @@ impl Window {
         self.samples.clear();
     }
 
-    /// Takes `value` at `t_s`; gives the slope, per second, over the last `window_s`, where samples span enough of it.
+    /// Takes `value` at `t_s`; gives the slope, per second, over the last `window_s`, where samples span enough of it: from the last
+    /// sample on that is as old, so that slow frames have a slope too.
     ///
     /// The last sample is the newest value, whatever the distance to the one before: that is replaced until it lies far enough
     /// from its own predecessor. So the slope is the same however frames are cut into calls.
@@ -34,7 +38,7 @@ impl Window {
             self.samples.pop_back();
         }
         self.samples.push_back([t_s, value]);
-        while self.samples.front().is_some_and(|&[first, _]| t_s - first > window_s * (1.0 + 1e-9)) {
+        while self.samples.get(1).is_some_and(|&[second, _]| t_s - second >= window_s * (1.0 - 1e-9)) {
             self.samples.pop_front();
         }
         let span_s = t_s - self.samples.front()?[0];
@@ -58,9 +62,87 @@ impl Window {
     }
 }
 
+/// A value that is made of the values of several members, over a window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Trend {
+    window: Window,
+    /// What the value would be now if all members had been there all the time.
+    level: f64,
+    /// By member, what it was when the value was known last.
+    before: Vec<Option<f64>>,
+}
+
+impl Trend {
+    /// Forgets everything.
+    pub(crate) fn clear(&mut self) {
+        self.window.clear();
+        self.before.clear();
+    }
+
+    /// Takes what the members are at `t_s`, `None` where one has no value; `value_of` makes the value of some of them, by member, if
+    /// there is one. Gives its slope, per second, over the last `window_s`, where samples span enough of it.
+    pub(crate) fn take(
+        &mut self,
+        t_s: f64,
+        now: &[Option<f64>],
+        window_s: f64,
+        value_of: impl Fn(&mut dyn Iterator<Item = (usize, f64)>) -> Option<f64>,
+    ) -> Option<f64> {
+        let both = || {
+            now.iter()
+                .zip(&self.before)
+                .enumerate()
+                .filter_map(|(member, (now, before))| Some((member, (*now)?, (*before)?)))
+        };
+        let was = value_of(&mut both().map(|(member, _, before)| (member, before)));
+        let is = value_of(&mut both().map(|(member, now, _)| (member, now)));
+        match (was, is) {
+            (Some(was), Some(is)) => self.level += is - was,
+            _ => {
+                self.window.clear();
+                self.level = value_of(&mut now.iter().enumerate().filter_map(|(member, now)| Some((member, (*now)?))))?;
+            }
+        }
+        self.before.clear();
+        self.before.extend(now);
+        self.window.take(t_s, self.level, window_s)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn mean(members: &mut dyn Iterator<Item = (usize, f64)>) -> Option<f64> {
+        let [sum, count] = members.fold([0.0; 2], |[sum, count], (_, value)| [sum + value, count + 1.0]);
+        (count > 0.0).then(|| sum / count)
+    }
+
+    #[test]
+    fn a_member_that_is_lost_for_a_while_does_not_move_the_value() {
+        let mut trend = Trend::default();
+        for frame in 0..199 {
+            let t_s = 0.01 * f64::from(frame);
+            // One of them is 30 K warmer, and lost now and then.
+            let warm = (frame % 7 != 3).then_some(50.0 + 2.0 * t_s);
+            let slope = trend.take(t_s, &[Some(20.0 + 2.0 * t_s), warm], 0.5, mean);
+            assert!(
+                slope.is_none_or(|slope| (slope - 2.0).abs() < 1e-9) && slope.is_some() == (frame >= 25),
+                "{slope:?}"
+            );
+        }
+        // Where no member stays, nothing is known of what was before.
+        assert!(trend.take(1.99, &[None, Some(54.0)], 0.5, mean).is_some());
+        assert_eq!(trend.take(2.0, &[Some(24.0), None], 0.5, mean), None);
+    }
+
+    #[test]
+    fn slow_frames_have_the_slope_from_one_to_the_next() {
+        let mut window = Window::default();
+        assert_eq!(window.take(0.0, 1.0, 0.1), None);
+        assert!((window.take(0.2, 2.0, 0.1).unwrap() - 5.0).abs() < 1e-12);
+        assert_eq!(window.take(0.4, 2.0, 0.1), Some(0.0));
+    }
 
     #[test]
     fn a_line_has_its_slope_once_half_the_window_is_there() {

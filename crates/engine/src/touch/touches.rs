@@ -166,8 +166,7 @@ impl Touches {
     }
 
     /// Puts into `out`, in place of what it holds, the sum and the wrench of all pressed taxels of the last frame by link, in the
-    /// body's order, whatever touches they are of: what a controller takes off what it measures. A wrench is absent where a
-    /// taxel's force is unknown.
+    /// body's order, whatever touches they are of. A wrench is of the forces along the normals, and absent where one is unknown.
     pub fn on_links(&self, out: &mut Vec<LinkShare>) {
         let felt = Felt {
             skin: &self.skin,
@@ -178,6 +177,11 @@ impl Touches {
         };
         out.clear();
         add_links(&felt, &self.pressed, out);
+    }
+
+    /// The pressed taxels of the last frame, as ascending nodes, and P of each.
+    pub(crate) fn pressed(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.pressed.iter().map(|&node| (node, self.pressures[node as usize]))
     }
 
     /// Takes the pressures of a frame.

@@ -17,6 +17,13 @@ pub struct Unrolled {
 }
 
 impl Skin {
+    /// +u, +v and the normal of the chart that is based at `base`, whose u is that of `link`, on the body at rest.
+    pub(crate) fn chart_axes(&self, base: u32, link: u32) -> [DVec3; 3] {
+        let normal = self.taxel(base).mean_normal;
+        let [u, v] = chart::directions(normal, self.axes_of(link));
+        [u, v, normal]
+    }
+
     /// The taxels `nodes` in the chart that is based at `base`, whose u is that of `link`; those on the other side of a limb, over 120°
     /// from the base, are left out.
     #[must_use]

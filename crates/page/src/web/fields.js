@@ -106,12 +106,13 @@ export class Fields {
     row.style.setProperty("--depth", String(depth));
     row.tabIndex = -1;
     row.setAttribute("role", "treeitem");
-    row.title = field?.name ?? "";
+    row.title = field?.label ?? "";
     const caret = make("span", "caret", parent ? (open ? "▾" : "▸") : "");
     const bar = make("span", "field-bar");
     const value = make("span", "field-value");
     const dot = make("i", "field-dot");
-    const name = make("span", "field-name", field?.label ?? "");
+    // The list is of the letter that is chosen above it.
+    const name = make("span", "field-name", field?.name ?? "");
     row.append(bar, caret, dot, name, value);
     const entry = {
       row,

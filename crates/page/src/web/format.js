@@ -28,7 +28,8 @@ export function short(x) {
 export function scaleFor(unit, size, quantity) {
   switch (unit === "P" ? quantity : unit) {
     case "m":
-      return size > 0 && size < 1e-4 ? { factor: 1e6, unit: "µm" } : { factor: 1e3, unit: "mm" };
+      // The least distance that is told, 0.1 mm, is a little less in single precision.
+      return size > 0 && size < 9.9e-5 ? { factor: 1e6, unit: "µm" } : { factor: 1e3, unit: "mm" };
     case "m²":
       return size >= 1e-2 ? { factor: 1e4, unit: "cm²" } : { factor: 1e6, unit: "mm²" };
     case "m/s":

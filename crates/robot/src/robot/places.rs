@@ -3,16 +3,19 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::messages::{Float32MultiArray, Message as _, PointCloud2, PointField};
-use crate::body::{Body, Taxel};
+use crate::body::{Body, Modality, Taxel};
 use crate::error::{Error, Result, failed};
 use crate::signal::{Axis, Channel, Frame, FrameTime, RawValue};
 
 /// The types of messages that frames are read from.
 pub(super) const FRAME_TYPES: [&str; 2] = [PointCloud2::TYPE, Float32MultiArray::TYPE];
 /// Fields of a point that are its raw value, the first that is there; and those that are its taxel's id. Of a taxel with three axes the
-/// tangential ones are called as the raw value with `_u` and `_v`, or `force_u` and `force_v`.
+/// tangential ones are called as the raw value with `_u` and `_v`, or `force_u` and `force_v`. Taxels of other kinds have a field of their
+/// own where there is one: °C, and mm, as values without a calibration are.
 const VALUE_FIELDS: [&str; 5] = ["value", "raw", "force", "pressure", "intensity"];
 const ID_FIELDS: [&str; 2] = ["taxel", "id"];
+const TEMPERATURE_FIELD: &str = "temperature";
+const DISTANCE_FIELD: &str = "distance_mm";
 
 /// That messages of the type `kind` are not frames.
 pub(super) fn not_read(kind: &str) -> Error {
@@ -27,7 +30,8 @@ pub(super) struct Places {
     /// The channels of a frame: first the taxels' own, in the body's order.
     ids: Vec<u32>,
     index_of: HashMap<u32, usize>,
-    /// By taxel, where its tangential values are, if it has three axes.
+    /// By taxel, what it measures, and where its tangential values are, if it has three axes.
+    kinds: Vec<Modality>,
     tangential: Vec<Option<[usize; 2]>>,
     /// By link, its taxels in the body's order.
     of_link: BTreeMap<String, Vec<usize>>,
@@ -52,13 +56,14 @@ impl Places {
         let place = |id: u32, axis: Axis| index_of.get(&Channel::of_taxel(id, axis).0).copied();
         let both = |taxel: &Taxel| Some([place(taxel.id, Axis::U)?, place(taxel.id, Axis::V)?]);
         let tangential = body.taxels.iter().map(both).collect();
+        let kinds = body.taxels.iter().map(|taxel| taxel.modality).collect();
         let mut side_by_side = ids.clone();
         Channel::side_by_side(&mut side_by_side);
         let side_by_side = side_by_side.iter().map(|id| index_of[id]).collect();
         let frames = body.links.iter().map(|link| link.name.clone()).collect();
         let all = (0..body.taxels.len()).collect();
         let body = body.name.clone();
-        Self { all, side_by_side, ids, index_of, tangential, of_link, body, frames, notices: Vec::new() }
+        Self { all, side_by_side, ids, index_of, kinds, tangential, of_link, body, frames, notices: Vec::new() }
     }
 
     /// The channels of a frame's values, in their order: all of the body.
@@ -100,10 +105,13 @@ impl Places {
             self.look_at_frame(&cloud.header.frame_id);
         }
         let mut put = |taxel: usize, point: usize| {
-            put(taxel, RawValue::new(points_of.value.at(point)));
+            match points_of.own_column(self.kinds[taxel]) {
+                Some(column) => column.value_if_there(point).into_iter().for_each(|value| put(taxel, value)),
+                None => put(taxel, RawValue::new(points_of.value.at(point))),
+            }
             if let (Some(columns), Some(places)) = (&points_of.tangential, self.tangential[taxel]) {
                 for (column, place) in columns.iter().zip(places) {
-                    put(place, RawValue::new(column.at(point)));
+                    column.value_if_there(point).into_iter().for_each(|value| put(place, value));
                 }
             }
         };
@@ -188,18 +196,31 @@ struct Points<'a> {
     value: Column<'a>,
     /// Along u and v.
     tangential: Option<[Column<'a>; 2]>,
+    temperature: Option<Column<'a>>,
+    distance: Option<Column<'a>>,
 }
 
 impl<'a> Points<'a> {
     /// Of `cloud`, whose field `value` is the raw value.
     fn new(cloud: &'a PointCloud2, value: &'a PointField) -> Result<Self> {
-        let named = |name: String| cloud.fields.iter().find(|field| field.name == name);
-        let both = |stem: &str| Some([named(format!("{stem}_u"))?, named(format!("{stem}_v"))?]);
+        let named = |name: &str| cloud.fields.iter().find(|field| field.name == name);
+        let both = |stem: &str| Some([named(&format!("{stem}_u"))?, named(&format!("{stem}_v"))?]);
+        let column = |name: &str| named(name).map(|field| Column::new(cloud, field)).transpose();
         let tangential = match both(&value.name).or_else(|| both("force")) {
             Some([u, v]) => Some([Column::new(cloud, u)?, Column::new(cloud, v)?]),
             None => None,
         };
-        Ok(Self { value: Column::new(cloud, value)?, tangential })
+        let [temperature, distance] = [TEMPERATURE_FIELD, DISTANCE_FIELD].map(column);
+        Ok(Self { value: Column::new(cloud, value)?, tangential, temperature: temperature?, distance: distance? })
+    }
+
+    /// The field that taxels of `kind` have in place of the raw value.
+    fn own_column(&self, kind: Modality) -> Option<&Column<'a>> {
+        match kind {
+            Modality::Temperature => self.temperature.as_ref(),
+            Modality::Proximity => self.distance.as_ref(),
+            _ => None,
+        }
     }
 }
 
@@ -251,6 +272,11 @@ impl<'a> Column<'a> {
             cloud.data.len(),
             field.name
         ))
+    }
+
+    /// The value of a field that not every point has; NaN stands for none.
+    fn value_if_there(&self, point: usize) -> Option<RawValue> {
+        Some(self.at(point)).filter(|number| !number.is_nan()).map(RawValue::new)
     }
 
     fn at(&self, point: usize) -> f64 {
@@ -393,6 +419,39 @@ mod tests {
         array.data.truncate(2);
         let why = places.array(&array, 0.0.into(), &mut frame).unwrap_err().to_string();
         assert!(why.contains("3 taxels; send one for each, or 7 with all axes"), "{why}");
+    }
+
+    #[test]
+    fn taxels_of_other_kinds_have_fields_of_their_own() {
+        let body = Body::from_bytes("hand", bundled::SENSING_HAND).unwrap();
+        let mut places = Places::new(&body);
+        let of = |kind: Modality| body.taxels.iter().position(|taxel| taxel.modality == kind).unwrap();
+        let kinds = [Modality::Force3, Modality::Temperature, Modality::Proximity];
+        let own = kinds.map(of);
+        let mut data = Vec::new();
+        for (index, taxel) in own.into_iter().enumerate() {
+            data.extend_from_slice(&body.taxels[taxel].id.to_le_bytes());
+            // Each has what is its own, and the pressed one nothing along v.
+            let numbers = [
+                [7.5, 0.5, f32::NAN, f32::NAN, f32::NAN],
+                [f32::NAN, f32::NAN, f32::NAN, 36.5, f32::NAN],
+                [f32::NAN, f32::NAN, f32::NAN, f32::NAN, 12.0],
+            ];
+            numbers[index].iter().for_each(|number| data.extend_from_slice(&number.to_le_bytes()));
+        }
+        let names = ["taxel", "pressure", "pressure_u", "pressure_v", "temperature", "distance_mm"];
+        let mut fields: Vec<(&str, u32, u8)> =
+            names.iter().enumerate().map(|(at, name)| (*name, 4 * at as u32, if at == 0 { 6 } else { 7 })).collect();
+        let frame = read(&mut places, &cloud("palm", &fields, 24, data.clone())).unwrap();
+        assert_eq!(own.map(|taxel| frame.values[taxel].number()), [7.5, 36.5, 12.0].map(Some));
+        let [u, v] = places.tangential[own[0]].unwrap();
+        assert_eq!(frame.values[u].number(), Some(0.5));
+        assert!(frame.values[v].is_missing());
+        assert_eq!(frame.values.iter().filter(|value| !value.is_missing()).count(), 4);
+        // Without those fields the raw value is that of all taxels, and NaN is not a number.
+        fields.truncate(4);
+        let frame = read(&mut places, &cloud("palm", &fields, 24, data)).unwrap();
+        assert_eq!(frame.values[own[1]], RawValue::FAULTY);
     }
 
     #[test]

@@ -54,7 +54,7 @@ use std::time::{Duration, Instant};
 use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::percept::{Outputs, Percepts};
-use crate::scene::{Plan, PlannedField};
+use crate::scene::{Plan, PlannedField, SensedTaxels, SensedValue};
 use crate::signal::{BoardHealth, Frame, RawValue, Wiring};
 
 /// Something that takes percepts.
@@ -189,12 +189,14 @@ impl FieldNames {
     }
 }
 
-/// Frames, and access to their pressures.
+/// Frames, and access to their forces.
 pub struct InputFrames<'a> {
     /// The frames.
     pub frames: &'a [Frame],
     /// Replaces a list by the taxel ids and pressures of one of the frames.
     pub pressures: &'a Pressures<'a>,
+    /// Replaces a list by what taxels of other kinds read in one of the frames, by itself.
+    pub sensed: &'a dyn Fn(&Frame, &SensedTaxels, &mut Vec<SensedValue>),
     /// The plan that they went through, as it is after the last one.
     pub plan: &'a Plan,
     /// The values that the last frame's percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
@@ -209,8 +211,8 @@ pub struct InputFrames<'a> {
 
 somatic_skin::debug_by_name!(InputFrames<'_>);
 
-/// Writes taxel ids and pressures of a frame into a list.
-pub type Pressures<'a> = dyn Fn(&Frame, &mut Vec<(u32, f64)>) + 'a;
+/// Writes taxel ids and pressures, or other forces, of a frame into a list.
+pub type Pressures<'a, Force = f64> = dyn Fn(&Frame, &mut Vec<(u32, Force)>) + 'a;
 
 /// How boards are doing, and messages: time (s) and text.
 #[derive(Clone, Debug, Default, PartialEq)]

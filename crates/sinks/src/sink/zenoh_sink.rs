@@ -226,6 +226,7 @@ mod tests {
         let input = InputFrames {
             frames: &frames,
             pressures: &|_, _| (),
+            sensed: &|_, _, _| (),
             plan: engine.plan(),
             values_read: None,
             values_sensed: &[],

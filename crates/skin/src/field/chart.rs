@@ -9,7 +9,7 @@
 
 use std::fmt;
 
-use glam::DVec3;
+use glam::{DQuat, DVec2, DVec3};
 
 use crate::body::ChartKind;
 
@@ -122,5 +122,15 @@ impl Chart {
     #[must_use]
     pub fn unproject(&self, place: DVec3) -> DVec3 {
         self.u_in_anchor * place.x + self.v_in_anchor * place.y + self.normal_in_anchor * place.z
+    }
+
+    /// Along u and v, what is along `tangent` on a taxel that looks along `normal`, both in the anchor's frame: turned by the
+    /// smallest turn that takes the normal to the chart's, so that no length is lost.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn along(&self, tangent: DVec3, normal: DVec3) -> DVec2 {
+        let turn = DQuat::from_rotation_arc(normal.normalize(), self.normal_in_anchor.normalize());
+        let tangent = turn * tangent;
+        DVec2::new(tangent.dot(self.u_in_anchor), tangent.dot(self.v_in_anchor))
     }
 }

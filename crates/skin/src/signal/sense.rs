@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use super::curve::Curve;
 use super::frame::RawValue;
+use super::response::Response;
 
 /// 0 °C, K.
 pub(super) const ZERO_CELSIUS_K: f64 = 273.15;
@@ -208,11 +209,23 @@ impl ShearCalibration {
         self.own_noises.get(&taxel).copied().or(self.noise)
     }
 
-    /// The forces along t and n × t, in the unit of P, that the body's taxel `taxel` feels under `pressure` with the raw values
-    /// `tangential`, each with `gain` ([`ShearCalibration::gain_of`]).
+    /// Whether [`ShearCalibration::gain_of`] the body's taxel `taxel` is one: its own gain is of raw values if its `response` is a line.
     #[must_use]
-    pub fn forces(&self, taxel: usize, gain: f64, pressure: f64, tangential: [f64; 2]) -> [f64; 2] {
-        let rest = self.own_baselines.get(&taxel).copied().unwrap_or(self.baselines);
+    pub fn has_gain(&self, taxel: usize, response: Response) -> bool {
+        response == Response::Linear || self.gain.is_some() || self.own_gains.contains_key(&taxel)
+    }
+
+    /// The raw tangential values at rest of the body's taxel `taxel`.
+    #[must_use]
+    pub fn rest_of(&self, taxel: usize) -> [f64; 2] {
+        self.own_baselines.get(&taxel).copied().unwrap_or(self.baselines)
+    }
+
+    /// The forces along t and n × t, in the unit of P, of a taxel that feels `pressure` and has the raw values `tangential`, with
+    /// `rest` ([`ShearCalibration::rest_of`]) and `gain` ([`ShearCalibration::gain_of`]).
+    #[must_use]
+    #[inline]
+    pub fn forces(&self, rest: [f64; 2], gain: f64, pressure: f64, tangential: [f64; 2]) -> [f64; 2] {
         let [u, v] = [0, 1].map(|axis| gain * (tangential[axis] - rest[axis]));
         self.cross_axis.map(|[of_p, of_u, of_v]| of_p * pressure + of_u * u + of_v * v)
     }

@@ -13,13 +13,14 @@ use super::{CsvSource, NdjsonSource, SimulatedSource, Source, TextPlace, TextSou
 use crate::error::{Error, Result, nearest};
 
 /// The syntax of each kind of source.
-const FORMS: [(&str, &str); 14] = [
+const FORMS: [(&str, &str); 15] = [
     ("csv", "csv:FILE"),
     ("ndjson", "ndjson:FILE"),
     ("serial", "serial:PORT[@BAUD]"),
     ("text", "text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers"),
     ("ros2", "ros2:/TOPIC[@TYPE]"),
     ("modbus", "modbus://HOST[:PORT][/UNIT]"),
+    ("paxini", "paxini:PORT[@BAUD]"),
     ("zenoh", "zenoh:KEY"),
     ("mcap", "mcap:FILE"),
     ("ros2-mcap", "ros2-mcap:PATH[:/TOPIC,...][@TYPE]"),
@@ -59,6 +60,13 @@ pub enum SourceSpec {
     },
     /// `modbus://HOST[:PORT][/UNIT]`: registers of a device that speaks Modbus TCP, by a map.
     Modbus(String),
+    /// `paxini:PORT[@BAUD]`: tactile sensors of PaXini on their board, on a serial line.
+    Paxini {
+        /// The port's name, such as `/dev/ttyUSB0`.
+        port: String,
+        /// Its speed, where one is given.
+        baud: Option<u32>,
+    },
     /// `zenoh:KEY`: a limb on another computer.
     Zenoh(String),
     /// `mcap:FILE`, or a bare `FILE.mcap`: a recording in MCAP.
@@ -98,6 +106,8 @@ impl fmt::Display for SourceSpec {
             Self::Ros2 { topic, kind: None } => write!(f, "ros2:{topic}"),
             Self::Ros2 { topic, kind: Some(kind) } => write!(f, "ros2:{topic}@{kind}"),
             Self::Modbus(place) => write!(f, "modbus://{place}"),
+            Self::Paxini { port, baud: None } => write!(f, "paxini:{port}"),
+            Self::Paxini { port, baud: Some(baud) } => write!(f, "paxini:{port}@{baud}"),
             Self::Zenoh(key) => write!(f, "zenoh:{key}"),
             Self::Mcap(path) => write!(f, "mcap:{}", path.display()),
             Self::Ros2Mcap(bag) => write!(f, "ros2-mcap:{bag}"),
@@ -130,20 +140,18 @@ fn topic(text: &str) -> Result<SourceSpec> {
     Ok(SourceSpec::Ros2 { topic: topic.to_owned(), kind: kind.map(whole) })
 }
 
-/// A serial line: `PORT[@BAUD]`.
-fn port(text: &str) -> Result<SourceSpec> {
-    let Some((port, baud)) = text.rsplit_once('@') else {
-        return Ok(SourceSpec::Serial { port: text.to_owned(), baud: None });
-    };
+/// A serial line of the source `kind`: `PORT[@BAUD]`.
+fn port(kind: &str, text: &str) -> Result<(String, Option<u32>)> {
+    let Some((port, baud)) = text.rsplit_once('@') else { return Ok((text.to_owned(), None)) };
     match baud.parse() {
-        Ok(baud) if baud > 0 && !port.is_empty() => Ok(SourceSpec::Serial { port: port.to_owned(), baud: Some(baud) }),
-        _ => Err(Error::usage(format!("`{baud}` is not a baud rate; write serial:PORT@115200"))),
+        Ok(baud) if baud > 0 && !port.is_empty() => Ok((port.to_owned(), Some(baud))),
+        _ => Err(Error::usage(format!("`{baud}` is not a baud rate; write {kind}:PORT@115200"))),
     }
 }
 
 impl SourceSpec {
-    /// Parses a source of one of `kinds`: `csv`, `serial`, `text`, `ros2`, `modbus`, `zenoh`, `mcap`, `ros2-mcap`, `lerobot`, `export`,
-    /// `sim`, `-` and `csv:-`.
+    /// Parses a source of one of `kinds`: `csv`, `serial`, `text`, `ros2`, `modbus`, `paxini`, `zenoh`, `mcap`, `ros2-mcap`, `lerobot`,
+    /// `export`, `sim`, `-` and `csv:-`.
     ///
     /// # Errors
     /// A usage error that lists the syntax of these kinds.
@@ -218,7 +226,8 @@ impl SourceSpec {
             "-" => Self::Stdin,
             "csv:-" => Self::CsvStdin,
             "ros2" => return topic(rest),
-            _ => return port(rest),
+            "paxini" => port(kind, rest).map(|(port, baud)| Self::Paxini { port, baud })?,
+            _ => port(kind, rest).map(|(port, baud)| Self::Serial { port, baud })?,
         })
     }
 
@@ -231,8 +240,9 @@ impl SourceSpec {
     /// Whether it ends, and can be read again.
     #[must_use]
     pub fn is_recording(&self) -> bool {
-        use SourceSpec::{CsvStdin, Modbus, Ros2, Serial, Stdin, Text, Zenoh};
-        !matches!(self, Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Modbus(_) | Zenoh(_))
+        use SourceSpec::{CsvStdin, Modbus, Paxini, Ros2, Serial, Stdin, Text, Zenoh};
+        let is_live = matches!(self, Stdin | CsvStdin | Text(_) | Serial { .. } | Ros2 { .. } | Modbus(_) | Zenoh(_));
+        !(is_live || matches!(self, Paxini { .. }))
     }
 
     /// What it is by its file's content and by the options: a `.csv` may be an export.
@@ -259,7 +269,7 @@ impl SourceSpec {
             Self::Ros2Mcap(name) => Some(&name.path),
             Self::LeRobot(name) => Some(&name.path),
             Self::Serial { .. } | Self::Text(_) | Self::Ros2 { .. } | Self::Modbus(_) | Self::Zenoh(_) => None,
-            Self::Stdin | Self::CsvStdin => None,
+            Self::Paxini { .. } | Self::Stdin | Self::CsvStdin => None,
         }
     }
 
@@ -295,10 +305,10 @@ impl SourceSpec {
 
     /// Checks that a map is for this source.
     fn check_map(&self, options: &VendorOptions) -> Result<()> {
-        use SourceSpec::{Modbus, Ndjson, Ros2, Ros2Mcap, Stdin, Text};
-        if !matches!(self, Ros2Mcap(_) | Ros2 { .. } | Modbus(_) | Ndjson(_) | Stdin | Text(_)) {
+        use SourceSpec::{Modbus, Ndjson, Paxini, Ros2, Ros2Mcap, Stdin, Text};
+        if !matches!(self, Ros2Mcap(_) | Ros2 { .. } | Modbus(_) | Paxini { .. } | Ndjson(_) | Stdin | Text(_)) {
             return Err(Error::usage(
-                "--map is for ROS 2 bags and topics, NDJSON, lines of JSON and Modbus; leave it out here, or name columns with --columns",
+                "--map is for ROS 2 bags and topics, NDJSON, lines of JSON, Modbus and PaXini; leave it out here, or name columns with --columns",
             ));
         }
         match options.text.given() {
@@ -307,7 +317,13 @@ impl SourceSpec {
         }
     }
 
-    /// Opens lines of JSON, or registers of a device, by `map`; `None` where it is another source.
+    /// The map that it has where none is given, by its name.
+    #[must_use]
+    pub fn usual_map(&self) -> Option<&'static str> {
+        matches!(self, Self::Paxini { .. }).then_some("paxini")
+    }
+
+    /// Opens lines of JSON, or values of a device, by `map`; `None` where it is another source.
     ///
     /// # Errors
     /// They cannot be read, or have not what the map says.
@@ -316,6 +332,8 @@ impl SourceSpec {
             Self::Stdin => Box::new(JsonLines::stdin(map)),
             Self::Ndjson(path) => Box::new(JsonLines::open(path, map)?),
             Self::Modbus(place) => Box::new(ModbusRegisters::connect(place, map)?),
+            #[cfg(feature = "serial")]
+            Self::Paxini { port, baud } => Box::new(super::map::paxini::PaxiniBoard::open(port, *baud, map)?),
             _ => return Ok(None),
         };
         MappedSource::new(messages, map, skip_bad).map(Some)
@@ -329,7 +347,8 @@ impl SourceSpec {
     pub fn open(&self, taxels: &[u32], options: &VendorOptions) -> Result<Box<dyn Source + Send>> {
         self.check_options(options)?;
         let skip_bad = options.skip_bad;
-        if let Some(map) = &options.map
+        let usual = self.usual_map().map(ArrayMap::named).transpose()?;
+        if let Some(map) = options.map.as_ref().or(usual.as_ref())
             && let Some(source) = self.open_json(map, skip_bad)?
         {
             return Ok(Box::new(source.for_body(taxels)?));
@@ -386,8 +405,10 @@ impl SourceSpec {
                 let what = "built without the feature `zenoh`: cargo install --path . --features zenoh";
                 Err(Error::failed(what).at(format!("source `zenoh:{key}`")))
             }
+            #[cfg(feature = "serial")]
+            Self::Paxini { .. } => Err(Error::failed("this source needs --map").at(self)),
             #[cfg(not(feature = "serial"))]
-            Self::Serial { port, .. } => {
+            Self::Serial { port, .. } | Self::Paxini { port, .. } => {
                 Err(Error::failed("this build reads no serial lines; build with feature `serial`").at(port))
             }
         }
@@ -428,6 +449,8 @@ mod tests {
             "ndjson:a/b.txt",
             "serial:/dev/ttyUSB0",
             "serial:COM3@921600",
+            "paxini:/dev/ttyUSB0",
+            "paxini:COM3@115200",
             "ros2:/arm/skin",
             "ros2:/arm/skin@sensor_msgs/msg/PointCloud2",
             "zenoh:robot/left",
@@ -455,7 +478,7 @@ mod tests {
         assert!(why("seril:a").contains("did you mean `serial:`"));
         assert!(why("ros2:skin").contains("write ros2:/TOPIC") && why("ros2:/a@").contains("write ros2:/TOPIC"));
         assert!(why("a.pdf").contains(
-            "csv:FILE, ndjson:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], modbus://HOST[:PORT][/UNIT], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], lerobot:DIR[:FEATURE][#EPISODE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
+            "csv:FILE, ndjson:FILE, serial:PORT[@BAUD], text:PORT[@BAUD] (or text:tcp://HOST:PORT, text:udp://:PORT, text:-) for lines of numbers, ros2:/TOPIC[@TYPE], modbus://HOST[:PORT][/UNIT], paxini:PORT[@BAUD], zenoh:KEY, mcap:FILE, ros2-mcap:PATH[:/TOPIC,...][@TYPE], lerobot:DIR[:FEATURE][#EPISODE], a pressure system's .csv, .asf, .lst, .asc or .txt, sim:FILE.toml, \
              - for NDJSON on standard input or csv:- for CSV"
         ));
         let of_recordings = |text: &str| SourceSpec::one_of(text, &["csv", "mcap"]).unwrap_err().to_string();

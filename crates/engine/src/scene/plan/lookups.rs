@@ -31,6 +31,7 @@ impl Plan {
 
     /// Per slot that is calibrated.
     #[doc(hidden)]
+    #[inline]
     pub fn curve_of(&self, slot: usize) -> Table<'_> {
         self.curves.table(self.taxels[slot].response)
     }
@@ -55,6 +56,12 @@ impl Plan {
     #[must_use]
     pub fn touch_outputs(&self) -> Option<TouchOutputs> {
         self.touch_outputs
+    }
+
+    /// Whether a letter or touches give what `receptor` reads, beside wrenches.
+    pub(in super::super) fn gives(&self, receptor: Receptor) -> bool {
+        let of_touches = self.touch_outputs.is_some_and(|outputs| outputs.contains(TouchOutputs::SHEAR));
+        self.letters.iter().any(|letter| letter.receptor == receptor) || (receptor == Receptor::Shear && of_touches)
     }
 
     /// Keeps the pressures that touches of the whole body are found in: those of the first letter `sustained`.

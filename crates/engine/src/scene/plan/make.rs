@@ -9,7 +9,7 @@ use super::super::curves::Curves;
 use super::super::left_out::{LeftOut, is_pressure, pressed_members};
 use super::super::members::{parts, quantity_of, surface, thresholds, unit_of, weights};
 use super::super::onset::softened;
-use super::super::senses::{Senses, letters_and_outputs};
+use super::super::senses::{ForTouches, Senses, letters_and_outputs};
 use super::super::stages::Stages;
 use super::super::{Coordinates, Scene, choose_fields};
 use super::{Plan, PlanField};
@@ -32,7 +32,8 @@ impl Plan {
         check(body, fields, scene, calibration)?;
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs);
-        let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, outputs)?;
+        let named = outputs;
+        let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, named)?;
         let left_out = LeftOut::from_fields(body, &chosen, fields, &letters);
         let chosen = left_out.feeling(body, chosen, fields)?;
         // Nobody named letters, and there are no pressures to find touches in.
@@ -40,10 +41,11 @@ impl Plan {
         let touches = scene.asked_touches().filter(|_| feels_pressure || !scene.letters.is_empty());
         let read = read(body, fields, touches.is_some(), &chosen);
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
-        // Who names letters has no others.
-        let touches_bring = touches.is_some() && scene.letters.is_empty();
-        plan.senses = Senses::new(body, fields, &chosen, (&letters, touches_bring), calibration);
+        let for_touches = ForTouches::new(body, scene, &letters, touches.is_some());
+        plan.senses = Senses::new(body, fields, &chosen, &letters, calibration, for_touches);
         plan.letters = letters;
+        let tells_shear = plan.letters.iter().any(|letter| letter.receptor == Receptor::Shear);
+        plan.senses.check_shear(body, (&plan.body_taxels, &plan.calibrations), scene.outputs, tells_shear)?;
         let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
         plan.senses.check_touches(body, of_touches).map_err(|e| e.at(&body.name))?;
         plan.touch_outputs = touches.map(|touches| touches.outputs | plan.senses.of_touches());

@@ -69,7 +69,7 @@ impl Sink for Ros2BagSink {
     fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         for frame in input.frames {
             let mut moment = Moment::default();
-            moment.read(self.clock.time_ns(frame.time()), frame, input.pressures);
+            moment.read(self.clock.time_ns(frame.time()), frame, input, self.messages.sensed());
             self.waiting.push_back(moment);
         }
         Ok(Flow::Open)

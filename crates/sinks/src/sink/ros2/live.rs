@@ -9,6 +9,7 @@ pub(super) use crate::dds::{Delivery, Node, Writer};
 use crate::error::Result;
 use crate::percept::Percepts;
 use crate::robot::messages::{Message as _, PointCloud2};
+use crate::scene::SensedTaxels;
 use crate::signal::BoardHealth;
 use crate::sink::handover::{Carrier, Handover, tell};
 use crate::sink::{Flow, InputFrames, News, Session, Sink};
@@ -37,6 +38,7 @@ pub struct Ros2Sink {
     /// Frames whose percepts are still to come, and others to fill again: `read` of them.
     moments: Vec<Moment>,
     read: usize,
+    sensed: SensedTaxels,
     remarks: Vec<String>,
 }
 
@@ -64,9 +66,10 @@ impl Ros2Sink {
             writers.push(node.writer(&topic, kind.kind.name, delivery(kind)).map_err(at)?);
         }
         let remarks = messages.remarks().into_iter().map(|remark| format!("{name}: {remark}")).collect();
+        let sensed = messages.sensed().clone();
         let sender = Sender { messages, writers, refused: 0, name: name.clone(), _node: node };
         let handover = Handover::start(&name, "frames", ROOM, sender)?;
-        Ok(Self { handover, clock: RosClock::new(session.ros_time), moments: Vec::new(), read: 0, remarks })
+        Ok(Self { handover, clock: RosClock::new(session.ros_time), moments: Vec::new(), read: 0, sensed, remarks })
     }
 }
 
@@ -134,7 +137,7 @@ impl Sink for Ros2Sink {
     fn write_input(&mut self, input: &InputFrames<'_>) -> Result<Flow> {
         self.moments.resize_with(self.moments.len().max(input.frames.len()), Moment::default);
         for (moment, frame) in self.moments.iter_mut().zip(input.frames) {
-            moment.read(self.clock.time_ns(frame.time()), frame, input.pressures);
+            moment.read(self.clock.time_ns(frame.time()), frame, input, &self.sensed);
         }
         self.read = input.frames.len();
         Ok(Flow::Open)

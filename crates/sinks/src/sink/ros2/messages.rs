@@ -12,6 +12,7 @@ use crate::robot::messages::{
     Byte, DiagnosticArray, DiagnosticStatus, JointState, KeyValue, MarkerArray, Message, PointCloud2, TfMessage,
     WrenchStamped,
 };
+use crate::scene::SensedTaxels;
 use crate::signal::{BoardHealth, Pose};
 use crate::sink::Session;
 
@@ -62,6 +63,7 @@ pub(super) struct Messages {
     at_rest: Vec<(String, Pose)>,
     links_sent_s: Option<f64>,
     readings: Readings,
+    sensed: SensedTaxels,
 }
 
 impl Messages {
@@ -71,7 +73,8 @@ impl Messages {
         let (Some(body), Some(plan)) = (session.body, session.plan) else {
             return Err(Error::failed("messages of ROS 2 need the robot's body"));
         };
-        let clouds = Clouds::new(body);
+        let sensed = SensedTaxels::new(plan, body);
+        let clouds = Clouds::new(body, &sensed);
         let wrenches = LinkWrenches::new(body, plan, session.taxels);
         let mut topics = vec![
             topic::<TfMessage>("/tf"),
@@ -107,6 +110,7 @@ impl Messages {
             at_rest: rest_poses(body),
             links_sent_s: None,
             readings: Readings::new(body),
+            sensed,
         })
     }
 
@@ -114,6 +118,11 @@ impl Messages {
     pub(super) fn remarks(&self) -> Vec<String> {
         let untouched = self.touches.is_none().then(|| "no markers of touches: add touches to --outputs".to_owned());
         untouched.into_iter().chain(self.wrenches.remarks().iter().cloned()).collect()
+    }
+
+    /// The taxels that read something else than pressure.
+    pub(super) fn sensed(&self) -> &SensedTaxels {
+        &self.sensed
     }
 
     /// All topics that there may be.
@@ -138,7 +147,7 @@ impl Messages {
             let state = JointState { header: header(time_ns, ""), name, position, ..JointState::default() };
             send(JOINTS, state.to_cdr())?;
         }
-        self.readings.read(&moment.pressures);
+        self.readings.read(&moment.pressures, &moment.sensed);
         for (cloud, message) in self.clouds.messages(time_ns, &self.readings).enumerate() {
             send(Topic(self.first_cloud + cloud), message.to_cdr())?;
         }

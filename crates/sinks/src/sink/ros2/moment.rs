@@ -2,8 +2,9 @@
 
 use crate::error::Error;
 use crate::percept::{LinkShare, Percepts};
+use crate::scene::{SensedTaxels, SensedValue};
 use crate::signal::{Frame, Pose};
-use crate::sink::Pressures;
+use crate::sink::InputFrames;
 use crate::sink::touch_mark::TouchMark;
 
 /// A frame and its percepts, as far as messages tell of them.
@@ -18,6 +19,8 @@ pub(super) struct Moment {
     pub(super) joints: Vec<(String, f64)>,
     /// By taxel id; those that are missing or rejected are left out.
     pub(super) pressures: Vec<(u32, f64)>,
+    /// Of taxels of other kinds, and the tangential forces of those with three axes.
+    pub(super) sensed: Vec<SensedValue>,
     /// Indices of the frame's values that did not come.
     pub(super) missing: Vec<usize>,
     /// The oldest first.
@@ -43,14 +46,15 @@ pub(super) fn without_frames() -> Error {
 }
 
 impl Moment {
-    /// Takes `frame`, whose messages are of the time `time_ns`.
-    pub(super) fn read(&mut self, time_ns: u64, frame: &Frame, pressures: &Pressures<'_>) {
+    /// Takes `frame` of `input`, whose messages are of the time `time_ns`; `taxels` are those of other kinds.
+    pub(super) fn read(&mut self, time_ns: u64, frame: &Frame, input: &InputFrames<'_>, taxels: &SensedTaxels) {
         self.time_ns = time_ns;
         self.t_s = frame.t_s;
         self.pose.clone_from(&frame.pose);
         self.has_stale_pose = frame.has_stale_pose;
         self.joints.clone_from(&frame.joints);
-        pressures(frame, &mut self.pressures);
+        (input.pressures)(frame, &mut self.pressures);
+        (input.sensed)(frame, taxels, &mut self.sensed);
         self.missing.clear();
         let values = frame.values.iter().enumerate();
         self.missing.extend(values.filter(|(_, value)| value.is_missing()).map(|(index, _)| index));

@@ -3,21 +3,24 @@
 use glam::{DQuat, DVec3};
 
 use super::readings::Readings;
-use crate::body::Body;
+use crate::body::{Body, Link};
 use crate::robot::messages::{
     Header, PointCloud2, PointField, Quaternion, TfMessage, Time, Transform, TransformStamped, Vector3,
 };
-use crate::signal::Pose;
+use crate::scene::{SensedTaxels, SensedValue};
+use crate::signal::{Pose, Reading, Receptor};
 
 /// The frame of coordinates that links are in.
 pub(super) const WORLD: &str = "world";
 /// `UINT32` and `FLOAT32` of `sensor_msgs/PointField`.
 const UINT32: u8 = 6;
 const FLOAT32: u8 = 7;
-/// A point: x, y, z, the pressure and the taxel's id; where the last two begin.
+/// A point: x, y, z, the pressure and the taxel's id, where the last two begin; then what its link's taxels read beside.
 const POINT_BYTES: usize = 20;
 const PRESSURE_AT: usize = 12;
 const TAXEL_AT: usize = 16;
+/// Nearer distances are read as this one, m, and are written as 0.
+const LEAST_M: f64 = 1e-4;
 
 pub(super) fn vector(v: DVec3) -> Vector3 {
     Vector3 { x: v.x, y: v.y, z: v.z }
@@ -48,12 +51,42 @@ struct Cloud {
     link: String,
     /// Indices of the body, and points whose pressures are still to come.
     taxels: Vec<(usize, [u8; POINT_BYTES])>,
+    /// Letters that its taxels have beside pressure.
+    beside: Vec<Receptor>,
+}
+
+/// The fields of points that are of `receptor`.
+fn fields_of(receptor: Receptor) -> &'static [&'static str] {
+    match receptor {
+        Receptor::Sustained | Receptor::Change => &[],
+        Receptor::Shear => &["pressure_u", "pressure_v"],
+        Receptor::Temperature => &["temperature"],
+        Receptor::Proximity => &["distance_mm"],
+    }
+}
+
+/// What `value` says in those fields; nothing where it says nothing, such as of what is out of range.
+fn numbers_of(value: &SensedValue) -> Option<[f64; 2]> {
+    match (value.receptor, value.reading) {
+        (Receptor::Shear, Reading::Value(..)) => Some(value.shear),
+        (Receptor::Temperature, Reading::Value(celsius, _)) => Some([celsius; 2]),
+        (Receptor::Proximity, Reading::Value(distance_m, true)) if distance_m <= LEAST_M => Some([0.0; 2]),
+        (Receptor::Proximity, Reading::Value(distance_m, true)) => Some([distance_m * 1e3; 2]),
+        _ => None,
+    }
 }
 
 impl Clouds {
-    pub(super) fn new(body: &Body) -> Self {
-        let mut clouds: Vec<Cloud> =
-            body.links.iter().map(|link| Cloud { link: link.name.clone(), taxels: Vec::new() }).collect();
+    /// Of the taxels of `body`, of which `sensed` read something else than pressure.
+    pub(super) fn new(body: &Body, sensed: &SensedTaxels) -> Self {
+        let empty = |link: &Link| Cloud { link: link.name.clone(), taxels: Vec::new(), beside: Vec::new() };
+        let mut clouds: Vec<Cloud> = body.links.iter().map(empty).collect();
+        for (taxel, receptor, _) in sensed.all() {
+            let beside = &mut clouds[body.taxels[taxel].link].beside;
+            if !beside.contains(&receptor) {
+                beside.push(receptor);
+            }
+        }
         for (index, taxel) in body.taxels.iter().enumerate() {
             let mut point = [0; POINT_BYTES];
             let place = taxel.position_in_link.as_vec3().to_array();
@@ -71,41 +104,64 @@ impl Clouds {
         self.0.iter().map(|cloud| cloud.link.as_str())
     }
 
-    /// The cloud of each link: the taxels that have a reading, in their link's frame.
+    /// The cloud of each link: the taxels that have a reading, in their link's frame. A field that is not of a taxel is NaN.
     pub(super) fn messages(&self, time_ns: u64, readings: &Readings) -> impl Iterator<Item = PointCloud2> {
-        self.0.iter().map(move |Cloud { link, taxels }| {
-            let mut data = Vec::with_capacity(taxels.len() * POINT_BYTES);
-            for (taxel, point) in taxels {
-                let Some(pressure) = readings.pressure(*taxel) else { continue };
-                let at = data.len() + PRESSURE_AT;
-                data.extend_from_slice(point);
-                data[at..][..4].copy_from_slice(&(pressure as f32).to_le_bytes());
+        self.0.iter().map(move |cloud| cloud.message(time_ns, readings))
+    }
+}
+
+impl Cloud {
+    fn message(&self, time_ns: u64, readings: &Readings) -> PointCloud2 {
+        let point_step = POINT_BYTES + self.beside.iter().map(|&receptor| 4 * fields_of(receptor).len()).sum::<usize>();
+        let mut data = Vec::with_capacity(self.taxels.len() * point_step);
+        let mut is_dense = true;
+        for (taxel, point) in &self.taxels {
+            let pressure = readings.pressure(*taxel);
+            let own = readings.sensed(*taxel).and_then(|value| Some((value.receptor, numbers_of(value)?)));
+            // What is along the surface goes with what is along the normal.
+            if pressure.is_none() && own.is_none_or(|(receptor, _)| receptor == Receptor::Shear) {
+                continue;
             }
-            let field = |(name, offset, datatype): (&str, usize, u8)| PointField {
-                name: name.to_owned(),
-                offset: offset as u32,
-                datatype,
-                count: 1,
+            let at = data.len() + PRESSURE_AT;
+            data.extend_from_slice(point);
+            let mut number = |number: Option<f64>| {
+                is_dense &= number.is_some();
+                number.map_or(f32::NAN, |number| number as f32).to_le_bytes()
             };
-            let of_point = [
-                ("x", 0, FLOAT32),
-                ("y", 4, FLOAT32),
-                ("z", 8, FLOAT32),
-                ("pressure", PRESSURE_AT, FLOAT32),
-                ("taxel", TAXEL_AT, UINT32),
-            ];
-            PointCloud2 {
-                header: header(time_ns, link),
-                height: 1,
-                width: (data.len() / POINT_BYTES) as u32,
-                fields: of_point.map(field).into(),
-                is_bigendian: false,
-                point_step: POINT_BYTES as u32,
-                row_step: data.len() as u32,
-                data,
-                is_dense: true,
+            data[at..][..4].copy_from_slice(&number(pressure));
+            for &receptor in &self.beside {
+                let numbers = own.filter(|&(own, _)| own == receptor).map(|(_, numbers)| numbers);
+                for index in 0..fields_of(receptor).len() {
+                    data.extend_from_slice(&number(numbers.map(|numbers| numbers[index])));
+                }
             }
-        })
+        }
+        let field = |(name, offset, datatype): (&str, usize, u8)| PointField {
+            name: name.to_owned(),
+            offset: offset as u32,
+            datatype,
+            count: 1,
+        };
+        let of_point = [
+            ("x", 0, FLOAT32),
+            ("y", 4, FLOAT32),
+            ("z", 8, FLOAT32),
+            ("pressure", PRESSURE_AT, FLOAT32),
+            ("taxel", TAXEL_AT, UINT32),
+        ];
+        let names = self.beside.iter().flat_map(|&receptor| fields_of(receptor));
+        let more = names.enumerate().map(|(index, name)| (*name, POINT_BYTES + 4 * index, FLOAT32));
+        PointCloud2 {
+            header: header(time_ns, &self.link),
+            height: 1,
+            width: (data.len() / point_step) as u32,
+            fields: of_point.into_iter().chain(more).map(field).collect(),
+            is_bigendian: false,
+            point_step: point_step as u32,
+            row_step: data.len() as u32,
+            data,
+            is_dense,
+        }
     }
 }
 
@@ -122,7 +178,7 @@ pub(super) fn transforms(time_ns: u64, at_rest: &[(String, Pose)], posed: &[(Str
 
 /// The links of `body` at rest, in the world.
 pub(super) fn rest_poses(body: &Body) -> Vec<(String, Pose)> {
-    let pose = |link: &crate::body::Link| {
+    let pose = |link: &Link| {
         let (_, rotation, translation) = link.world_from_link().to_scale_rotation_translation();
         (link.name.clone(), Pose { translation, rotation })
     };

@@ -1,16 +1,16 @@
 //! The force and torque on each link, and of each touch, where they are known in newtons.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
 use super::places::{header, vector};
 use super::readings::Readings;
-use crate::body::Body;
+use crate::body::{Body, Modality};
 use crate::percept;
 use crate::robot::messages::{Wrench, WrenchStamped};
-use crate::scene::Plan;
-use crate::signal::{Quantity, Receptor};
+use crate::scene::{Plan, SensedTaxels};
+use crate::signal::{Axis, Channel, Quantity, Receptor};
 
 /// Links that are named in a line; the others are counted.
 const NAMED_LINKS: usize = 4;
@@ -18,8 +18,8 @@ const NAMED_LINKS: usize = 4;
 /// The links whose wrench can be computed.
 pub(super) struct LinkWrenches {
     links: Vec<LinkWrench>,
-    /// By value of a frame, which of these links its taxel is of.
-    link_of_value: Vec<Option<usize>>,
+    /// By value of a frame, which of these links its taxel is of; and that taxel, if the value counts only while it is pressed.
+    link_of_value: Vec<Option<(usize, Option<usize>)>>,
     /// Which of them lack values in this frame; memory.
     lacks: Vec<bool>,
     /// Why others have none, a line each.
@@ -36,6 +36,8 @@ struct WrenchTaxel {
     taxel: usize,
     /// The force at P = 1, into the skin, N.
     force_at_one_in_link: DVec3,
+    /// The same of tangential forces, if it has three axes.
+    pulls_at_one_in_link: Option<[DVec3; 2]>,
     position_in_link: DVec3,
 }
 
@@ -47,6 +49,8 @@ enum Unknown {
     NotRead,
     NotSent,
     NotSustained,
+    NoPullsRead,
+    NoPullsSent,
 }
 
 impl Unknown {
@@ -57,6 +61,8 @@ impl Unknown {
             Self::NotRead => "the fields leave out some of its taxels; add touches to --outputs",
             Self::NotSent => "the source sends none of its taxels",
             Self::NotSustained => "the letters have no pressure; add letter sustained",
+            Self::NoPullsRead => "tangential forces are not read; add touches to --outputs, or letter shear",
+            Self::NoPullsSent => "the source sends no tangential forces of some taxels with three axes",
         }
     }
 }
@@ -64,10 +70,15 @@ impl Unknown {
 impl LinkWrenches {
     /// The wrenches of the links of `body`, whose frames hold values of the taxels `sent`.
     pub(super) fn new(body: &Body, plan: &Plan, sent: &[u32]) -> Self {
-        let taxel_of = |id: &u32| body.taxels.binary_search_by_key(id, |taxel| taxel.id).ok();
-        let sent: Vec<Option<usize>> = sent.iter().map(taxel_of).collect();
-        let mut is_sent = vec![false; body.taxels.len()];
-        sent.iter().flatten().for_each(|&taxel| is_sent[taxel] = true);
+        let taxel_of = |id: &u32| {
+            let channel = Channel(*id);
+            let taxel = body.taxels.binary_search_by_key(&channel.taxel(), |taxel| taxel.id).ok()?;
+            Some((taxel, channel.axis()))
+        };
+        let sent: Vec<Option<(usize, Axis)>> = sent.iter().map(taxel_of).collect();
+        let all_sent: BTreeSet<(usize, Axis)> = sent.iter().flatten().copied().collect();
+        let sensed = SensedTaxels::new(plan, body);
+        let is_read = |channel: Channel| sensed.channels().binary_search(&channel.0).is_ok();
         let mut of_links = vec![Vec::new(); body.links.len()];
         for (index, taxel) in body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality.is_pressed()) {
             of_links[taxel.link].push(index);
@@ -75,7 +86,7 @@ impl LinkWrenches {
         let (mut links, mut unknown) = (Vec::new(), BTreeMap::<Unknown, Vec<&str>>::new());
         let mut link_of_taxel = vec![None; body.taxels.len()];
         for (link, own) in body.links.iter().zip(&of_links).filter(|(_, own)| !own.is_empty()) {
-            match wrench_taxels(body, plan, own, &is_sent) {
+            match wrench_taxels((body, plan), own, &all_sent, is_read) {
                 Ok(taxels) => {
                     taxels.iter().for_each(|own| link_of_taxel[own.taxel] = Some(links.len()));
                     links.push(LinkWrench { name: link.name.clone(), taxels });
@@ -83,7 +94,11 @@ impl LinkWrenches {
                 Err(why) => unknown.entry(why).or_default().push(&link.name),
             }
         }
-        let link_of_value = sent.into_iter().map(|taxel| link_of_taxel[taxel?]).collect();
+        let value = |sent: Option<(usize, Axis)>| {
+            let (taxel, axis) = sent?;
+            Some((link_of_taxel[taxel]?, Some(taxel).filter(|_| axis != Axis::Normal)))
+        };
+        let link_of_value = sent.into_iter().map(value).collect();
         let is_none_known = links.is_empty() && unknown.len() == 1;
         let remark = |(why, of): (Unknown, Vec<&str>)| {
             if is_none_known {
@@ -107,9 +122,9 @@ impl LinkWrenches {
         &self.remarks
     }
 
-    /// The wrench of each link, by its place among [`Self::names`]: −Σ PᵢAᵢnᵢ over all of its taxels, whatever touches they are of, and
-    /// the torque about the link's origin. A link with a missing value has none: a part would pass for the whole. A value
-    /// that came and was rejected adds nothing, as in all sums.
+    /// The wrench of each link, by its place among [`Self::names`]: Σ Aᵢ(−Pᵢnᵢ + sᵢ) over all of its taxels, whatever touches they are
+    /// of, and the torque about the link's origin. A link with a missing value has none, tangential ones where nothing presses
+    /// aside: a part would pass for the whole. A value that came and was rejected adds nothing, as in all sums.
     pub(super) fn messages(
         &mut self,
         time_ns: u64,
@@ -118,14 +133,23 @@ impl LinkWrenches {
     ) -> impl Iterator<Item = (usize, WrenchStamped)> {
         let Self { links, link_of_value, lacks, .. } = self;
         lacks.fill(false);
-        missing.iter().filter_map(|&value| *link_of_value.get(value)?).for_each(|link| lacks[link] = true);
+        let is_pressed = |taxel: usize| readings.pressure(taxel).is_some_and(|pressure| pressure > 0.0);
+        let counts = |(_, taxel): &(usize, Option<usize>)| taxel.is_none_or(is_pressed);
+        let missing = missing.iter().filter_map(|&value| *link_of_value.get(value)?).filter(counts);
+        missing.for_each(|(link, _)| lacks[link] = true);
         let whole = links.iter().enumerate().zip(lacks).filter(|(_, lacks)| !**lacks);
         whole.map(move |((index, link), _)| (index, link.message(time_ns, readings)))
     }
 }
 
-/// The taxels `own` of a link as parts of its wrench, without those that are masked, or that no frame has.
-fn wrench_taxels(body: &Body, plan: &Plan, own: &[usize], is_sent: &[bool]) -> Result<Vec<WrenchTaxel>, Unknown> {
+/// The taxels `own` of a link as parts of its wrench, without those that are masked, or that are not among those `sent`. `is_read`
+/// says of a tangential channel whether the plan reads it.
+fn wrench_taxels(
+    (body, plan): (&Body, &Plan),
+    own: &[usize],
+    sent: &BTreeSet<(usize, Axis)>,
+    is_read: impl Fn(Channel) -> bool,
+) -> Result<Vec<WrenchTaxel>, Unknown> {
     if plan.letters().first().is_none_or(|letter| letter.receptor != Receptor::Sustained) {
         return Err(Unknown::NotSustained);
     }
@@ -133,7 +157,7 @@ fn wrench_taxels(body: &Body, plan: &Plan, own: &[usize], is_sent: &[bool]) -> R
     for &index in own {
         let channel = plan.body_taxels.binary_search(&index).map_err(|_| Unknown::NotRead)?;
         let calibration = &plan.calibrations[channel];
-        if calibration.mask || !is_sent[index] {
+        if calibration.mask || !sent.contains(&(index, Axis::Normal)) {
             continue;
         }
         let taxel = &body.taxels[index];
@@ -143,9 +167,19 @@ fn wrench_taxels(body: &Body, plan: &Plan, own: &[usize], is_sent: &[bool]) -> R
             Quantity::Pascal => return Err(Unknown::NoArea),
             Quantity::Newton => 1.0,
         };
+        let has_pulls = taxel.modality == Modality::Force3;
+        let pulls = || [Axis::U, Axis::V].into_iter();
+        if has_pulls && !pulls().all(|axis| is_read(Channel::of_taxel(taxel.id, axis))) {
+            return Err(Unknown::NoPullsRead);
+        }
+        if has_pulls && !pulls().all(|axis| sent.contains(&(index, axis))) {
+            return Err(Unknown::NoPullsSent);
+        }
+        let tangents = || taxel.tangents_in_link().map(|tangent| tangent * newton_at_one);
         taxels.push(WrenchTaxel {
             taxel: index,
             force_at_one_in_link: -taxel.normal_in_link * newton_at_one,
+            pulls_at_one_in_link: has_pulls.then(tangents),
             position_in_link: taxel.position_in_link,
         });
     }
@@ -155,11 +189,14 @@ fn wrench_taxels(body: &Body, plan: &Plan, own: &[usize], is_sent: &[bool]) -> R
 impl LinkWrench {
     fn message(&self, time_ns: u64, readings: &Readings) -> WrenchStamped {
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
-        for WrenchTaxel { taxel, force_at_one_in_link, position_in_link } in &self.taxels {
-            let Some(pressure) = readings.pressure(*taxel).filter(|&pressure| pressure > 0.0) else { continue };
-            let own = force_at_one_in_link * pressure;
+        for taxel in &self.taxels {
+            let Some(pressure) = readings.pressure(taxel.taxel).filter(|&pressure| pressure > 0.0) else { continue };
+            let mut own = taxel.force_at_one_in_link * pressure;
+            if let Some((tangents, [su, sv])) = taxel.pulls_at_one_in_link.zip(readings.pull(taxel.taxel)) {
+                own += su * tangents[0] + sv * tangents[1];
+            }
             force += own;
-            torque += position_in_link.cross(own);
+            torque += taxel.position_in_link.cross(own);
         }
         let wrench = Wrench { force: vector(force), torque: vector(torque) };
         WrenchStamped { header: header(time_ns, &self.name), wrench }
@@ -203,7 +240,9 @@ mod tests {
         let mut pressures = Vec::new();
         engine.pressures(frame, &mut pressures);
         let mut readings = Readings::new(body);
-        readings.read(&pressures);
+        let mut sensed = Vec::new();
+        engine.sensed_alone(frame, &SensedTaxels::new(engine.plan(), body), &mut sensed);
+        readings.read(&pressures, &sensed);
         let missing: Vec<usize> = (0..frame.values.len()).filter(|&index| frame.values[index].is_missing()).collect();
         let messages = wrenches.messages(0, &readings, &missing);
         messages.map(|(_, message)| (message.header.frame_id, message.wrench)).collect()
@@ -280,5 +319,76 @@ mod tests {
         body.taxels.iter_mut().for_each(|taxel| taxel.area = 0.0);
         assert!(remarks(&body, "[all]\nunit = \"Pa\"\n", with_touches(), &ids).contains("taxels have no area"));
         assert_eq!(remarks(&body, newtons, with_touches(), &ids), "");
+    }
+
+    /// A hand whose fingertips have three axes, pressed and pulled: an engine and its frame.
+    fn pulled_hand(body: &Body, ids: &[u32], scene: Scene) -> (Engine, crate::Frame) {
+        let calibration = "[all]\ngain = 0.01\nunit = \"N\"\n[shear]\ngain = 0.02\n";
+        let engine = engine(body, ids, calibration, scene);
+        let mut frame = engine.frame(0.0);
+        for (index, value) in frame.values.iter_mut().enumerate() {
+            *value = RawValue::new((index * 7 % 11) as f64);
+        }
+        (engine, frame)
+    }
+
+    #[test]
+    fn tangential_forces_of_taxels_with_three_axes_are_in_it() {
+        let body = Body::from_bytes("sensing-hand", bundled::body("sensing-hand").unwrap()).unwrap();
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let sent = Channel::all_of(&body);
+        let (mut engine, mut frame) = pulled_hand(&body, &ids, with_touches());
+        let mut wrenches = LinkWrenches::new(&body, engine.plan(), &sent);
+        assert!(wrenches.remarks().is_empty(), "{:?}", wrenches.remarks());
+        let mut by_engine = |frame: &crate::Frame| {
+            engine.process_one(frame).unwrap();
+            let (mut presses, name) = (Vec::new(), |link: u32| body.links[link as usize].name.clone());
+            engine.presses_on_links(&mut presses);
+            let known = presses.iter().filter_map(|press| Some((name(press.link), press.wrench?)));
+            (known.collect::<BTreeMap<_, _>>(), wrenches_by_link(&mut wrenches, &body, &engine, frame))
+        };
+        let three = |index: &usize| body.taxels[*index].modality == Modality::Force3 && index * 7 % 11 > 0;
+        let taxel = (0..ids.len()).find(three).unwrap();
+        let (id, link) = (ids[taxel], &body.links[body.taxels[taxel].link].name);
+        let of_three = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Force3);
+        let links: BTreeSet<&str> = of_three.map(|taxel| body.links[taxel.link].name.as_str()).collect();
+        let (right, found) = by_engine(&frame);
+        let mut without = frame.clone();
+        without.values[ids.len()..].fill(RawValue::new(0.0));
+        let (_, untouched) = by_engine(&without);
+        assert!(links.len() >= 2);
+        for (name, wrench) in &right {
+            let own = &found[name];
+            let [force, torque] = [&own.force, &own.torque].map(|own| DVec3::new(own.x, own.y, own.z));
+            assert!(force.distance(wrench.force_newton) < 1e-12 && torque.distance(wrench.torque_newton_m) < 1e-12);
+            // Without what pulls, only links without such taxels have the same.
+            assert_eq!(*own != untouched[name], links.contains(name.as_str()), "{name}");
+        }
+        let at = sent.binary_search(&Channel::of_taxel(id, Axis::U).0).unwrap();
+        frame.values[at] = RawValue::MISSING;
+        let (right, missing) = by_engine(&frame);
+        assert!(!right.contains_key(link) && !missing.contains_key(link) && missing.len() + 1 == found.len());
+        frame.values[taxel] = RawValue::new(0.0);
+        let (right, unpressed) = by_engine(&frame);
+        assert!(right.contains_key(link) && unpressed.contains_key(link), "what nothing presses pulls nowhere");
+        // A value that was rejected adds nothing, and its taxel's normal force stays.
+        frame.values[taxel] = RawValue::new((taxel * 7 % 11) as f64);
+        frame.values[at] = RawValue::FAULTY;
+        let (right, faulty) = by_engine(&frame);
+        assert!(!right.contains_key(link) && ![&found[link], &unpressed[link]].contains(&&faulty[link]));
+    }
+
+    #[test]
+    fn why_tangential_forces_are_not_known_is_reported() {
+        let body = Body::from_bytes("sensing-hand", bundled::body("sensing-hand").unwrap()).unwrap();
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let remarks = |scene: Scene, sent: &[u32]| {
+            let (engine, _) = pulled_hand(&body, &ids, scene);
+            LinkWrenches::new(&body, engine.plan(), sent).remarks().join("\n")
+        };
+        let sent = remarks(with_touches(), &ids);
+        assert!(sent.contains("the source sends no tangential forces of some taxels with three axes"), "{sent}");
+        let read = Scene::default().outputs(percept::Outputs::TOTAL).touches(None);
+        assert!(remarks(read, &Channel::all_of(&body)).contains("add touches to --outputs, or letter shear"));
     }
 }

@@ -29,7 +29,7 @@ pub trait Messages {
     /// It cannot be read, or has not what the map says.
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came>;
 
-    /// The names of the last message's sensors, with how many values each has; none where the map has no names.
+    /// The names of the last message's sensors, with how many values each has, or taxels with three axes; none where they have no names.
     fn named(&self) -> &[(String, usize)] {
         &[]
     }
@@ -53,6 +53,11 @@ pub trait Messages {
     /// What was not read, a line each.
     fn losses(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// Whether any value so far was stale.
+    fn has_stale(&self) -> bool {
+        false
     }
 
     /// When the last message was read, where it comes live.
@@ -227,6 +232,10 @@ impl Source for MappedSource {
 
     fn progress(&self) -> Option<f64> {
         self.messages.progress()
+    }
+
+    fn has_stale(&self) -> bool {
+        self.messages.has_stale()
     }
 
     fn read_at(&mut self) -> Option<Instant> {

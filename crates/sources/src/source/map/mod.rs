@@ -10,6 +10,8 @@ mod layout;
 mod mapped;
 pub(in crate::source) mod modbus;
 pub(in crate::source) mod path;
+#[cfg(feature = "serial")]
+pub(in crate::source) mod paxini;
 mod presets;
 mod sensor_names;
 mod taxels;

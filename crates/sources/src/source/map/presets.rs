@@ -183,10 +183,18 @@ grid = "3x3"
 pitch = "7mm"
 "#;
 
+/// What a board's frames hold is known without paths.
+const PAXINI: &str = r#"
+values = "taxels"
+axes = "uvn"
+scale = 0.1
+pitch = "2mm"
+"#;
+
 const UNMEASURED_AXES: &str =
     "x is taken for right and y for up on the pad, as drawn; drag over it, and correct `axes` in a map of your own";
 
-const PRESETS: [Preset; 7] = [
+const PRESETS: [Preset; 8] = [
     Preset {
         name: "dex3",
         map: DEX3,
@@ -244,6 +252,16 @@ const PRESETS: [Preset; 7] = [
             "the nine pillars of a Contactile PapillArray are drawn 7 mm apart, row by row; its manual says that pillar 4 is in the middle",
             "public sources differ about the messages of a PapillArray (a header, ids of 32 or 64 bits), so they have to be defined: by the \
              bag, or by `definition` in a map",
+            UNMEASURED_AXES,
+        ],
+        is_untested: true,
+    },
+    Preset {
+        name: "paxini",
+        map: PAXINI,
+        definition: None,
+        notes: &[
+            "values are in N; the taxels of each sensor of PaXini are drawn in a row, 2 mm apart, not measured",
             UNMEASURED_AXES,
         ],
         is_untested: true,

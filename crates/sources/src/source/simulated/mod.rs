@@ -6,6 +6,7 @@ mod calibration;
 mod contact;
 mod delivered;
 mod disturbed;
+mod drag;
 mod file;
 mod friction;
 mod layer;

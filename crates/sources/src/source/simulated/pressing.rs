@@ -6,6 +6,7 @@ use std::sync::Arc;
 use toml::Spanned;
 
 use super::contact::Layer;
+use super::drag::Drag;
 use super::file::TouchKeys;
 use super::friction::Friction;
 use super::link_touch::{Felt, Kinds, LinkTouch, Places};
@@ -53,10 +54,14 @@ impl Touches {
         for (index, keys) in keys.iter().enumerate() {
             if whole_setup::is_of_body(keys.get_ref()) {
                 let make = || BodySkin::new(body, layer, of.pressed, covers);
-                match (setup.body_touch(index, keys.get_ref(), layer, &mut body_skin, make), wrong) {
-                    (Err(_), WrongTouch::LeaveOut) => {}
-                    (touch, _) => all.push(Pressing::Body(Box::new(TouchOfBody::new(touch?)))),
-                }
+                let touch = match (setup.body_touch(index, keys.get_ref(), layer, &mut body_skin, make), wrong) {
+                    (Err(_), WrongTouch::LeaveOut) => continue,
+                    (touch, _) => touch?,
+                };
+                let is_long = touch.tool.is_long();
+                let drag = Drag::new(setup.beside(keys.get_ref(), layer, is_long)?, is_long);
+                let drag = drag.filter(|_| of.has_pulls);
+                all.push(Pressing::Body(Box::new(TouchOfBody::new(touch, drag))));
                 continue;
             }
             let touch = match (setup.touch(index, keys.get_ref()), wrong) {
@@ -66,7 +71,7 @@ impl Touches {
             let in_link = || Arc::new(Places::new(body, touch.link, of));
             let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
             let link = body.links[touch.link].name.clone();
-            let beside = setup.beside(keys.get_ref(), layer)?;
+            let beside = setup.beside(keys.get_ref(), layer, touch.indenter.is_long())?;
             all.push(Pressing::Link(Box::new(LinkTouch { touch, beside, link, places })));
         }
         Ok(Self { all, body_skin })
@@ -76,7 +81,7 @@ impl Touches {
     pub(super) fn friction(&self) -> Option<f64> {
         let of_touch = |touch: &Pressing| match touch {
             Pressing::Link(touch) => touch.beside.friction.as_ref().map(Friction::coefficient),
-            Pressing::Body(_) => None,
+            Pressing::Body(touch) => touch.friction(),
         };
         let mut all = self.all.iter().filter_map(of_touch);
         let first = all.next()?;
@@ -86,8 +91,9 @@ impl Touches {
     /// Forgets what indenters hold.
     pub(super) fn rest(&mut self) {
         for touch in &mut self.all {
-            if let Pressing::Link(touch) = touch {
-                touch.rest();
+            match touch {
+                Pressing::Link(touch) => touch.rest(),
+                Pressing::Body(touch) => touch.rest(),
             }
         }
     }
@@ -108,7 +114,12 @@ impl Touches {
                 Pressing::Link(touch) => truth.extend(touch.press(layer, of, &moment, felt)?),
                 Pressing::Body(touch) => {
                     let Some(skin) = &self.body_skin else { continue };
-                    truth.extend(touch.press(body, skin, &moment, felt.forces_newton)?);
+                    truth.extend(touch.press(
+                        body,
+                        (skin, layer),
+                        &moment,
+                        (&mut *felt.forces_newton, &mut *felt.pulls_newton),
+                    )?);
                 }
             }
         }

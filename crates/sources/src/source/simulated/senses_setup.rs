@@ -1,4 +1,4 @@
-//! What a touch of one link does beside pressing, from its keys: friction, warmth, and how far off it is.
+//! What a touch does beside pressing, from its keys: friction, warmth, and how far off it is.
 
 use toml::Spanned;
 
@@ -34,8 +34,8 @@ pub(super) struct Beside {
 }
 
 impl Setup<'_> {
-    /// What `keys` say of a touch that presses through `layer`.
-    pub(super) fn beside(&self, keys: &TouchKeys, layer: &Layer) -> Result<Beside> {
+    /// What `keys` say of a touch that presses through `layer`, with an indenter that has a direction if it `is_long`.
+    pub(super) fn beside(&self, keys: &TouchKeys, layer: &Layer, is_long: bool) -> Result<Beside> {
         let text = self.text;
         let friction = match &keys.friction {
             None => {
@@ -48,8 +48,8 @@ impl Setup<'_> {
             }
             Some(friction) => Some(Friction::new(text.positive("friction", friction)?)),
         };
-        if keys.angle_deg.is_some() {
-            text.refuse("twist_deg", keys.twist_deg.as_ref(), "with `angle_deg`, which turns the indenter")?;
+        if is_long {
+            text.refuse("twist_deg", keys.twist_deg.as_ref(), "for this indenter, which `angle_deg` turns")?;
         }
         let twist = self.list("twist_deg", keys.twist_deg.as_ref(), -MOST, "degrees")?;
         let twist = twist.map(|points| points.into_iter().map(|(t_s, degrees)| (t_s, degrees.to_radians())).collect());
@@ -85,10 +85,8 @@ impl Setup<'_> {
     }
 
     /// Refuses what touches of the whole body cannot do.
-    pub(super) fn only_presses(&self, keys: &TouchKeys) -> Result<()> {
+    pub(super) fn only_drags(&self, keys: &TouchKeys) -> Result<()> {
         let why = "for a touch of the whole body; press a field or a link";
-        self.text.refuse("friction", keys.friction.as_ref(), why)?;
-        self.text.refuse("twist_deg", keys.twist_deg.as_ref(), why)?;
         self.text.refuse("celsius", keys.celsius.as_ref(), why)?;
         self.text.refuse("gap_m", keys.gap_m.as_ref(), why)
     }

@@ -47,7 +47,7 @@ impl Setup<'_> {
         make: impl FnOnce() -> BodySkin,
     ) -> Result<BodyTouch> {
         let text = self.text;
-        self.only_presses(keys)?;
+        self.only_drags(keys)?;
         if layer.thickness_m <= 0.0 {
             let what = "`on` is body, which needs a layer that gives way; give [layer] its `thickness_m`";
             return Err(text.wrong(keys.on.span(), what));

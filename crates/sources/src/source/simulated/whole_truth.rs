@@ -2,6 +2,9 @@
 
 use glam::DVec3;
 
+use super::contact::Layer;
+use super::drag::Drag;
+use super::friction::Pull;
 use super::truth::{Truth, line_angle};
 use super::whole::{BodySkin, BodyTouch, Contact};
 use super::whole_setup::leaves_skin;
@@ -12,6 +15,8 @@ use crate::field::default_u;
 /// A touch of the whole body, and where its indenters were last.
 pub(super) struct TouchOfBody {
     pub(super) touch: BodyTouch,
+    /// Its friction, if that is felt.
+    drag: Option<Drag>,
     /// The frame, and the place of each indenter at rest.
     last: Option<(u64, Vec<DVec3>)>,
 }
@@ -27,29 +32,46 @@ pub(super) struct Moment {
 }
 
 impl TouchOfBody {
-    pub(super) fn new(touch: BodyTouch) -> Self {
-        Self { touch, last: None }
+    pub(super) fn new(touch: BodyTouch, drag: Option<Drag>) -> Self {
+        Self { touch, drag, last: None }
     }
 
-    /// Presses, adds what the taxels feel to `forces_newton`, and returns what is true of each indenter.
+    /// μ, if it has friction that is felt.
+    pub(super) fn friction(&self) -> Option<f64> {
+        self.drag.as_ref().map(Drag::coefficient)
+    }
+
+    /// Lets go of the skin.
+    pub(super) fn rest(&mut self) {
+        self.drag.iter_mut().for_each(Drag::release);
+    }
+
+    /// Presses through `layer`, adds what the taxels feel to `forces_newton` and `pulls_newton`, and returns what is true of each
+    /// indenter.
     pub(super) fn press(
         &mut self,
         body: &Body,
-        skin: &BodySkin,
+        (skin, layer): (&BodySkin, &Layer),
         moment: &Moment,
-        forces_newton: &mut [f64],
+        (forces_newton, pulls_newton): (&mut [f64], &mut [[f64; 2]]),
     ) -> Result<Vec<Truth>> {
         let (touch, &Moment { frame, t_s, before_s, .. }) = (&self.touch, moment);
-        let Some(force_newton) = touch.force(t_s) else { return Ok(Vec::new()) };
+        let Some(force_newton) = touch.force(t_s) else {
+            self.rest();
+            return Ok(Vec::new());
+        };
         let off = |t_s: f64| Error::failed(format!("touch `{}`: {}", touch.name, leaves_skin(t_s)));
-        let contacts = touch.press(skin, t_s, force_newton, forces_newton).ok_or_else(|| off(t_s))?;
+        let force = (force_newton, self.drag.is_some());
+        let contacts = touch.press(skin, t_s, force, forces_newton).ok_or_else(|| off(t_s))?;
+        let drag = self.drag.as_mut();
+        let pulls = drag.map(|drag| drag.pull((skin, layer), t_s, &contacts, pulls_newton));
         let places = |contacts: &[Contact]| contacts.iter().map(|contact| contact.position).collect::<Vec<DVec3>>();
         let known = self.last.take().filter(|(number, _)| number + 1 == frame).map(|(_, places)| places);
         // Frames may be read in any order.
         let before = match (known, before_s.and_then(|before_s| Some((before_s, touch.force(before_s)?)))) {
             (None, Some((before_s, force))) => {
                 let mut unfelt = vec![0.0; forces_newton.len()];
-                let before = touch.press(skin, before_s, force, &mut unfelt).ok_or_else(|| off(before_s))?;
+                let before = touch.press(skin, before_s, (force, false), &mut unfelt).ok_or_else(|| off(before_s))?;
                 Some(places(&before))
             }
             (known, _) => known,
@@ -63,14 +85,21 @@ impl TouchOfBody {
                 _ => format!("{} (second)", touch.name),
             };
             let velocity = moved.zip(before_s).map(|(moved, before_s)| moved / (t_s - before_s));
-            truth(body, moment.touch, name, contact, velocity)
+            let pull = pulls.as_ref().map(|pulls| pulls[number]);
+            truth(body, (moment.touch, name), contact, velocity, pull)
         };
         Ok(contacts.iter().enumerate().map(of_indenter).collect())
     }
 }
 
-/// The truth of `contact`, which moves with `velocity` on the body at rest.
-fn truth(body: &Body, touch: usize, name: String, contact: &Contact, velocity: Option<DVec3>) -> Truth {
+/// The truth of `contact`, which moves with `velocity` on the body at rest, and does `pull` along the skin.
+fn truth(
+    body: &Body,
+    (touch, name): (usize, String),
+    contact: &Contact,
+    velocity: Option<DVec3>,
+    pull: Option<Pull>,
+) -> Truth {
     let link = &body.links[contact.link];
     let link_from_body = link.body_from_link.inverse();
     let turned = |vector: DVec3| link_from_body.transform_vector3(vector);
@@ -95,10 +124,10 @@ fn truth(body: &Body, touch: usize, name: String, contact: &Contact, velocity: O
         direction_in_link,
         principal_axis_in_link: contact.principal_axis.map(turned),
         depth_m: Some(contact.depth_m),
-        shear_in_link: None,
+        shear_in_link: pull.map(|pull| turned(pull.newton)),
         shear_uv: None,
-        torsion: None,
-        slips: None,
+        torsion: pull.map(|pull| pull.torsion),
+        slips: pull.map(|pull| pull.slips),
         gap_m: None,
         celsius: None,
     }

@@ -36,7 +36,7 @@ pub(super) fn distance(offset: DVec3, normal: DVec3, other: DVec3) -> f64 {
 }
 
 /// `vector`, carried from where the normal is `from` to where it is `to` by the smallest turn between them.
-pub(super) fn carried(vector: DVec3, from: DVec3, to: DVec3) -> DVec3 {
+pub(in crate::source::simulated) fn carried(vector: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let cos = from.dot(to);
     if cos <= -1.0 + 1e-9 {
         return vector;

@@ -26,6 +26,8 @@ pub(super) struct Footprint {
     pub(super) link: usize,
     /// Unit vector along the footprint, if it has a direction.
     pub(super) principal_axis: Option<DVec3>,
+    /// Of the even disc with the same second moment, m.
+    pub(super) radius_m: f64,
 }
 
 impl Footprint {
@@ -47,13 +49,14 @@ impl Footprint {
         felt.iter().for_each(|felt| *by_link.entry(surface.facet(felt.facet).link).or_default() += felt.force_newton);
         let most = by_link.into_iter().reduce(|most, other| if other.1 > most.1 { other } else { most });
         let (link, _) = most?;
-        Some(Self { spot, normal, link, principal_axis: axis(surface, felt, &spot, normal) })
+        let moments = moments(surface, felt, &spot, normal);
+        let radius_m = (2.0 * (moments.x_axis.x + moments.y_axis.y + moments.z_axis.z)).sqrt();
+        Some(Self { spot, normal, link, principal_axis: axis(moments), radius_m })
     }
 }
 
-/// The direction of the largest second moment of the pressure, unrolled around `spot`; in space where it is wrapped around a
-/// limb.
-fn axis(surface: &WholeSurface, felt: &[Felt], spot: &Spot, normal: DVec3) -> Option<DVec3> {
+/// The second moments of the pressure, unrolled around `spot`, m²; in space where it is wrapped around a limb.
+fn moments(surface: &WholeSurface, felt: &[Felt], spot: &Spot, normal: DVec3) -> DMat3 {
     let force: f64 = felt.iter().map(|felt| felt.force_newton).sum();
     let behind = felt.iter().filter(|felt| surface.facet(felt.facet).normal.dot(normal) < WRAPPED_COSINE);
     let wrapped = behind.map(|felt| felt.force_newton).sum::<f64>() > WRAPPED_SHARE * force;
@@ -68,6 +71,11 @@ fn axis(surface: &WholeSurface, felt: &[Felt], spot: &Spot, normal: DVec3) -> Op
         let weighted = from_mean * (felt.force_newton / force);
         moments += DMat3::from_cols(from_mean * weighted.x, from_mean * weighted.y, from_mean * weighted.z);
     }
+    moments
+}
+
+/// The direction of the largest of them, if they have one.
+fn axis(moments: DMat3) -> Option<DVec3> {
     let (direction, first, second) = principal(moments)?;
     ((first - second) >= MIN_ANISOTROPY * (first + second)).then_some(direction)
 }

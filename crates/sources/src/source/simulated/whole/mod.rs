@@ -16,6 +16,7 @@ mod surface;
 mod tests;
 mod touch;
 
+pub(super) use self::chart::carried;
 pub use self::given::{GivenPress, GivenPresses, GivenTruth, NoisySensors};
 pub(super) use self::indenter::Shape;
 pub(super) use self::path::{BodyPath, Waypoint};

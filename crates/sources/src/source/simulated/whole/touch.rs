@@ -12,7 +12,7 @@ use super::layer::Layer;
 use super::path::{self, BodyPath, Waypoint};
 use super::press::{Pressure, Skin};
 use super::surface::WholeSurface;
-use crate::body::Body;
+use crate::body::{Body, Modality};
 
 /// What a taxel feels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +36,8 @@ pub(in crate::source::simulated) struct BodySkin {
     cells: Cells,
     layer: Layer,
     covers: Covers,
+    /// By taxel, if any has three axes.
+    tangents: Vec<[DVec3; 2]>,
 }
 
 /// A touch of a whole body.
@@ -58,6 +60,13 @@ pub(in crate::source::simulated) struct Contact {
     pub(in crate::source::simulated) principal_axis: Option<DVec3>,
     /// Of an indenter that has a direction.
     pub(in crate::source::simulated) direction: Option<DVec3>,
+    /// The place of the path under it, and the way that it faces there.
+    pub(in crate::source::simulated) stands_at: DVec3,
+    pub(in crate::source::simulated) along: DVec3,
+    /// Of the even disc with the second moment of its pressure, m.
+    pub(in crate::source::simulated) radius_m: f64,
+    /// The forces of taxels that feel it, if they are asked for.
+    pub(in crate::source::simulated) forces_newton: Vec<(usize, f64)>,
 }
 
 impl Tool {
@@ -80,7 +89,24 @@ impl BodySkin {
         let least_side_m = taxels.iter().map(|(_, side_m)| *side_m).min_by(f64::total_cmp).unwrap_or(0.0);
         let layer = Layer::new(layer, least_side_m);
         let (surface, cells) = (WholeSurface::new(body, layer.piece_m()), Cells::new(body, taxels));
-        Self { surface, cells, layer, covers }
+        let has_pulls = taxels.iter().any(|&(index, _)| body.taxels[index].modality == Modality::Force3);
+        let tangents = |&(index, _): &(usize, f64)| {
+            let taxel = &body.taxels[index];
+            let rest = &body.links[taxel.link].body_from_link;
+            taxel.tangents_in_link().map(|tangent| rest.transform_vector3(tangent))
+        };
+        let tangents = if has_pulls { taxels.iter().map(tangents).collect() } else { Vec::new() };
+        Self { surface, cells, layer, covers, tangents }
+    }
+
+    /// Where a taxel is.
+    pub(in crate::source::simulated) fn position(&self, taxel: usize) -> DVec3 {
+        self.cells.sensors()[taxel].position
+    }
+
+    /// The normal of a taxel and its tangents, if any taxel has three axes.
+    pub(in crate::source::simulated) fn axes(&self, taxel: usize) -> (DVec3, [DVec3; 2]) {
+        (self.cells.sensors()[taxel].normal, self.tangents[taxel])
     }
 
     /// The skin at `p`, if there is any within 20 mm.
@@ -175,13 +201,13 @@ impl BodyTouch {
         }
     }
 
-    /// Presses at `t_s`, adds what the taxels feel to `forces_newton`, and returns what is true of each indenter; `None` where
-    /// there is no skin.
+    /// Presses at `t_s`, adds what the taxels feel to `forces_newton`, and returns what is true of each indenter, with those forces if
+    /// it is to be `by_contact`; `None` where there is no skin.
     pub(in crate::source::simulated) fn press(
         &self,
         skin: &BodySkin,
         t_s: f64,
-        force_newton: f64,
+        (force_newton, by_contact): (f64, bool),
         forces_newton: &mut [f64],
     ) -> Option<Vec<Contact>> {
         let poses = self.poses(skin, t_s)?;
@@ -190,9 +216,18 @@ impl BodyTouch {
         for (shape, pose) in poses {
             let placed = Placed::new(&skin.surface, shape, pose);
             let pressure = skin.skin().press(&placed, each_newton);
-            skin.feel(&pressure, forces_newton);
-            let Footprint { spot, normal, link, principal_axis } = Footprint::new(&skin.surface, &pressure.felt)?;
-            let flat = pose.along - normal * pose.along.dot(normal);
+            let own = if by_contact {
+                let mut own = vec![0.0; forces_newton.len()];
+                skin.feel(&pressure, &mut own);
+                own.into_iter().enumerate().filter(|(_, force)| *force > 0.0).collect()
+            } else {
+                skin.feel(&pressure, forces_newton);
+                Vec::new()
+            };
+            own.iter().for_each(|&(taxel, force)| forces_newton[taxel] += force);
+            let Footprint { spot, normal, link, principal_axis, radius_m } =
+                Footprint::new(&skin.surface, &pressure.felt)?;
+            let flat = (pose.along - normal * pose.along.dot(normal)).normalize_or(pose.along);
             contacts.push(Contact {
                 force_newton: each_newton,
                 depth_m: pressure.depth_m,
@@ -200,7 +235,11 @@ impl BodyTouch {
                 normal,
                 link,
                 principal_axis,
-                direction: shape.is_long().then(|| flat.normalize_or(pose.along)),
+                direction: shape.is_long().then_some(flat),
+                stands_at: pose.spot.position,
+                along: flat,
+                radius_m,
+                forces_newton: own,
             });
         }
         Some(contacts)
