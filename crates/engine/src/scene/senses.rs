@@ -109,7 +109,7 @@ pub(super) fn letters_and_outputs(
     let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
     let there: Vec<Receptor> = others.into_iter().filter(|&other| has(other)).collect();
     // Where nothing else is there either, no letter reads what is.
-    let is_empty = |receptor: &Receptor| !has(*receptor) && !(receptor.is_of_pressure() && there.is_empty());
+    let is_empty = |receptor: &Receptor| !has(*receptor) && (!receptor.is_of_pressure() || !there.is_empty());
     if let Some(empty) = letters.iter().map(|letter| letter.receptor).find(is_empty) {
         let what = match empty {
             Receptor::Shear => {
@@ -277,7 +277,7 @@ impl Senses {
         let known = self.of_touches() | if self.pulls_touches { OF_SHEAR } else { TouchOutputs::empty() };
         let of_letters = [(OF_SHEAR, Receptor::Shear), (TouchOutputs::TEMPERATURE, Receptor::Temperature)];
         for (outputs, receptor) in of_letters {
-            if let Some(name) = (outputs & asked - known).names().next() {
+            if let Some(name) = (outputs & (asked - known)).names().next() {
                 let why = why_not(receptor, body.taxels.iter().any(|taxel| receptor.reads(taxel.modality)));
                 return Err(Error::usage(format!("`touches.{name}` is of letter `{receptor}`, {why}")));
             }

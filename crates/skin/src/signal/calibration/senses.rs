@@ -268,7 +268,7 @@ impl ShearKeys {
         shear.gain = self.gain.as_ref().map(|gain| gain_of("gain", gain, text)).transpose()?;
         if let Some(matrix) = &self.cross_axis {
             let rows = matrix.get_ref();
-            let why = match rows.iter().flatten().find(|share| !(share.abs() <= MOST_ACROSS)) {
+            let why = match rows.iter().flatten().find(|share| share.is_nan() || share.abs() > MOST_ACROSS) {
                 Some(share) => format!("has {share}; its numbers are at most {MOST_ACROSS} in size"),
                 None if rows.iter().flatten().all(|share| *share == 0.0) => {
                     "leaves no shear; its rows are all 0".into()
