@@ -28,8 +28,9 @@ const SIDE: u32 = 20;
 /// Pixels of a swatch with the gap behind it, and of the gap between two entries.
 const SWATCH: u32 = 22;
 const GAP: u32 = 24;
-/// Length of a bar of colours.
+/// Length of a bar of colours: at least, that for which a title gets smaller, and at most.
 const SHORTEST_BAR: u32 = 24;
+const LEFT_BAR: u32 = 80;
 const LONGEST_BAR: u32 = 160;
 /// Width reserved for the scale bar at the right of the last row.
 const BAR: u32 = 220;
@@ -160,7 +161,7 @@ impl Labels {
 
     fn title_size(&self) -> u32 {
         let room = match &self.colours {
-            Some(legend) => self.legend_from(legend).saturating_sub(self.scaled(SHORTEST_BAR + SIDE)),
+            Some(legend) => self.legend_from(legend).saturating_sub(self.scaled(LEFT_BAR + SIDE)),
             None => self.width.saturating_sub(2 * self.scaled(SIDE)),
         };
         let sizes = (MIN_TITLE_SIZE..=self.scaled(TITLE_SIZE)).rev();
