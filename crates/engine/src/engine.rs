@@ -26,7 +26,7 @@ mod touch_senses;
 use self::cadence::OnChange;
 use self::check::Check;
 use self::drift_state::DriftState;
-use self::ids::ranges;
+use self::ids::no_channel;
 use self::input::Input;
 use self::links::Links;
 use self::on_skin::OnSkin;
@@ -216,7 +216,7 @@ impl Engine {
         let mut taken = vec![false; self.ids.len()];
         let mut taxel_of_value = Vec::with_capacity(ids.len());
         for id in ids {
-            let taxel = self.ids.binary_search(id).map_err(|_| self.no_channel(Channel(*id)))?;
+            let taxel = self.ids.binary_search(id).map_err(|_| no_channel(Channel(*id), self.taxel_ids()))?;
             if std::mem::replace(&mut taken[taxel], true) {
                 return Err(Error::failed(format!("taxel id {} appears twice", Channel(*id))));
             }
@@ -225,16 +225,6 @@ impl Engine {
         self.intake.set_channels(taxel_of_value);
         self.pick();
         Ok(())
-    }
-
-    fn no_channel(&self, channel: Channel) -> Error {
-        let taxel = channel.taxel();
-        Error::failed(if self.taxel_ids().binary_search(&taxel).is_ok() {
-            format!("taxel {taxel} has one value, and {channel} is given; its modality is not force3")
-        } else {
-            let ids = ranges(self.taxel_ids());
-            format!("taxel id {channel} is not in the body, whose ids are {ids}; is it the right body?")
-        })
     }
 
     /// From now on, fields that hold a taxel whose value is [`RawValue::STALE`] carry [`Flags::STALE`](crate::percept::Flags::STALE) beside

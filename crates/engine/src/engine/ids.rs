@@ -1,7 +1,20 @@
 //! Ids in words.
 
+use crate::error::Error;
+use crate::signal::Channel;
+
+/// That a body with the taxels `ids`, ascending, does not have `channel`.
+pub(super) fn no_channel(channel: Channel, ids: &[u32]) -> Error {
+    let taxel = channel.taxel();
+    Error::failed(if ids.binary_search(&taxel).is_ok() {
+        format!("taxel {taxel} has one value, and {channel} is given; its modality is not force3")
+    } else {
+        format!("taxel id {channel} is not in the body, whose ids are {}; is it the right body?", ranges(ids))
+    })
+}
+
 /// Ascending ids in few words: `0–35, 64–103`.
-pub(super) fn ranges(ids: &[u32]) -> String {
+fn ranges(ids: &[u32]) -> String {
     let mut words: Vec<String> = Vec::new();
     let mut start = 0;
     for end in 1..=ids.len() {
