@@ -82,8 +82,13 @@ impl Fill<'_> {
                 snap(self.rest_surface, region, &of_marks(self.rest_surface, names)?, *within_m)?
             }
             Placement::Icub { path, link, within_m } => {
-                let (given, more) =
-                    of_icub(self.rest_surface, path, link.as_deref(), self.place.modality.unwrap_or_default(), self.place.first_id)?;
+                let (given, more) = of_icub(
+                    self.rest_surface,
+                    path,
+                    link.as_deref(),
+                    self.place.modality.unwrap_or_default(),
+                    self.place.first_id,
+                )?;
                 notes.extend(more);
                 snap(self.rest_surface, region, &given, *within_m)?
             }

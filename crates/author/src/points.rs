@@ -108,7 +108,8 @@ fn read_table(rest_surface: &RestSurface<'_>, path: &Path, modality: Option<Moda
         let (mut position_in_body, mut tangent_in_body) = (row.position, row.tangent);
         if let Some([own, wanted]) = row.modality.zip(modality).map(<[Modality; 2]>::from).filter(|[a, b]| a != b) {
             let (own, wanted) = (own.name(), wanted.name());
-            let what = format!("taxel {} measures {own}, and the place's `modality` is {wanted}; remove one of them", row.id);
+            let what =
+                format!("taxel {} measures {own}, and the place's `modality` is {wanted}; remove one of them", row.id);
             return Err(Error::failed(what).at(format!("line {}", row.line)));
         }
         if let Some(name) = &row.link {

@@ -148,7 +148,12 @@ fn seat_images<'p>(
     for (pair, image) in seated.chunks_exact_mut(2).zip(images) {
         let [one, other] = pair else { continue };
         let link = pairs.image(one.taxel.link);
-        *other = rest_surface.mesh_taxel(image, other.taxel.id, (other.taxel.modality, None), &BTreeSet::from([link as u32]));
+        *other = rest_surface.mesh_taxel(
+            image,
+            other.taxel.id,
+            (other.taxel.modality, None),
+            &BTreeSet::from([link as u32]),
+        );
         if other.taxel.link != link {
             let name = |link: usize| &rest_surface.body.links[link].name;
             return Err(failed!(
