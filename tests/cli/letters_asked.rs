@@ -99,7 +99,7 @@ fn a_body_without_pressures_is_told_so() {
         assert!(why.contains(&format!("{no_pressure}{what}")), "{why}");
     }
     let within = fails(2, &[&["run"][..], &read, &["--within", "3 mm"]].concat());
-    assert!(within.contains(no_pressure), "{within}");
+    assert!(within.contains("options are for letters of pressure, and there is none; leave --within"), "{within}");
     let surveyed = fails(2, &[&["calibrate"][..], &read, &["--rest", "0.5", "-o", "/dev/null"]].concat());
     assert!(surveyed.contains("pad.glb: no taxel measures pressure"), "{surveyed}");
     // What is warm is not pressed.

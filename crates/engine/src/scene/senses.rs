@@ -148,12 +148,14 @@ pub(super) fn letters_and_outputs(
 }
 
 impl ForTouches {
-    /// For touches, if `scene` asks for them, beside fields in `letters`: whoever names letters has no others.
+    /// For touches, if `scene` asks for them, beside fields in `letters`: whoever names letters has no others, and who asks only for what is
+    /// made of touches none.
     pub(super) fn new(body: &Body, scene: &Scene, letters: &[Letter], are_asked: bool) -> Self {
         let has = |receptor: Receptor| are_asked && body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
+        let has_all = scene.letters.is_empty() && scene.touches.is_some();
         let gives = |receptor: Receptor| {
             let is_named = letters.iter().any(|letter| letter.receptor == receptor);
-            has(receptor) && (is_named || scene.letters.is_empty())
+            has(receptor) && (is_named || has_all)
         };
         Self {
             reads_pulls: has(Receptor::Shear),

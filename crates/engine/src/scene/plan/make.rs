@@ -32,8 +32,7 @@ impl Plan {
         check(body, fields, scene, calibration)?;
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs);
-        let named = outputs;
-        let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, named)?;
+        let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, outputs)?;
         let left_out = LeftOut::from_fields(body, &chosen, fields, &letters);
         let chosen = left_out.feeling(body, chosen, fields)?;
         // Nobody named letters, and there are no pressures to find touches in.
