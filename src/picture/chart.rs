@@ -234,8 +234,8 @@ mod tests {
 
     #[test]
     fn forces_lie_in_a_chart_as_their_taxels_do_and_keep_their_length() {
-        // A palm is flat: a step along a tangent is a step along it in the chart.
-        let [step, length] = off("hand/palm");
+        // A back is flat: a step along a tangent is a step along it in the chart.
+        let [step, length] = off("hand/back");
         assert!(step < 1e-6 && length < 1e-9, "{step}, {length}");
         // A finger is not: a step is shortened there, and a force is not.
         let [step, length] = off("hand/midhand/index");

@@ -28,6 +28,10 @@ const SIDE: u32 = 20;
 /// Pixels of a swatch with the gap behind it, and of the gap between two entries.
 const SWATCH: u32 = 22;
 const GAP: u32 = 24;
+/// Length of a bar of colours: at least, that for which a title gets smaller, and at most.
+const SHORTEST_BAR: u32 = 24;
+const LEFT_BAR: u32 = 80;
+const LONGEST_BAR: u32 = 160;
 /// Width reserved for the scale bar at the right of the last row.
 const BAR: u32 = 220;
 
@@ -156,7 +160,10 @@ impl Labels {
     }
 
     fn title_size(&self) -> u32 {
-        let room = self.width.saturating_sub(2 * self.scaled(SIDE));
+        let room = match &self.colours {
+            Some(legend) => self.legend_from(legend).saturating_sub(self.scaled(LEFT_BAR + SIDE)),
+            None => self.width.saturating_sub(2 * self.scaled(SIDE)),
+        };
         let sizes = (MIN_TITLE_SIZE..=self.scaled(TITLE_SIZE)).rev();
         let mut fitting = sizes.filter(|&size| ink::width(&self.title, size).is_ok_and(|wide| wide <= room));
         fitting.next().unwrap_or(MIN_TITLE_SIZE)
@@ -253,6 +260,14 @@ impl Labels {
         area.present().map_err(cannot)
     }
 
+    /// Where a bar of colours could begin that is as long as nothing, pixels: what is right of it are its ends and gaps.
+    fn legend_from(&self, Legend { ends: [least, most], unit, .. }: &Legend) -> u32 {
+        let size = self.scaled(SIZE);
+        // An error is reported when the text is drawn.
+        let words = [short(*least), format!("{} {unit}", short(*most))].map(|end| ink::width(&end, size).unwrap_or(0));
+        self.width.saturating_sub(words[0] + words[1] + self.scaled(SIDE + 16 + GAP))
+    }
+
     /// Draws a bar of colours at the right of the title.
     fn draw_colours<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, legend: &Legend) -> Result<()> {
         let Legend { colours, ends: [least, most], unit, note } = legend;
@@ -265,7 +280,10 @@ impl Labels {
         let (top, low) = (scaled(14), scaled(12));
         let ends = [(short(*least), HPos::Right), (format!("{} {unit}", short(*most)), HPos::Left)];
         let right = width - side - ink::width(&ends[1].0, size)? - scaled(8);
-        let left = right - scaled(160);
+        // A bar of colours gives way to a title.
+        let title = side + ink::width(&self.title, self.title_size())?;
+        let room = self.legend_from(legend).saturating_sub(title);
+        let left = right.saturating_sub(room.clamp(scaled(SHORTEST_BAR), scaled(LONGEST_BAR)));
         for x in left..right {
             let [r, g, b] = colours[((x - left) * 255 / (right - left)) as usize];
             let column = [place(x, top + scaled(5)), place(x + 1, top + scaled(5) + low)];
@@ -359,6 +377,21 @@ mod tests {
         // A name that takes the bar's place has the bar below it.
         let mut narrow = Labels::new("x", 400);
         assert_eq!(narrow.key(vec![(None, "a field of a rather long name".to_owned())], [400, 400]), 2 * ROW + 12);
+    }
+
+    #[test]
+    fn a_title_leaves_room_for_a_bar_of_colours() {
+        let legend = || Legend { colours: [[0; 3]; COLOURS], ends: [0.0, 1.4], unit: "N".into(), note: String::new() };
+        for width in [240, 300, 500, 1200] {
+            let mut labels = Labels::new("hand/midhand/index", width);
+            let alone = labels.title_size();
+            labels.colours(legend());
+            let (size, from) = (labels.title_size(), labels.legend_from(&legend()));
+            let ends_at = labels.scaled(SIDE) + ink::width("hand/midhand/index", size).unwrap();
+            assert!(ends_at + labels.scaled(SHORTEST_BAR) <= from, "{width}: {ends_at} and {from}");
+            // Only where it would not fit, a title is smaller for it.
+            assert_eq!(size < alone, width < 500, "{width}");
+        }
     }
 
     #[test]

@@ -124,7 +124,10 @@ impl Prepared {
         // Include the discs and their rims.
         let reach = |taxel: usize| {
             let (place, reach) = (dots.places[taxel] - middle, RIM * dots.radii[taxel]);
-            [place - reach, place + reach]
+            // All corners of the cube around it: views may be aslant.
+            [-reach, reach].into_iter().flat_map(move |x| {
+                [-reach, reach].into_iter().flat_map(move |y| [-reach, reach].map(|z| place + DVec3::new(x, y, z)))
+            })
         };
         let all = (0..dots.places.len()).flat_map(reach);
         let points: Vec<DVec3> = triangles.iter().flat_map(|(_, c)| c.map(|p| p - middle)).chain(all).collect();

@@ -123,6 +123,18 @@ fn each_quantity_is_plotted_in_the_letter_that_gives_it_with_its_unit() {
 }
 
 #[test]
+fn a_quantity_that_no_upper_field_has_is_plotted_of_the_first_one_that_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("a.svg");
+    let named = |outputs: &str| {
+        done(&["plot", "--body", "sensing-hand", "--outputs", outputs, "-o", text_of(&to), "--force"]);
+        std::fs::read_to_string(&to).unwrap().matches("hand/midhand/index").count()
+    };
+    // Maps name it twice. The fields above it have a friction, and no chart to have a shear in.
+    assert_eq!((named("friction"), named("shear")), (2, 3));
+}
+
+#[test]
 fn taxels_have_the_colours_of_the_letter_that_is_asked_for() {
     let skin = Skin::new();
     let at = |map: [[u8; 3]; 256], share: f64| map[(255.0 * share).round() as usize];

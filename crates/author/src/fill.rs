@@ -82,13 +82,18 @@ impl Fill<'_> {
                 snap(self.rest_surface, region, &of_marks(self.rest_surface, names)?, *within_m)?
             }
             Placement::Icub { path, link, within_m } => {
-                let (given, more) =
-                    of_icub(self.rest_surface, path, link.as_deref(), self.place.modality, self.place.first_id)?;
+                let (given, more) = of_icub(
+                    self.rest_surface,
+                    path,
+                    link.as_deref(),
+                    self.place.modality.unwrap_or_default(),
+                    self.place.first_id,
+                )?;
                 notes.extend(more);
                 snap(self.rest_surface, region, &given, *within_m)?
             }
             Placement::Table { path, within_m } => {
-                let given = of_table(self.rest_surface, path)?;
+                let given = of_table(self.rest_surface, path, self.place.modality)?;
                 snap(self.rest_surface, region, &given, *within_m).map_err(|e| e.at(path.display()))?
             }
             _ => return self.sample(&chosen, progress),
@@ -148,7 +153,7 @@ impl Fill<'_> {
             }
             _ => kept,
         };
-        Ok(placed.into_iter().map(|placed| Snapped { placed, id: None, moved_m: 0.0 }).collect())
+        Ok(placed.into_iter().map(|placed| Snapped::on_surface(placed)).collect())
     }
 
     /// The triangles `chosen`.
@@ -245,7 +250,7 @@ impl Fill<'_> {
         let cells = set_cell_areas(positions, triangles, &group_of, (&is_surface, skin), &mut placed);
         filled.cells = cells.filter(|_| !is_surface.contains(&false));
         let in_body = |one: Placed| Placed { triangle: chosen[one.triangle], ..one };
-        let taxels = placed.into_iter().map(|one| Snapped { placed: in_body(one), id: None, moved_m: 0.0 });
+        let taxels = placed.into_iter().map(|one| Snapped::on_surface(in_body(one)));
         filled.taxels = taxels.collect();
         filled.hidden_m2 = ground.hidden_m2();
         let name = &self.place.name;

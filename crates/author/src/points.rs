@@ -19,6 +19,9 @@ pub(super) struct GivenPoint {
     position_in_body: DVec3,
     /// Its area, m², if given.
     area_m2: Option<f64>,
+    /// What it measures, if given.
+    modality: Option<Modality>,
+    tangent_in_body: Option<DVec3>,
     name: String,
 }
 
@@ -26,7 +29,18 @@ pub(super) struct GivenPoint {
 pub(super) struct Snapped {
     pub(super) placed: Placed,
     pub(super) id: Option<u32>,
+    /// What it measures, if that is its own.
+    pub(super) modality: Option<Modality>,
+    /// The tangent of one with three axes, if it has its own.
+    pub(super) tangent_in_body: Option<DVec3>,
     pub(super) moved_m: f64,
+}
+
+impl Snapped {
+    /// A place that nobody gave.
+    pub(super) fn on_surface(placed: Placed) -> Self {
+        Self { placed, id: None, modality: None, tangent_in_body: None, moved_m: 0.0 }
+    }
 }
 
 /// The places of the marks called `names`, sorted by name, `tip.2` before `tip.10`.
@@ -46,6 +60,8 @@ pub(super) fn of_marks(rest_surface: &RestSurface<'_>, names: &Globs) -> Result<
             id: None,
             position_in_body,
             area_m2: None,
+            modality: None,
+            tangent_in_body: None,
             name: if mark.positions_in_body.len() > 1 {
                 format!("point {index} of `{}`", mark.name)
             } else {
@@ -72,25 +88,45 @@ fn natural(name: &str) -> Vec<(String, u64)> {
 }
 
 /// The places in the table at `path`: columns `id`, `x`, `y`, `z` in metres, optionally `link` for coordinates in a link's
-/// frame, and `area` in m²; normals are the surface's, and what taxels measure is the place's.
-pub(super) fn of_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPoint>> {
-    read_table(rest_surface, path).map_err(|e| e.at(path.display()))
+/// frame, `area` in m², `modality`, and `tx`, `ty`, `tz` of taxels with three axes; normals are the surface's. If the place says what
+/// its taxels measure, `modality`, no row says something else.
+pub(super) fn of_table(
+    rest_surface: &RestSurface<'_>,
+    path: &Path,
+    modality: Option<Modality>,
+) -> Result<Vec<GivenPoint>> {
+    read_table(rest_surface, path, modality).map_err(|e| e.at(path.display()))
 }
 
-fn read_table(rest_surface: &RestSurface<'_>, path: &Path) -> Result<Vec<GivenPoint>> {
+fn read_table(rest_surface: &RestSurface<'_>, path: &Path, modality: Option<Modality>) -> Result<Vec<GivenPoint>> {
     let file = limits::open(path, MAX_TABLE_BYTES).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::failed("no such file; it must be next to the recipe"),
         _ => Error::failed(e.to_string()),
     })?;
     let mut given = Vec::new();
     for row in read_taxel_table(file, false)? {
-        let mut position_in_body = row.position;
+        let (mut position_in_body, mut tangent_in_body) = (row.position, row.tangent);
+        if let Some([own, wanted]) = row.modality.zip(modality).map(<[Modality; 2]>::from).filter(|[a, b]| a != b) {
+            let (own, wanted) = (own.name(), wanted.name());
+            let what =
+                format!("taxel {} measures {own}, and the place's `modality` is {wanted}; remove one of them", row.id);
+            return Err(Error::failed(what).at(format!("line {}", row.line)));
+        }
         if let Some(name) = &row.link {
             let link = find_link(rest_surface.body, name).map_err(|e| e.at(format!("line {}", row.line)))?;
-            position_in_body = rest_surface.body.links[link].body_from_link.transform_point3(position_in_body);
+            let body_from_link = rest_surface.body.links[link].body_from_link;
+            position_in_body = body_from_link.transform_point3(position_in_body);
+            tangent_in_body = tangent_in_body.map(|tangent| body_from_link.transform_vector3(tangent));
         }
         let name = format!("line {}: taxel {}", row.line, row.id);
-        given.push(GivenPoint { id: Some(row.id), position_in_body, area_m2: row.area_m2, name });
+        given.push(GivenPoint {
+            id: Some(row.id),
+            position_in_body,
+            area_m2: row.area_m2,
+            modality: row.modality,
+            tangent_in_body,
+            name,
+        });
     }
     Ok(given)
 }
@@ -120,6 +156,8 @@ pub(super) fn of_icub(
             id: Some(first_id.saturating_add(channel)),
             position_in_body: body_from_link.transform_point3(taxel.position_in_link),
             area_m2: None,
+            modality: None,
+            tangent_in_body: None,
             name: format!("channel {channel} of {}", path.display()),
         })
         .collect();
@@ -162,7 +200,13 @@ pub(super) fn snap(
         let triangle = triangles[hit.triangle];
         let barycentric = barycentric(rest_surface.corners(triangle), hit.position);
         let point = SurfacePoint { position: hit.position, normal: hit.normal, area: 0.0 };
-        snapped.push(Snapped { placed: Placed { point, triangle, barycentric }, id: place.id, moved_m });
+        snapped.push(Snapped {
+            placed: Placed { point, triangle, barycentric },
+            id: place.id,
+            modality: place.modality,
+            tangent_in_body: place.tangent_in_body,
+            moved_m,
+        });
     }
     let placed: Vec<Placed> = snapped.iter().map(|snapped| snapped.placed).collect();
     let all_known = given.iter().all(|place| place.area_m2.is_some());

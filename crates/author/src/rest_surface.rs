@@ -154,7 +154,13 @@ impl<'a> RestSurface<'a> {
     }
 
     /// The taxel `id` at `placed`, whose triangle is one of this surface. On a skinned mesh it rides on the heaviest of `links`.
-    pub(super) fn mesh_taxel(&self, placed: &Placed, id: u32, modality: Modality, links: &BTreeSet<u32>) -> MeshTaxel {
+    pub(super) fn mesh_taxel(
+        &self,
+        placed: &Placed,
+        id: u32,
+        (modality, tangent_in_body): (Modality, Option<DVec3>),
+        links: &BTreeSet<u32>,
+    ) -> MeshTaxel {
         let (part, index) = self.origin[placed.triangle];
         let part = part as usize;
         let surface = &self.body.surfaces[part];
@@ -182,7 +188,9 @@ impl<'a> RestSurface<'a> {
         let stretch = (DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * normal).length();
         let area = if stretch > 0.0 { placed.point.area / stretch } else { 0.0 };
         let position_in_link = at(0) + at(1) + at(2);
-        let taxel = Taxel { id, link, position_in_link, normal_in_link: normal, area, modality, tangent_in_link: None };
+        let mesh_from_body = (self.body.links[link].body_from_link * link_from_mesh).inverse();
+        let tangent_in_link = tangent_in_body.map(|tangent| mesh_from_body.transform_vector3(tangent).normalize());
+        let taxel = Taxel { id, link, position_in_link, normal_in_link: normal, area, modality, tangent_in_link };
         MeshTaxel { part, taxel, carriers }
     }
 }

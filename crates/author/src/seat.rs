@@ -96,11 +96,14 @@ impl Seated {
         let ids: Vec<u32> = filled.iter().zip(place.first_id..).map(|(one, next)| one.id.unwrap_or(next)).collect();
         used.take(ids.iter().copied(), &format!("place `{}`", place.name), &place.at)?;
         self.notes.extend(without_area(place, &filled, &ids));
-        let is_whole = is_alone && place.modality.is_pressed() && !region.contains(&false);
+        let is_whole = is_alone && place.modality.unwrap_or_default().is_pressed() && !region.contains(&false);
         self.divided = cells.filter(|_| is_whole).map(|cells| (ids.clone(), cells));
         let first = self.taxels.len();
         let links = rest_surface.link.iter().zip(region).filter(|(_, is_in)| **is_in).map(|(&link, _)| link).collect();
-        let seat = |(one, &id): (&Snapped, &u32)| rest_surface.mesh_taxel(&one.placed, id, place.modality, &links);
+        let seat = |(one, &id): (&Snapped, &u32)| {
+            let modality = one.modality.or(place.modality).unwrap_or_default();
+            rest_surface.mesh_taxel(&one.placed, id, (modality, one.tangent_in_body), &links)
+        };
         self.taxels.extend(filled.iter().zip(&ids).map(seat));
         if is_mirrored {
             let images = filled.iter().map(|one| &one.placed).skip(1).step_by(2);
@@ -145,7 +148,12 @@ fn seat_images<'p>(
     for (pair, image) in seated.chunks_exact_mut(2).zip(images) {
         let [one, other] = pair else { continue };
         let link = pairs.image(one.taxel.link);
-        *other = rest_surface.mesh_taxel(image, other.taxel.id, other.taxel.modality, &BTreeSet::from([link as u32]));
+        *other = rest_surface.mesh_taxel(
+            image,
+            other.taxel.id,
+            (other.taxel.modality, None),
+            &BTreeSet::from([link as u32]),
+        );
         if other.taxel.link != link {
             let name = |link: usize| &rest_surface.body.links[link].name;
             return Err(failed!(

@@ -201,6 +201,9 @@ fn bar(percept: &Percept, scale: Scale) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use somatic::internal::signal::{Channel, Frame, RawValue};
+    use somatic::{Body, Engine, Options, bundled};
+
     use super::*;
 
     #[test]
@@ -215,6 +218,26 @@ mod tests {
         assert_eq!(texts, ["0° →", "23° ↗", "90° ↑", "180° ←", "-179° ←", "-90° ↓", "-23° ↘"]);
         // The widest there is fits its column.
         assert_eq!(arrow(-3.0).chars().count(), 7);
+    }
+
+    #[test]
+    fn a_name_of_another_letter_takes_room_that_columns_would_have() {
+        let unit = PrintedUnit::for_quantity(Quantity::Newton);
+        let layout = Layout::new(32, Outputs::all(), None, 100, unit);
+        let body = Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
+        let mut engine = Engine::new(&body, Options::default()).unwrap();
+        let values = vec![RawValue::new(24.0); Channel::all_of(&body).len()];
+        let percepts = engine.process_one(&Frame { values, ..Frame::default() }).unwrap().clone();
+        let scale = Scale { largest_total: 1.0, unit };
+        let name = "hand/midhand/index · temperature";
+        let row = |has: fn(&Percept) -> bool| {
+            let percept = percepts.frame(0).find(has).unwrap();
+            layout.row(name, Some(&percept), scale)
+        };
+        let warm = row(|percept| percept.temperature.is_some());
+        assert!(warm.contains(name) && warm.contains("24.0 °C") && console::measure_text_width(&warm) <= 100, "{warm}");
+        // One of pressures has its columns.
+        assert!(!row(|percept| percept.total.is_some()).contains(name));
     }
 
     #[test]

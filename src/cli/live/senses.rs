@@ -17,11 +17,7 @@ pub(super) fn said(percept: &Percept, factor: f64, unit: &str) -> Option<String>
         vec![
             Some(format!("{} mm away", millimetres(nearest))),
             percept.covered.map(|covered| format!("{covered} in range")),
-            percept.approach_speed.map(|speed| {
-                let mm_per_s = (speed * 1e3).round();
-                let way = if mm_per_s < 0.0 { "going" } else { "coming" };
-                if mm_per_s == 0.0 { "still".to_owned() } else { format!("{way} at {:.0} mm/s", mm_per_s.abs()) }
-            }),
+            percept.approach_speed.map(way),
         ]
     } else {
         let force = percept.shear_vector.map(|force| force.iter().map(|x| x * x).sum::<f64>().sqrt());
@@ -34,4 +30,21 @@ pub(super) fn said(percept: &Percept, factor: f64, unit: &str) -> Option<String>
     };
     let said: Vec<String> = parts.into_iter().flatten().collect();
     (!said.is_empty()).then(|| said.join("  "))
+}
+
+/// What something does that approaches at `speed`, m/s.
+fn way(speed: f64) -> String {
+    let mm_per_s = (speed * 1e3).round();
+    let way = if mm_per_s < 0.0 { "going" } else { "coming" };
+    if mm_per_s == 0.0 { "still".to_owned() } else { format!("{way} at {:.0} mm/s", mm_per_s.abs()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn something_comes_goes_or_is_still() {
+        assert_eq!([0.1, -0.145, -4e-4].map(way), ["coming at 100 mm/s", "going at 145 mm/s", "still"]);
+    }
 }

@@ -239,12 +239,12 @@ fn place(recipe_text: RecipeText<'_>, spanned: &Spanned<PlaceKeys>, folder: &Pat
         return Err(text.wrong(id.span(), "`first_id` has no meaning where the table has ids; remove it"));
     }
     let modality = match &keys.modality {
-        None => Modality::Pressure,
+        None => None,
         Some(name) => {
             let known = [Modality::Pressure, Modality::Temperature, Modality::Proximity, Modality::Force3];
             let names = known.map(Modality::name);
             let found = known.into_iter().find(|modality| modality.name() == *name.get_ref());
-            found.ok_or_else(|| text.unknown(name, "modality", names.iter().map(String::as_str)))?
+            Some(found.ok_or_else(|| text.unknown(name, "modality", names.iter().map(String::as_str)))?)
         }
     };
     let regions = keys.region.as_ref().map_or_else(Vec::new, |names| names.get_ref().0.clone());

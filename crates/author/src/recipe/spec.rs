@@ -74,7 +74,8 @@ pub(crate) struct PlaceSpec {
     pub(crate) seed: Option<u64>,
     /// The first of its ids, which count up.
     pub(crate) first_id: u32,
-    pub(crate) modality: Modality,
+    /// What its taxels measure, if it says so.
+    pub(crate) modality: Option<Modality>,
     pub(crate) how: Placement,
     pub(crate) at: Origin,
 }
@@ -161,7 +162,7 @@ impl Recipe {
             regions,
             seed: None,
             first_id: 0,
-            modality: Modality::Pressure,
+            modality: None,
             how,
             at: Origin::flag(flag),
         });
