@@ -156,7 +156,8 @@ fn clouds_of_a_bag_have_what_every_kind_of_taxel_reads() {
     let bag = format!("ros2-mcap:{}", folder.path().join("bag").display());
     let asked = ["run", "--body", "sensing-hand", "--backend", "reference", "--all-fields", "--sink", "-"];
     let lines = frames(&done(&[&asked[..], &["--sink", &bag]].concat()));
-    let again = frames(&done(&[&asked[..], &["--source", &bag]].concat()));
+    let calibration = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/sensing-hand.toml");
+    let again = frames(&done(&[&asked[..], &["--source", &bag, "--calibration", calibration]].concat()));
     assert!(lines.len() > 100 && lines.len() == again.len(), "{} and {}", lines.len(), again.len());
     let percepts = |frame: &Value| frame["fields"].as_array().unwrap().clone();
     let mut seen = BTreeSet::new();
@@ -179,7 +180,8 @@ fn clouds_of_a_bag_have_what_every_kind_of_taxel_reads() {
     let asked = ["run", "--body", text_of(&body), "--backend", "reference", "--all-fields", "--sink", "-", "--outputs"];
     let asked = [&asked[..], &["total,shear,shear_vector"]].concat();
     let lines = frames(&done(&[&asked[..], &["--source", text_of(&touch), "--sink", &bag]].concat()));
-    let again = frames(&done(&[&asked[..], &["--source", &bag]].concat()));
+    let calibration = concat!(env!("CARGO_MANIFEST_DIR"), "/bodies/sensing-hand.toml");
+    let again = frames(&done(&[&asked[..], &["--source", &bag, "--calibration", calibration]].concat()));
     let shear = |frame: &Value| {
         let all = percepts(frame);
         all.into_iter().find(|percept| percept["letter"] == "shear").unwrap()

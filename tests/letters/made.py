@@ -199,6 +199,7 @@ def random_calibration(rng, body):
         shear |= {"gain": number(0.001, 1)} if rng.random() < 0.5 else {}
         shear |= {"cross_axis": np.round(np.array([[0, 1, 0], [0, 0, 1]]) + rng.normal(0, 0.1, (2, 3)), 4).tolist()} if rng.random() < 0.5 else {}
         shear |= {"slips_at": number(0.2, 1.2)} if rng.random() < 0.7 else {}
+        shear |= {"noise": number(0.1, 3)} if rng.random() < 0.4 else {}
         file["shear"] = shear
     warm = {"window_s": float(rng.choice([0.33, 1.0, 2.5]))} if rng.random() < 0.5 else {}
     match rng.integers(4):
@@ -223,8 +224,11 @@ def random_calibration(rng, body):
         if kind == "force3":
             own |= {"shear_baseline": [number(-30, 30), number(-30, 30)]} if rng.random() < 0.5 else {}
             own |= {"shear_gain": number(0.001, 1)} if rng.random() < 0.5 else {}
+            own |= {"shear_noise": number(0.1, 3)} if rng.random() < 0.3 else {}
         elif kind != "pressure" and rng.random() < 0.3:
             own |= {"curve": "warm" if kind == "temperature" else "far"}
+        if kind in ("temperature", "proximity") and rng.random() < 0.3:
+            own |= {"invert": True}
         file["taxel"][str(taxel)] = own
     return file
 

@@ -120,7 +120,7 @@ def sensed(recording, letter, taxels):
         own = every | file.get("taxel", {}).get(str(body.ids[taxel]), {})
         # What a masked taxel reads is faulty, whatever it is.
         codes[:, column] &= not own.get("mask")
-        above = raw[:, column] - own["baseline"]
+        above = (own["baseline"] - raw[:, column]) if own.get("invert") else (raw[:, column] - own["baseline"])
         if "ntc" in own and "curve" not in own:
             ntc = own["ntc"]
             with np.errstate(all="ignore"):
@@ -253,6 +253,8 @@ def shears(recording, field, frames):
     own_gain = of("shear_gain", keys.get("gain", np.nan)).astype(float) * unit
     side_gain = np.where(np.isnan(own_gain), np.abs(gain), own_gain)
     rest = np.array([file.get("taxel", {}).get(str(body.ids[taxel]), {}).get("shear_baseline", keys.get("baseline", [0.0, 0.0])) for taxel in field.members])
+    side_noise = of("shear_noise", keys.get("noise", np.nan)).astype(float)
+    side_noise = np.where(np.isnan(side_noise), noise, side_noise)
     cross = np.array(keys.get("cross_axis", [[0, 1, 0], [0, 0, 1]]), float)
     areas = body.area[field.members]
     newtons = {"N": np.ones(len(areas)), "Pa": np.where(areas > 0, areas, np.nan), None: np.full(len(areas), np.nan)}[quantity]
@@ -321,7 +323,7 @@ def shears(recording, field, frames):
             flags |= {"noise_unknown"}
         else:
             of_pull = ((weights * np.abs(gain[there]) * noise[there]) ** 2).sum()
-            of_shear = ((weights * np.abs(g) * noise[there]) ** 2).sum()
+            of_shear = ((weights * np.abs(g) * side_noise[there]) ** 2).sum()
             sigma = np.sqrt(of_shear + friction**2 * of_pull) / pull
             # A standard deviation of P is a difference of values.
             large = (np.abs(raw[frame, there]) + np.abs(baseline[there]) + noise[there]) / noise[there]

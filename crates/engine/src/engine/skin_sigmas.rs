@@ -28,7 +28,7 @@ pub(super) struct SkinSigmas {
 impl SkinSigmas {
     /// `None` where none of them is asked for.
     pub(super) fn new(wanted: TouchOutputs) -> Option<Self> {
-        let wanted = wanted.intersection(TouchOutputs::SIGMAS.difference(TouchOutputs::FRICTION_SIGMA));
+        let wanted = wanted.intersection(TouchOutputs::SIGMAS);
         (!wanted.is_empty()).then(|| Self { wanted, near: Vec::new(), felt: Vec::new() })
     }
 

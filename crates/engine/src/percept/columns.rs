@@ -316,7 +316,7 @@ columns! {
     FRICTION 44 friction: f64, One, Number, shear, parts [] host [Friction];
     #[doc = "The standard deviation of the friction by the sensors' noise; only on request."]
     FRICTION_SIGMA 45 friction_sigma: f64, One, Number, shear, parts [] host [FrictionSigma];
-    #[doc = "Friction over that at which it slips, slips_at of the calibration: a slip begins at 0.95."]
+    #[doc = "Friction over that at which it slips, if the calibration has slips_at: a slip begins at 0.95."]
     SLIP_RATIO 62 slip_ratio: f64, One, Number, shear, parts [] host [SlipRatio];
     #[doc = "Weighted mean of the temperatures, °C; of letter `temperature`, as the outputs down to temperature_rate."]
     TEMPERATURE 46 temperature: f64, Celsius, Number, temperature, parts [] host [Temperature];

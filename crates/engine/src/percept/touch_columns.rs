@@ -94,6 +94,7 @@ impl TouchOutputs {
         .difference(Self::WRENCH)
         .difference(Self::FIT)
         .difference(Self::SIGMAS)
+        .difference(Self::FRICTION_SIGMA)
         .difference(Self::SHEAR)
         .difference(Self::TEMPERATURE);
 
@@ -108,9 +109,8 @@ impl TouchOutputs {
         .union(Self::FIT_VELOCITY)
         .union(Self::PLACE);
 
-    /// Standard deviations of what is not made of fits.
-    pub const SIGMAS: Self =
-        Self::TOTAL_SIGMA.union(Self::POSITION_SIGMA).union(Self::PRINCIPAL_AXIS_SIGMA).union(Self::FRICTION_SIGMA);
+    /// Standard deviations of what is made of pressures and not of fits.
+    pub const SIGMAS: Self = Self::TOTAL_SIGMA.union(Self::POSITION_SIGMA).union(Self::PRINCIPAL_AXIS_SIGMA);
 
     /// The names as `--outputs touches.NAME` and NDJSON spell them, in order.
     pub fn names(self) -> impl Iterator<Item = String> {

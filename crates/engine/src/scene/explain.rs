@@ -112,7 +112,8 @@ impl Plan {
         };
         let slots = (self.calibrated(), 0);
         let found = (counts(&all).0, 0);
-        let senses = &self.senses;
+        // What touches alone read of them is a part of touches.
+        let is_letter = |receptor: Receptor| self.letters.iter().any(|letter| letter.receptor == receptor);
         let sensed = |receptor: Receptor| {
             let own = self.fields.iter().filter(|field| self.letters[field.letter].receptor == receptor);
             own.fold((0, 0), |(fields, members), field| (fields + 1, members + field.sensed.len()))
@@ -136,9 +137,14 @@ impl Plan {
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
             ("fit", self.fits(), (self.channels(), 0), ""),
-            ("shear", senses.shear.is_some(), sensed(Receptor::Shear), "no letter is `shear`"),
-            ("temperature", senses.temperature.is_some(), sensed(Receptor::Temperature), "no letter is `temperature`"),
-            ("proximity", senses.proximity.is_some(), sensed(Receptor::Proximity), "no letter is `proximity`"),
+            ("shear", is_letter(Receptor::Shear), sensed(Receptor::Shear), "no letter is `shear`"),
+            (
+                "temperature",
+                is_letter(Receptor::Temperature),
+                sensed(Receptor::Temperature),
+                "no letter is `temperature`",
+            ),
+            ("proximity", is_letter(Receptor::Proximity), sensed(Receptor::Proximity), "no letter is `proximity`"),
         ];
         let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
             let gives = match name {

@@ -240,13 +240,11 @@ impl Senses {
     }
 
     /// Refuses shear whose calibration does not say what it is made of: of the taxels `body_taxels`, which `calibrations` are of, one
-    /// has a curve and no gain for its tangential values; or `outputs` asks by name for the ratio to a friction that is not known.
-    /// Nothing is refused if only wrenches read them, not touches nor, by `of_fields`, fields.
+    /// has a curve and no gain for its tangential values. Nothing is refused if only wrenches read them, not touches nor, by `of_fields`, fields.
     pub(super) fn check_shear(
         &self,
         body: &Body,
         (body_taxels, calibrations): (&[usize], &[TaxelCalibration]),
-        outputs: Outputs,
         of_fields: bool,
     ) -> Result<()> {
         let Some(by) = self.shear.as_ref().filter(|_| of_fields || self.pulls_touches) else { return Ok(()) };
@@ -260,11 +258,6 @@ impl Senses {
                 "taxel {} has a curve, which is of its normal force: give `gain` in [shear], the unit of P for a raw unit along the skin",
                 body.taxels[taxel].id
             )));
-        }
-        if outputs.contains(Outputs::SLIP_RATIO) && !outputs.contains(Outputs::USUAL) && by.slips_at.is_none() {
-            return Err(Error::usage(
-                "`slip_ratio` is friction over that at which a touch slips: give `slips_at` in [shear] of the calibration",
-            ));
         }
         Ok(())
     }

@@ -44,7 +44,7 @@ impl Plan {
         plan.senses = Senses::new(body, fields, &chosen, &letters, calibration, for_touches);
         plan.letters = letters;
         let tells_shear = plan.letters.iter().any(|letter| letter.receptor == Receptor::Shear);
-        plan.senses.check_shear(body, (&plan.body_taxels, &plan.calibrations), scene.outputs, tells_shear)?;
+        plan.senses.check_shear(body, (&plan.body_taxels, &plan.calibrations), tells_shear)?;
         let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
         plan.senses.check_touches(body, of_touches).map_err(|e| e.at(&body.name))?;
         plan.touch_outputs = touches.map(|touches| touches.outputs | plan.senses.of_touches());

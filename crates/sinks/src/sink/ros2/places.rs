@@ -65,13 +65,14 @@ fn fields_of(receptor: Receptor) -> &'static [&'static str] {
     }
 }
 
-/// What `value` says in those fields; nothing where it says nothing, such as of what is out of range.
+/// What `value` says in those fields; nothing where it has no reading.
 fn numbers_of(value: &SensedValue) -> Option<[f64; 2]> {
     match (value.receptor, value.reading) {
         (Receptor::Shear, Reading::Value(..)) => Some(value.shear),
         (Receptor::Temperature, Reading::Value(celsius, _)) => Some([celsius; 2]),
-        (Receptor::Proximity, Reading::Value(distance_m, true)) if distance_m <= LEAST_M => Some([0.0; 2]),
-        (Receptor::Proximity, Reading::Value(distance_m, true)) => Some([distance_m * 1e3; 2]),
+        (Receptor::Proximity, Reading::Value(distance_m, _)) if distance_m <= LEAST_M => Some([0.0; 2]),
+        // Also where it is out of range: it is not missing, and a calibration says what is in range.
+        (Receptor::Proximity, Reading::Value(distance_m, _)) => Some([distance_m * 1e3; 2]),
         _ => None,
     }
 }
