@@ -153,7 +153,7 @@ impl Fill<'_> {
             }
             _ => kept,
         };
-        Ok(placed.into_iter().map(|placed| Snapped::on_surface(placed)).collect())
+        Ok(placed.into_iter().map(Snapped::on_surface).collect())
     }
 
     /// The triangles `chosen`.
