@@ -496,6 +496,29 @@ fn places_that_are_given_are_taken_to_the_surface() {
 }
 
 #[test]
+fn a_table_says_what_its_taxels_measure() {
+    let folder = tempfile::tempdir().unwrap();
+    let parse = |more: &str| {
+        let text = format!("[[place]]\nwithin = \"3 mm\"\ncsv = \"taxels.csv\"\n{more}");
+        author(drafted(1.0, &json!({})), &Recipe::parse("recipe.toml", &text, folder.path()).unwrap(), |_| {})
+    };
+    let csv = |text: &str| std::fs::write(folder.path().join("taxels.csv"), text).unwrap();
+    csv(
+        "id,x,y,z,modality,tx,ty,tz\n1,0.02,0.02,0,temperature,,,\n2,0.04,0.02,0,force3,0,-1,0\n3,0.06,0.02,0,force3,,,\n\
+         4,0.08,0.02,0,,,,\n",
+    );
+    let body = parse("").unwrap().body;
+    let kinds: Vec<String> = body.taxels.iter().map(|taxel| taxel.modality.name()).collect();
+    assert_eq!(kinds, ["temperature", "force3", "force3", "pressure"]);
+    let tangent = |taxel: usize| body.taxels[taxel].tangents_in_link()[0];
+    assert!(tangent(1).distance(DVec3::NEG_Y) < 1e-6 && tangent(2).distance(DVec3::NEG_Y) > 0.5, "{}", tangent(2));
+    let why = parse("modality = \"proximity\"\n").unwrap_err().to_string();
+    assert!(why.contains("line 2: taxel 1 measures temperature, and the place's `modality` is proximity"), "{why}");
+    csv("id,x,y,z\n1,0.02,0.02,0\n");
+    assert_eq!(parse("modality = \"proximity\"\n").unwrap().body.taxels[0].modality.name(), "proximity");
+}
+
+#[test]
 fn empties_and_points_become_taxels() {
     let mut draft = Draft::default();
     let primitive = sheet(&mut draft, 8, 1.0);

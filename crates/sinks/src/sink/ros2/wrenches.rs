@@ -347,7 +347,7 @@ mod tests {
             let known = presses.iter().filter_map(|press| Some((name(press.link), press.wrench?)));
             (known.collect::<BTreeMap<_, _>>(), wrenches_by_link(&mut wrenches, &body, &engine, frame))
         };
-        let three = |index: &usize| body.taxels[*index].modality == Modality::Force3 && index * 7 % 11 > 0;
+        let three = |index: &usize| body.taxels[*index].modality == Modality::Force3 && !(index * 7).is_multiple_of(11);
         let taxel = (0..ids.len()).find(three).unwrap();
         let (id, link) = (ids[taxel], &body.links[body.taxels[taxel].link].name);
         let of_three = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Force3);
