@@ -381,10 +381,8 @@ impl Messages for PaxiniBoard {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
-    #![cfg(unix)]
-
     use std::fs::File;
     use std::os::unix::fs::symlink;
     use std::sync::Arc;
