@@ -209,6 +209,19 @@ fn a_touch_pulls_and_is_warm_as_the_taxels_under_it() {
         let of_each = under.map(|(_, of)| TOUCH.celsius + 300.0 * of.x - 100.0 * of.y).collect::<Vec<_>>();
         let mean = of_each.iter().sum::<f64>() / of_each.len() as f64;
         assert!((felt.temperature_celsius.unwrap() - mean).abs() < 1e-4);
+        // What is pressed pushes, whether it is known how it pulls or not; in a field, too.
+        let mut lost = touch.frame(&engine, 0.1);
+        lost.values[engine.index_of("13.u").unwrap()] = RawValue::MISSING;
+        let percepts = engine.process_one(&lost).unwrap();
+        let felt = &percepts.touches(0).unwrap().touches[0];
+        let of_field = DVec3::from_array(percepts.get(0, 1).force_vector.unwrap());
+        for force in [felt.force_vector_newton.unwrap(), of_field] {
+            assert!(
+                (force.y + felt.total).abs() < 1e-5 * felt.total && force.x < 0.29 * felt.total,
+                "{kind:?}: {force}"
+            );
+        }
+        assert!(felt.flags.contains(somatic::percept::TouchFlags::INCOMPLETE));
     }
     let plain = Flat::new(&[[0.0, 0.0], [0.01, 0.0]]).field("skin", None, 0..2).body();
     let scene = Scene::default().touches(somatic::touch::Options::default());

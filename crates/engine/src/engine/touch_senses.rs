@@ -3,8 +3,8 @@
 //! Σs and Σ(x − c) × s · n go over the taxels of a touch that have three axes and whose tangential forces are known, x being
 //! where they are on the body at rest, c the mean of x by P and n the normal of the taxel at which the touch's chart is based. In
 //! that chart each s is turned by the smallest turn that takes its taxel's normal to the chart's; the friction is ‖Σs‖/ΣP of
-//! these. Tangential forces are a part of wrenches, too. A touch is as warm as the mean of the taxels of temperature whose nearest
-//! pressure taxel on the same link is one of its taxels.
+//! these. The force has the normal part of the others, too. Tangential forces are a part of wrenches. A touch is as warm as the mean
+//! of the taxels of temperature whose nearest pressure taxel on the same link is one of its taxels.
 
 use std::collections::BTreeMap;
 
@@ -72,6 +72,8 @@ pub(super) struct TouchSenses {
     link_from_body: Vec<DMat3>,
     /// Memory: those of a touch.
     pulls: Vec<Pull>,
+    /// Memory: the taxels of a touch whose tangential forces are not known, and their P.
+    normal_only: Vec<(u32, f64)>,
 }
 
 impl TouchSenses {
@@ -111,6 +113,7 @@ impl TouchSenses {
             pulled,
             warm,
             pulls: Vec::new(),
+            normal_only: Vec::new(),
             link_from_body: body.links.iter().map(|link| link.body_from_link.matrix3.transpose()).collect(),
         })
     }
@@ -127,11 +130,16 @@ impl TouchSenses {
             let temperature = self.temperature(plan, sensed.row, nodes);
             let mut flags = TouchFlags::empty();
             self.pulls.clear();
+            self.normal_only.clear();
             if self.wanted.intersects(OF_PULLS) {
                 for &node in nodes {
-                    match self.pull(plan, sensed.row, (node, sensed.pressures[node as usize])) {
+                    let pressed = (node, sensed.pressures[node as usize]);
+                    match self.pull(plan, sensed.row, pressed) {
                         Some(Ok(pull)) => self.pulls.push(pull),
-                        Some(Err(why)) => flags |= why,
+                        Some(Err(why)) => {
+                            flags |= why;
+                            self.normal_only.push(pressed);
+                        }
                         None => {}
                     }
                 }
@@ -220,6 +228,10 @@ impl TouchSenses {
                 let along_normal = pull.pressure * own.normal;
                 sum + newtons * (pull.shear - along_normal)
             });
+        }
+        for &(node, pressure) in &self.normal_only {
+            let normal = skin.taxels()[node as usize].normal;
+            force = force.zip(newtons_per_p(plan, node)).map(|(sum, newtons)| sum - newtons * pressure * normal);
         }
         let turn = self.link_from_body[touch.link as usize];
         let friction = in_chart.length() / total;
