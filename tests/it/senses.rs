@@ -311,6 +311,25 @@ fn what_is_lost_for_a_while_is_no_motion_and_what_tells_nothing_counts_nothing()
 }
 
 #[test]
+fn what_presses_pushes_where_nothing_is_known_of_how_it_pulls() {
+    let body = skin(1);
+    for kind in backends() {
+        let mut engine = engine(&body, kind, Scene::default());
+        let mut frame = TOUCH.frame(&engine, 0.0);
+        for (i, _) in grid() {
+            frame.values[engine.index_of(&format!("{i}.v")).unwrap()] = RawValue::MISSING;
+        }
+        let percepts: Vec<Percept> = engine.process_one(&frame).unwrap().frame(0).collect();
+        let (pressure, shear) = (percepts[0], percepts[1]);
+        let force = DVec3::from_array(shear.force_vector.unwrap());
+        assert!((force - pressure.total.unwrap() * DVec3::NEG_Y).length() < 1e-6, "{kind:?}: {force}");
+        assert!(shear.contact && shear.flags.contains(Flags::INCOMPLETE) && !shear.flags.contains(Flags::NO_CONTACT));
+        assert!(shear.shear.is_none() && shear.shear_vector.is_none() && shear.friction.is_none());
+        assert!(shear.torsion.is_none() && !shear.flags.contains(Flags::ONE_TAXEL));
+    }
+}
+
+#[test]
 fn one_taxel_has_no_torsion_and_two_have_no_gradient() {
     let body = skin(3);
     let mut engine = engine(&body, BackendKind::Reference, Scene::default());
@@ -338,7 +357,7 @@ fn shear_whose_calibration_does_not_say_what_it_is_made_of_is_refused() {
     };
     let curve = "[curve.c]\nraw = [0, 10]\np = [0, 1]\n[all]\ncurve = \"c\"\n";
     let why = made(curve, Outputs::USUAL).unwrap_err();
-    assert!(why.contains("taxel 0 has a curve") && why.contains("`gain` in [shear]"), "{why}");
+    assert!(why.contains("taxel 0 has a curve or is an FSR") && why.contains("`gain` in [shear]"), "{why}");
     made(&format!("{curve}[shear]\ngain = 0.1\n"), Outputs::USUAL).unwrap();
     made(curve, Outputs::TOTAL).unwrap();
     made(curve, Outputs::SELF_CONTACTS).unwrap();

@@ -276,8 +276,17 @@ def shears(recording, field, frames):
         flags |= {"incomplete"} if (pressed & no_side).any() else set()
         flags |= {"faulty_input"} if (pressed & bad_side).any() else set()
         there = np.flatnonzero(pressed & ~no_side & ~bad_side)
-        if len(there) == 0:
+        # What presses counts in the force, whether it is known how it pulls or not.
+        presses = np.flatnonzero(pressed)
+        if len(presses) == 0:
             yield {}, flags | {"no_contact"}, False
+            continue
+        normal = -(newtons * np.where(pressed, pressure, 0))[presses, None] * field.normals[presses]
+        if np.isnan(newtons[presses]).any():
+            flags |= {"no_unit"}
+        if len(there) == 0:
+            force = Value(normal.sum(axis=0), np.abs(normal).sum())
+            yield {} if "no_unit" in flags else {"force_vector": force}, flags, True
             continue
         p, weights, g = pressure[there], field.weights[there], side_gain[there]
         felt = np.stack([p] + [g * (sides[axis][0][frame, there] - rest[there, axis]) for axis in (0, 1)])
@@ -289,12 +298,7 @@ def shears(recording, field, frames):
         vector = (weights[:, None] * in_space).sum(axis=0)
         friction = np.linalg.norm(vector) / pull
         found = {"shear_vector": Value(vector, size)}
-        # What presses counts in the force, whether it is known how it pulls or not.
-        presses = np.flatnonzero(pressed)
-        if np.isnan(newtons[presses]).any():
-            flags |= {"no_unit"}
-        else:
-            normal = -(newtons * np.where(pressed, pressure, 0))[presses, None] * field.normals[presses]
+        if "no_unit" not in flags:
             force = (newtons[there, None] * in_space).sum(axis=0) + normal.sum(axis=0)
             found["force_vector"] = Value(force, (newtons[there] * terms.sum(axis=0)).sum() + np.abs(normal).sum())
         if field.chart:
@@ -307,7 +311,7 @@ def shears(recording, field, frames):
             found |= {"shear": Value(total, size)}
             if len(there) > 1:
                 found["torsion"] = Value(torsion, 4 * size * reach)
-            else:
+            elif len(presses) == 1:
                 flags |= {"one_taxel"}
             length = np.linalg.norm(total)
             # Raw values are rounded to single precision.
@@ -322,9 +326,17 @@ def shears(recording, field, frames):
         if np.isnan(noise[there]).any():
             flags |= {"noise_unknown"}
         else:
-            of_pull = ((weights * np.abs(gain[there]) * noise[there]) ** 2).sum()
-            of_shear = ((weights * np.abs(g) * side_noise[there]) ** 2).sum()
-            sigma = np.sqrt(of_shear + friction**2 * of_pull) / pull
+            # Along the direction of the sum in the chart, or else of each.
+            if field.chart:
+                way = total / np.linalg.norm(total) if np.linalg.norm(total) > 0 else np.array([1.0, 0.0])
+                ways = np.stack([field.along[0][there] @ way, field.along[1][there] @ way])
+            else:
+                lengths = np.linalg.norm(along, axis=0)
+                ways = np.where(lengths > 0, along, [[1.0], [0.0]]) / np.where(lengths > 0, lengths, 1)
+            shares = cross.T @ ways
+            of_pull = (weights * (shares[0] - friction) * np.abs(gain[there]) * noise[there]) ** 2
+            of_shear = (weights * np.hypot(shares[1], shares[2]) * np.abs(g) * side_noise[there]) ** 2
+            sigma = np.sqrt((of_shear + of_pull).sum()) / pull
             # A standard deviation of P is a difference of values.
             large = (np.abs(raw[frame, there]) + np.abs(baseline[there]) + noise[there]) / noise[there]
             found["friction_sigma"] = Value(sigma, sigma * large.max() * max(1, size / pull / max(friction, 1e-9)))

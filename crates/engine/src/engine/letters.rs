@@ -12,7 +12,7 @@ use crate::percept::{Flags, Host, Outputs, Percepts};
 use crate::scene::{Plan, PlanField, SensedMember};
 use crate::signal::{RawValue, Reading, Receptor, SenseCalibration, ShearCalibration};
 use crate::stage::proximity::{LEAST_M, Near};
-use crate::stage::shear::{Pulled, Sums};
+use crate::stage::shear::{Noise, Pulled, Sums};
 use crate::stage::temperature::Warm;
 use crate::stage::window::Trend;
 use crate::stage::{calibrate, proximity, temperature};
@@ -311,7 +311,7 @@ impl Cell<'_> {
         }
         let frame = self.frame_of(self.pressed(pulls).map(|(member, _)| member.link), now);
         let found = self.sums(pulls, &frame, now);
-        if found.pull <= 0.0 {
+        if !found.is_pressed() {
             return;
         }
         made.is_there = true;
@@ -319,18 +319,25 @@ impl Cell<'_> {
             made.flags |= Flags::NO_POSE;
         } else {
             made.percepts.in_world[made.cell] = matches!(frame, Frame::World);
-            made.give(Outputs::SHEAR_VECTOR, Host::ShearVector, &found.in_space().to_array());
+            if found.pull > 0.0 {
+                made.give(Outputs::SHEAR_VECTOR, Host::ShearVector, &found.in_space().to_array());
+            }
             match found.force() {
                 Some(newtons) => made.give(Outputs::FORCE_VECTOR, Host::ForceVector, &newtons.to_array()),
                 None => made.flags |= Flags::NO_UNIT,
             }
+        }
+        if found.pull <= 0.0 {
+            // It is not known how any of them pulls.
+            return;
         }
         if self.field.chart.is_some() {
             let DVec2 { x, y } = found.along_chart;
             made.give(Outputs::SHEAR, Host::Shear, &[x, y]);
             match found.torsion() {
                 Some(torsion) => made.give(Outputs::TORSION, Host::Torsion, &[torsion]),
-                None => made.flags |= Flags::ONE_TAXEL,
+                // Where others are pressed, it is said why theirs is not known.
+                None => made.flags.set(Flags::ONE_TAXEL, found.is_one_taxel()),
             }
             match found.direction() {
                 Some(direction) => made.give(Outputs::SHEAR_DIRECTION, Host::ShearDirection, &[direction]),
@@ -340,13 +347,9 @@ impl Cell<'_> {
         let friction = found.friction(self.field.chart.is_some());
         made.give(Outputs::FRICTION, Host::Friction, &[friction]);
         if made.percepts.outputs().contains(Outputs::FRICTION_SIGMA) {
-            match self.variances(by, pulls) {
-                Some(variances) => {
-                    made.give(
-                        Outputs::FRICTION_SIGMA,
-                        Host::FrictionSigma,
-                        &[found.friction_sigma(friction, variances)],
-                    );
+            match self.friction_variance(by, pulls, &found) {
+                Some(variance) => {
+                    made.give(Outputs::FRICTION_SIGMA, Host::FrictionSigma, &[variance.sqrt() / found.pull]);
                 }
                 None => made.flags |= Flags::NOISE_UNKNOWN,
             }
@@ -356,19 +359,25 @@ impl Cell<'_> {
         }
     }
 
-    /// The variances of Σ wP and of Σ ws along its direction, where the noise of all pressed members is known.
-    fn variances(&self, by: &ShearCalibration, pulls: &Pulls) -> Option<[f64; 2]> {
-        let plan = self.plan;
-        let mut known = self.pressed(pulls).filter(|(_, pull)| pull.shear.is_some());
-        known.try_fold([0.0; 2], |[of_pull, of_shear], (member, _)| {
-            let channel = member.channel?;
+    /// The variance of the friction times Σ wP, where the noise of all pressed members is known.
+    fn friction_variance(&self, by: &ShearCalibration, pulls: &Pulls, found: &Sums) -> Option<f64> {
+        let (plan, charted) = (self.plan, self.field.chart.is_some());
+        let (friction, direction) = (found.friction(charted), found.along_chart.normalize_or(DVec2::X));
+        self.pressed(pulls).try_fold(0.0, |sum, (member, pull)| {
+            let (channel, Some(shear)) = (member.channel?, pull.shear) else { return Some(sum) };
             let calibration = &plan.calibrations[channel];
             let (noise, raw) = (calibration.noise?, self.frames.raw.rows.value(self.frames.offset, channel));
-            let pressure = calibrate::sigma(raw.number()?, noise, calibration, plan.curve_of(channel));
-            let along = by.noise_of(member.taxel).unwrap_or(noise);
-            let shear = tangential_gain(by, member.taxel, calibration).abs() * along;
-            let squared = |sigma: f64| (member.weight * sigma).powi(2);
-            Some([of_pull + squared(pressure), of_shear + squared(shear)])
+            let noise = Noise {
+                of_pressure: calibrate::sigma(raw.number()?, noise, calibration, plan.curve_of(channel)),
+                of_sides: tangential_gain(by, member.taxel, calibration).abs()
+                    * by.noise_of(member.taxel).unwrap_or(noise),
+            };
+            // Without a chart, each along its own direction.
+            let along = match charted {
+                true => member.tangents_in_chart.map(|tangent| tangent.dot(direction)),
+                false => DVec2::from_array(shear).normalize_or(DVec2::X).to_array(),
+            };
+            Some(sum + member.weight.powi(2) * noise.variance(&by.cross_axis, along, friction))
         })
     }
 }

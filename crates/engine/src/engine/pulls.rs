@@ -45,14 +45,17 @@ pub(super) struct Pulls {
     is_known: bool,
     is_pressed: bool,
     has_flags: bool,
-    /// By the plan's channels.
+    /// By the plan's channels, if there are `taxels`.
     felt: Vec<Pull>,
 }
 
 impl Pulls {
     pub(super) fn new(plan: &Plan) -> Self {
-        let mut pulls = Self { felt: vec![Pull::default(); plan.channels()], ..Self::default() };
+        let mut pulls = Self::default();
         pulls.calibrate(plan);
+        if !pulls.taxels.is_empty() {
+            pulls.felt = vec![Pull::default(); plan.channels()];
+        }
         pulls
     }
 
@@ -98,10 +101,10 @@ impl Pulls {
             let (pressure, mut flags) = calibrate::pressure_and_flags(raw, calibration, plan.curve_of(own.channel));
             let mut felt = Pull { pressure, newtons_per_p: own.newtons_per_p, ..Pull::default() };
             if pressure > 0.0 {
+                self.is_pressed = true;
                 match numbers_of(own.values.map(|value| row[value])) {
                     Ok(raw) => {
                         felt.shear = Some(by.forces(own.rest, own.gain, pressure, raw));
-                        self.is_pressed = true;
                     }
                     Err(why) => flags |= why,
                 }
@@ -112,7 +115,7 @@ impl Pulls {
         }
     }
 
-    /// Whether any of them is pressed and its tangential forces are known.
+    /// Whether any of them is pressed.
     pub(super) fn is_pressed(&self) -> bool {
         self.is_pressed
     }

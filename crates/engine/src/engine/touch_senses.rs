@@ -16,7 +16,7 @@ use crate::body::{Body, Modality};
 use crate::percept::{Flags, LinkShare, Touch, TouchFlags, TouchFrame, TouchOutputs};
 use crate::scene::Plan;
 use crate::signal::{Axis, Channel, RawValue, Reading};
-use crate::stage::shear::ROUNDING;
+use crate::stage::shear::{Noise, ROUNDING};
 use crate::stage::{calibrate, force};
 use crate::touch::Skin;
 
@@ -154,7 +154,7 @@ impl TouchSenses {
                 self.shear((plan, skin), touch);
             }
             if self.wanted.contains(TouchOutputs::FRICTION_SIGMA) {
-                touch.friction_sigma = touch.friction.and_then(|friction| self.friction_sigma(plan, sensed, friction));
+                touch.friction_sigma = self.friction_sigma((plan, skin), sensed, touch);
                 if touch.friction_sigma.is_none() {
                     touch.flags |= TouchFlags::NOISE_UNKNOWN;
                 }
@@ -234,15 +234,16 @@ impl TouchSenses {
             force = force.zip(newtons_per_p(plan, node)).map(|(sum, newtons)| sum - newtons * pressure * normal);
         }
         let turn = self.link_from_body[touch.link as usize];
-        let friction = in_chart.length() / total;
+        // Around a limb there is no chart.
+        let is_wrapped = touch.flags.contains(TouchFlags::WRAPPED);
+        let friction = if is_wrapped { shear.length() } else { in_chart.length() } / total;
         touch.shear = Some(turn * shear);
-        // One taxel has no arm.
+        // One taxel has no arm. `one_taxel` says so where no other is pressed.
         touch.torsion = (self.pulls.len() > 1).then_some(torsion);
-        touch.flags |= if self.pulls.len() > 1 { TouchFlags::empty() } else { TouchFlags::ONE_TAXEL };
         touch.friction = Some(friction);
         touch.slip_ratio = plan.senses.shear.as_ref().and_then(|by| by.slips_at).map(|slips_at| friction / slips_at);
         touch.force_vector_newton = force.map(|force| turn * force);
-        if touch.flags.contains(TouchFlags::WRAPPED) {
+        if is_wrapped {
             return;
         }
         let [along_u, along_v] = [in_chart.dot(u), in_chart.dot(v)];
@@ -252,23 +253,33 @@ impl TouchSenses {
         touch.flags.set(TouchFlags::STILL, is_still);
     }
 
-    /// The standard deviation of the friction, as stage *shear* has it; `None` where a taxel's noise is not known.
-    fn friction_sigma(&self, plan: &Plan, sensed: &Sensed<'_>, friction: f64) -> Option<f64> {
+    /// The standard deviation of the friction of `touch`, as stage *shear* has it; `None` where a taxel's noise is not known.
+    fn friction_sigma(&self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, touch: &Touch) -> Option<f64> {
+        let (friction, by) = (touch.friction?, plan.senses.shear.as_ref()?);
         let first_slot = plan.touched_from.unwrap_or(0);
-        let (mut pull, mut of_pull, mut of_shear) = (0.0, 0.0, 0.0);
-        for own in &self.pulls {
-            let node = own.node as usize;
-            let calibration = &plan.calibrations[node];
+        let up = (!touch.flags.contains(TouchFlags::WRAPPED)).then(|| skin.chart_axes(touch.base, touch.link)[2]);
+        let turned = |node: u32, vector: DVec3| match up {
+            Some(up) => DQuat::from_rotation_arc(skin.taxels()[node as usize].normal.normalize(), up) * vector,
+            None => vector,
+        };
+        let direction = self.pulls.iter().map(|pull| turned(pull.node, pull.shear)).sum::<DVec3>().normalize_or_zero();
+        let (mut total, mut variance) = (0.0, 0.0);
+        for pull in &self.pulls {
+            let node = pull.node as usize;
+            let (calibration, own) = (&plan.calibrations[node], self.pulled[node].as_ref()?);
             let noise = calibration.noise?;
             let number = sensed.raw.rows.value(sensed.offset, node).number()?;
-            let curve = plan.curve_of(first_slot + node);
-            pull += own.pressure;
-            of_pull += calibrate::sigma(number, noise, calibration, curve).powi(2);
-            let taxel = self.pulled[node].as_ref()?.taxel;
-            let along = plan.senses.shear.as_ref()?.noise_of(taxel).unwrap_or(noise);
-            of_shear += (own.gain * along).powi(2);
+            let noise = Noise {
+                of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
+                of_sides: pull.gain.abs() * by.noise_of(own.taxel).unwrap_or(noise),
+            };
+            let along = own.tangents_in_body.map(|tangent| turned(pull.node, tangent).dot(direction));
+            // Where nothing pulls, every direction is as good.
+            let along = if direction == DVec3::ZERO { [1.0, 0.0] } else { along };
+            total += pull.pressure;
+            variance += noise.variance(&by.cross_axis, along, friction);
         }
-        Some((of_shear + friction.powi(2) * of_pull).sqrt() / pull)
+        Some(variance.sqrt() / total)
     }
 
     fn temperature(&self, plan: &Plan, row: &[RawValue], nodes: &[u32]) -> Option<f64> {

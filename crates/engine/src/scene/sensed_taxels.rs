@@ -99,9 +99,19 @@ impl SenseRanges {
 }
 
 impl SensedTaxels {
-    /// Those of `plan`, which is of `body`.
+    /// Those of `plan`, which is of `body`, whose letters or touches are asked for.
     #[must_use]
     pub fn new(plan: &Plan, body: &Body) -> Self {
+        Self::chosen(plan, body, |receptor| plan.gives(receptor))
+    }
+
+    /// The same, and those that are read for wrenches alone.
+    #[must_use]
+    pub fn with_wrenches(plan: &Plan, body: &Body) -> Self {
+        Self::chosen(plan, body, |_| true)
+    }
+
+    fn chosen(plan: &Plan, body: &Body, is_wanted: impl Fn(Receptor) -> bool) -> Self {
         let all = Channel::all_of(body);
         let channels: Vec<u32> = plan.senses.channels.iter().map(|&channel| all[channel]).collect();
         let place = |taxel: u32, axis: Axis| channels.binary_search(&Channel::of_taxel(taxel, axis).0);
@@ -109,7 +119,7 @@ impl SensedTaxels {
             let letter = [Receptor::Shear, Receptor::Temperature, Receptor::Proximity]
                 .into_iter()
                 .find(|receptor| receptor.reads(taxel.modality))
-                .filter(|&receptor| plan.gives(receptor))?;
+                .filter(|&receptor| is_wanted(receptor))?;
             let values = match letter {
                 Receptor::Shear => [Axis::U, Axis::V].map(|axis| place(taxel.id, axis)),
                 _ => [place(taxel.id, Axis::Normal); 2],

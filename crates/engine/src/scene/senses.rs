@@ -250,12 +250,12 @@ impl Senses {
         let Some(by) = self.shear.as_ref().filter(|_| of_fields || self.pulls_touches) else { return Ok(()) };
         let lacks_gain = |taxel: usize, calibration: &TaxelCalibration| {
             let has_axes = Receptor::Shear.reads(body.taxels[taxel].modality);
-            has_axes && !by.has_gain(taxel, calibration.response)
+            has_axes && !calibration.mask && !by.has_gain(taxel, calibration.response)
         };
         let found = body_taxels.iter().zip(calibrations).find(|&(&taxel, calibration)| lacks_gain(taxel, calibration));
         if let Some((&taxel, _)) = found {
             return Err(Error::usage(format!(
-                "taxel {} has a curve, which is of its normal force: give `gain` in [shear], the unit of P for a raw unit along the skin",
+                "taxel {} has a curve or is an FSR, which is of its normal force: give `gain` in [shear], the unit of P for a raw unit along the skin",
                 body.taxels[taxel].id
             )));
         }

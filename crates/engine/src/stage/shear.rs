@@ -10,8 +10,9 @@
 //! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend. Each sum goes over the taxels once,
 //! the torsion as Σ wx × s − c × Σ ws, and sums in space are turned into the world link by link.
 //!
-//! **Sigma.** With σₛ and σₚ the standard deviations of s along its own direction and of Σ wP, both of independent noise, that of
-//! the friction f is √(σₛ² + f²σₚ²)/Σ wP.
+//! **Sigma.** A taxel's s along the direction e of the sum is e·C(P, u, v)ᵀ = aₚP + aᵤu + aᵥv, with C its `cross_axis` and u and v
+//! its tangential values. With σₚ and σ the standard deviations of P and of u and v, all of independent noise, that of the friction f is
+//! √(Σ w²((aₚ − f)²σₚ² + (aᵤ² + aᵥ²)σ²))/Σ wP.
 
 use glam::{DVec2, DVec3};
 
@@ -39,6 +40,8 @@ pub(crate) struct Pulled<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Sums {
     taxels: usize,
+    /// Taxels whose tangential forces are not known.
+    normal_only: usize,
     /// Σ wP.
     pub(crate) pull: f64,
     /// Σ ws along u and v of the chart.
@@ -85,15 +88,27 @@ impl Sums {
 
     /// Adds a taxel whose tangential force is not known: its normal force is in the force alone. `taxel.shear` does not count.
     pub(crate) fn add_normal(&mut self, taxel: &Pulled<'_>) {
+        self.normal_only += 1;
         match taxel.newtons_per_p {
             Some(newtons) => self.space.force -= newtons * taxel.pressure * taxel.normal,
             None => self.space.lacks_force = true,
         }
     }
 
+    /// Whether any taxel is in it, also with its normal part alone.
+    pub(crate) fn is_pressed(&self) -> bool {
+        self.taxels + self.normal_only > 0
+    }
+
+    /// Whether one taxel alone is pressed.
+    pub(crate) fn is_one_taxel(&self) -> bool {
+        self.taxels + self.normal_only == 1
+    }
+
     /// Takes in what `other` sums up, whose space `turn` turns into this one's.
     pub(crate) fn join(&mut self, other: &Self, turn: impl Fn(DVec3) -> DVec3) {
         self.taxels += other.taxels;
+        self.normal_only += other.normal_only;
         self.pull += other.pull;
         self.along_chart += other.along_chart;
         self.moment += other.moment;
@@ -119,7 +134,7 @@ impl Sums {
         (self.along_chart.length() > ROUNDING * self.size).then(|| self.along_chart.to_angle())
     }
 
-    /// Absent where one taxel is pressed: it has no arm.
+    /// Absent where that of one taxel is known: it has no arm.
     pub(crate) fn torsion(&self) -> Option<f64> {
         (self.taxels > 1).then(|| self.turn - (self.moment / self.pull).perp_dot(self.along_chart))
     }
@@ -129,10 +144,23 @@ impl Sums {
         let size = if charted { self.along_chart.length() } else { self.space.shear.length() };
         size / self.pull
     }
+}
 
-    /// The standard deviation of `friction`, from the variances of Σ wP and of Σ ws along its direction.
-    pub(crate) fn friction_sigma(&self, friction: f64, [of_pull, of_shear]: [f64; 2]) -> f64 {
-        (of_shear + friction.powi(2) * of_pull).sqrt() / self.pull
+/// The noise of a taxel's raw values.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Noise {
+    /// Standard deviation of P.
+    pub(crate) of_pressure: f64,
+    /// Of u and v.
+    pub(crate) of_sides: f64,
+}
+
+impl Noise {
+    /// The variance of what a taxel adds to (ΣwP) f, for a weight of 1 and the friction f: `along` are its t and n × t along the direction
+    /// of Σ ws.
+    pub(crate) fn variance(self, cross_axis: &[[f64; 3]; 2], along: [f64; 2], friction: f64) -> f64 {
+        let [of_p, of_u, of_v] = [0, 1, 2].map(|of| along[0] * cross_axis[0][of] + along[1] * cross_axis[1][of]);
+        ((of_p - friction) * self.of_pressure).powi(2) + (of_u.powi(2) + of_v.powi(2)) * self.of_sides.powi(2)
     }
 }
 
@@ -168,9 +196,6 @@ mod tests {
         assert!((sums.direction().unwrap() - 0.8_f64.atan2(0.6)).abs() < 1e-15);
         assert!(sums.torsion().unwrap().abs() < 1e-15 && (sums.friction(true) - 0.5).abs() < 1e-15);
         assert!((sums.force().unwrap() - DVec3::new(1.2, 1.6, -4.0)).length() < 1e-15);
-        // With σ = 0.1 of each P and 0.2 of each s, σₛ² = 2 · 0.04 and σₚ² = 2 · 0.01.
-        let sigma = (0.08_f64 + 0.25 * 0.02).sqrt() / 4.0;
-        assert!((sums.friction_sigma(0.5, [0.02, 0.08]) - sigma).abs() < 1e-15);
     }
 
     #[test]
@@ -187,6 +212,19 @@ mod tests {
         let left = ring(1.0);
         assert!((left.torsion().unwrap() - 0.04).abs() < 1e-15 && (ring(-1.0).torsion().unwrap() + 0.04).abs() < 1e-15);
         assert!(left.direction().is_none() && left.friction(true) < 1e-15);
+    }
+
+    #[test]
+    fn noise_goes_through_what_mixes_the_axes() {
+        let noise = Noise { of_pressure: 0.1, of_sides: 0.2 };
+        let plain = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for along in [[1.0, 0.0], [0.6, 0.8]] {
+            assert!((noise.variance(&plain, along, 0.5) - (0.04 + 0.25 * 0.01)).abs() < 1e-15);
+        }
+        // P leaks into s as much as the friction is: what P strays does not matter.
+        let leaking = [[0.5, 5.0, 0.0], [0.0, 0.0, 5.0]];
+        assert!((noise.variance(&leaking, [1.0, 0.0], 0.5) - 25.0 * 0.04).abs() < 1e-15);
+        assert!((noise.variance(&leaking, [0.0, 1.0], 0.5) - (25.0 * 0.04 + 0.25 * 0.01)).abs() < 1e-15);
     }
 
     #[test]

@@ -73,7 +73,7 @@ impl Messages {
         let (Some(body), Some(plan)) = (session.body, session.plan) else {
             return Err(Error::failed("messages of ROS 2 need the robot's body"));
         };
-        let sensed = SensedTaxels::new(plan, body);
+        let sensed = SensedTaxels::with_wrenches(plan, body);
         let clouds = Clouds::new(body, &sensed);
         let wrenches = LinkWrenches::new(body, plan, session.taxels);
         let mut topics = vec![

@@ -77,7 +77,7 @@ impl LinkWrenches {
         };
         let sent: Vec<Option<(usize, Axis)>> = sent.iter().map(taxel_of).collect();
         let all_sent: BTreeSet<(usize, Axis)> = sent.iter().flatten().copied().collect();
-        let sensed = SensedTaxels::new(plan, body);
+        let sensed = SensedTaxels::with_wrenches(plan, body);
         let is_read = |channel: Channel| sensed.channels().binary_search(&channel.0).is_ok();
         let mut of_links = vec![Vec::new(); body.links.len()];
         for (index, taxel) in body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality.is_pressed()) {
@@ -241,7 +241,7 @@ mod tests {
         engine.pressures(frame, &mut pressures);
         let mut readings = Readings::new(body);
         let mut sensed = Vec::new();
-        engine.sensed_alone(frame, &SensedTaxels::new(engine.plan(), body), &mut sensed);
+        engine.sensed_alone(frame, &SensedTaxels::with_wrenches(engine.plan(), body), &mut sensed);
         readings.read(&pressures, &sensed);
         let missing: Vec<usize> = (0..frame.values.len()).filter(|&index| frame.values[index].is_missing()).collect();
         let messages = wrenches.messages(0, &readings, &missing);
