@@ -371,8 +371,9 @@ pub(crate) fn gains(
         if let Some(radius_m) = stamp_m {
             estimate.sigma_m = layer_under(radius_m, estimate.width_m)?;
         }
-        let text = with_gains(&calibration.text, &ids, &estimate)?;
-        Calibration::parse(&text, &ids).map_err(|e| e.at("the calibration that follows from these touches"))?;
+        let kinds: Vec<_> = body.inner.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+        let text = with_gains(&calibration.text, &kinds, &estimate)?;
+        Calibration::parse_for(&text, &kinds).map_err(|e| e.at("the calibration that follows from these touches"))?;
         Ok::<_, Error>(Some((estimate, text, source.losses())))
     });
     let Some((estimate, text, losses)) = done.or_raise(py)? else { return Err(interrupted(raised)) };

@@ -156,7 +156,7 @@ impl OpenSource {
                     TextSource::open(place, options, &mut |what| notices.push(what.to_owned()))?.for_body(ids)?;
                 return Ok(Self { source: Box::new(source), lines: None, is_live: true });
             }
-            let is_live = spec.is_stdin();
+            let is_live = !spec.is_recording();
             let spec = spec.with_content(options);
             if options.map.is_some() {
                 let mut mapped = open_mapped(&spec, options)?;

@@ -2,6 +2,7 @@
 
 use toml_edit::{DocumentMut, Item, Table, value};
 
+use crate::body::Modality;
 use crate::error::{Error, Result};
 use somatic_engine::gains::GainsEstimate;
 
@@ -21,16 +22,18 @@ pub fn layer_under(radius_m: f64, width_m: f64) -> Result<f64> {
     Ok(variance.sqrt())
 }
 
-/// The calibration `text` with the gains and the layer of `estimate`, for taxels of `ids`. What is counted in P goes with the gain.
+/// The calibration `text` with the gains and the layer of `estimate`, for `taxels`: ids and what they measure; those that feel no
+/// pressure have no gain. What is counted in P goes with the gain.
 ///
 /// # Errors
 /// It is not the text of a calibration.
-pub fn with_gains(text: &str, ids: &[u32], estimate: &GainsEstimate) -> Result<String> {
+pub fn with_gains(text: &str, taxels: &[(u32, Modality)], estimate: &GainsEstimate) -> Result<String> {
     let mut document: DocumentMut = text.parse().map_err(|e| Error::failed(format!("{e}")))?;
     let number =
         |item: Option<&Item>| item.and_then(|item| item.as_float().or_else(|| item.as_integer().map(|n| n as f64)));
     let without_gain = spread_without_gain(estimate);
-    for (id, gain) in ids.iter().zip(&estimate.gains) {
+    let pressed = taxels.iter().zip(&estimate.gains).filter(|((_, kind), _)| kind.is_pressed());
+    for ((id, _), gain) in pressed {
         let id = id.to_string();
         let number_at = |document: &DocumentMut, key: &str| {
             let own = document.get("taxel").and_then(|taxels| taxels.get(&id)).and_then(|taxel| taxel.get(key));
@@ -94,6 +97,21 @@ mod tests {
     use super::*;
     use crate::signal::Calibration;
 
+    fn pads(ids: [u32; 3]) -> [(u32, Modality); 3] {
+        ids.map(|id| (id, Modality::Pressure))
+    }
+
+    #[test]
+    fn what_feels_no_pressure_has_no_gain() {
+        let taxels = [(3, Modality::Force3), (7, Modality::Temperature), (9, Modality::Proximity)];
+        let written = with_gains("", &taxels, &estimate(&[Some(0.8), None, None])).unwrap();
+        assert!(
+            written.contains("[taxel.3]") && !written.contains("taxel.7") && !written.contains("taxel.9"),
+            "{written}"
+        );
+        Calibration::parse_for(&written, &taxels).unwrap();
+    }
+
     fn estimate(gains: &[Option<f64>]) -> GainsEstimate {
         let mut estimate = GainsEstimate::default();
         (estimate.gains, estimate.sigma_m) = (gains.to_vec(), 0.002_345_67);
@@ -104,7 +122,7 @@ mod tests {
     fn gains_go_into_a_calibration_with_what_is_counted_in_p() {
         let text =
             "# Mine.\n[all]\nbaseline = 12\ndead_band = 3 # counts\ngain = 2\n\n[taxel.7]\ngain = 4.0\np_max = 800\n";
-        let written = with_gains(text, &[3, 7, 9], &estimate(&[Some(0.8), Some(1.25), None])).unwrap();
+        let written = with_gains(text, &pads([3, 7, 9]), &estimate(&[Some(0.8), Some(1.25), None])).unwrap();
         assert!(written.contains("# Mine.") && written.contains("dead_band = 3 # counts"), "{written}");
         let [before, after] = [text, &written].map(|text| Calibration::parse(text, &[3, 7, 9]).unwrap());
         for (index, factor) in [0.8, 1.25, 1.0].into_iter().enumerate() {
@@ -119,7 +137,7 @@ mod tests {
         assert_eq!(own_spread.collect::<Vec<_>>(), [false, false, true]);
         assert!((after.taxels[2].gain_spread.unwrap() / 0.223 - 1.0).abs() < 1e-2, "{:?}", after.taxels[2]);
         // Again with other gains: a layer that was there is replaced.
-        let again = with_gains(&written, &[3, 7, 9], &estimate(&[Some(1.0); 3])).unwrap();
+        let again = with_gains(&written, &pads([3, 7, 9]), &estimate(&[Some(1.0); 3])).unwrap();
         let again = Calibration::parse(&again, &[3, 7, 9]).unwrap();
         assert_eq!((again.layer, again.taxels[2].gain_spread), (after.layer, None));
     }

@@ -88,7 +88,7 @@ pub(super) fn calibrate(
     if let Some(radius_m) = stamp_m {
         estimate.sigma_m = layer_under(radius_m, estimate.width_m)?;
     }
-    let written = with_gains(&text, &ids, &estimate).map_err(|e| e.at(path.display()))?;
+    let written = with_gains(&text, &kinds, &estimate).map_err(|e| e.at(path.display()))?;
     // What is written must be what `run` takes; if it were not, nothing is written.
     Calibration::parse_for(&written, &kinds).map_err(|e| e.at("the calibration that follows from these touches"))?;
     let name = to.name().display().to_string();

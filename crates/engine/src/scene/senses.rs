@@ -148,8 +148,8 @@ pub(super) fn letters_and_outputs(
 }
 
 impl ForTouches {
-    /// For touches, if `scene` asks for them, beside fields in `letters`: whoever names letters has no others, and who asks only for what is
-    /// made of touches none.
+    /// For touches, if they are asked for, beside fields in `letters`. A scene that names letters gets no others, and one that asks for
+    /// what is made of touches, but for no touches, gets none.
     pub(super) fn new(body: &Body, scene: &Scene, letters: &[Letter], are_asked: bool) -> Self {
         let has = |receptor: Receptor| are_asked && body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
         let has_all = scene.letters.is_empty() && scene.touches.is_some();
@@ -240,7 +240,8 @@ impl Senses {
     }
 
     /// Refuses shear whose calibration does not say what it is made of: of the taxels `body_taxels`, which `calibrations` are of, one
-    /// has a curve and no gain for its tangential values. Nothing is refused if only wrenches read them, not touches nor, by `of_fields`, fields.
+    /// has a curve and no gain for its tangential values. What wrenches alone read is not refused; `of_fields`
+    /// says whether fields read it.
     pub(super) fn check_shear(
         &self,
         body: &Body,
@@ -255,7 +256,7 @@ impl Senses {
         let found = body_taxels.iter().zip(calibrations).find(|&(&taxel, calibration)| lacks_gain(taxel, calibration));
         if let Some((&taxel, _)) = found {
             return Err(Error::usage(format!(
-                "taxel {} has a curve or is an FSR, which is of its normal force: give `gain` in [shear], the unit of P for a raw unit along the skin",
+                "taxel {} has a curve or is an FSR, which is of its normal force: give `gain` in [shear]: P for a raw unit along the skin",
                 body.taxels[taxel].id
             )));
         }

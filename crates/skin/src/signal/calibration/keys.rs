@@ -110,6 +110,13 @@ impl Keys {
             own.raw_range = *range.get_ref();
         }
         own.falls = self.invert.unwrap_or(own.falls);
+        if let SenseResponse::Ntc { full_raw, .. } = own.response
+            && own.falls
+            && own.baseline == 0.0
+        {
+            // Above its resistor, a thermistor is at full scale less the raw value.
+            own.baseline = full_raw;
+        }
         own.mask = self.mask.unwrap_or(own.mask);
         if own != senses.all {
             senses.own.insert(taxel, own);

@@ -65,8 +65,7 @@ mod tests {
         assert!((value(read_all.proximity.of_taxel(3).read(RawValue::new(10.0))) - 0.18).abs() < 1e-15);
         // A thermistor at the reference voltage, above its resistor.
         let above = read(
-            "[temperature]\nntc = { ohm_at_25 = 10e3, b_k = 3950, series_ohm = 10e3, full_raw = 1023 }\n[taxel.200]\ninvert = true\n\
-             baseline = 1023\n",
+            "[temperature]\nntc = { ohm_at_25 = 10e3, b_k = 3950, series_ohm = 10e3, full_raw = 1023 }\n[taxel.200]\ninvert = true\n",
         );
         let above = above.unwrap().temperature;
         let [colder, warmer] = [400.0, 600.0].map(|raw| value(above.of_taxel(2).read(RawValue::new(raw))));

@@ -16,8 +16,8 @@ const WINDOWS_S: RangeInclusive<f64> = 1e-3..=3600.0;
 /// B parameters of thermistors, K. Those that are sold have 2000 to 6000; with less the temperatures of a divider leave all that a
 /// sensor survives.
 const B_K: RangeInclusive<f64> = 500.0..=20_000.0;
-/// Resistances of thermistors at 25 °C and beside them, Ω. Those that are sold have some Ω to some MΩ.
-const OHMS: RangeInclusive<f64> = 0.1..=1e9;
+/// Resistances of thermistors at 25 °C and beside them, Ω: some Ω to some MΩ. As their ratio alone counts, some write them in MΩ.
+const OHMS: RangeInclusive<f64> = 1e-6..=1e9;
 /// Of what one raw value of another axis is in a tangential force.
 const MOST_ACROSS: f64 = 1e6;
 

@@ -381,7 +381,9 @@ impl Messages for PaxiniBoard {
     }
 }
 
-#[cfg(all(test, unix))]
+// Terminals are Unix's.
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use std::fs::File;
     use std::os::unix::fs::symlink;
