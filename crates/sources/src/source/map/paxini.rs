@@ -440,7 +440,7 @@ mod tests {
         /// What is sent instead of the n-th frame since it was told to send. If that is nothing, the board has started again, and is silent.
         frame: fn(u16) -> Vec<u8>,
         refuses: Option<u16>,
-        /// Whether the first answer about sensors breaks off after a wrong length.
+        /// Whether the first answer about sensors, and every other one, breaks off after a wrong length.
         breaks_off: bool,
     }
 
@@ -504,7 +504,7 @@ mod tests {
     }
 
     fn play(mut end: File, says: &Says, is_unplugged: &AtomicBool, is_asleep: &AtomicBool) {
-        let (mut sends, mut sent, mut request, mut asked) = (false, 0_u16, Vec::new(), 0);
+        let (mut sends, mut sent, mut request, mut breaks_off) = (false, 0_u16, Vec::new(), false);
         while !is_unplugged.load(Ordering::Relaxed) {
             let mut byte = [0];
             while matches!(end.read(&mut byte), Ok(1)) {
@@ -524,13 +524,14 @@ mod tests {
                 taxels[8] = says.taxels[1] as u8;
                 let told = match (bytes[3], register) {
                     (function, register) if says.refuses == Some(register) => answer(function, register, &[5]),
-                    (READ, CONNECTED) if says.breaks_off && std::mem::replace(&mut asked, 1) == 0 => {
-                        answer(READ, register, &[0; 56])[..9].to_vec()
+                    (READ, CONNECTED) => {
+                        breaks_off = says.breaks_off && !breaks_off;
+                        let broken = answer(READ, register, &[0; 56])[..9].to_vec();
+                        if breaks_off { broken } else { answer(READ, register, &says.connected) }
                     }
-                    (READ, CONNECTED) => answer(READ, register, &says.connected),
                     (READ, TAXELS) => answer(READ, register, &taxels),
                     (WRITE, SENDING) => {
-                        (sends, sent) = (bytes[8] == 1, 0);
+                        (sends, sent, breaks_off) = (bytes[8] == 1, 0, false);
                         is_asleep.store(false, Ordering::Relaxed);
                         answer(WRITE, register, &[0])
                     }
@@ -571,10 +572,16 @@ mod tests {
         row
     }
 
+    /// The board on the line. It may give no answer for long on a busy machine.
+    fn on_line(board: &Board, map: &ArrayMap) -> Result<PaxiniBoard> {
+        let open = || PaxiniBoard::open(board.link.to_str().unwrap(), None, map);
+        let is_answer = |opened: &Result<_>| opened.as_ref().err().is_none_or(|e| !e.to_string().contains("no answer"));
+        (0..8).map(|_| open()).find(is_answer).unwrap_or_else(open)
+    }
+
     fn opened(board: &Board) -> Result<MappedSource> {
         let map = ArrayMap::named("paxini").unwrap();
-        let messages = PaxiniBoard::open(board.link.to_str().unwrap(), None, &map)?;
-        MappedSource::new(Box::new(messages), &map, false)
+        MappedSource::new(Box::new(on_line(board, &map)?), &map, false)
     }
 
     /// The next frame that is as wanted, of at most 2,000 and within a minute.
@@ -676,6 +683,13 @@ mod tests {
     }
 
     #[test]
+    fn an_answer_that_breaks_off_does_not_swallow_the_next_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let board = Board::plugged(folder.path(), Says { breaks_off: true, ..TWO });
+        until(&mut opened(&board).unwrap(), is_known);
+    }
+
+    #[test]
     fn half_a_packet_does_not_swallow_the_answers() {
         let folder = tempfile::tempdir().unwrap();
         // The board starts again within a frame that is longer than a hundred answers.
@@ -684,7 +698,7 @@ mod tests {
             30 => pushed(0, &[data(n), vec![0; 1488]].concat())[..400].to_vec(),
             _ => Vec::new(),
         };
-        let board = Board::plugged(folder.path(), Says { taxels: [250, 249], frame, breaks_off: true, ..TWO });
+        let board = Board::plugged(folder.path(), Says { taxels: [250, 249], frame, ..TWO });
         let mut source = opened(&board).unwrap();
         let mut again = || {
             until(&mut source, is_known);
@@ -717,7 +731,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut board = Board::plugged(folder.path(), TWO);
         let map = ArrayMap::named("paxini").unwrap();
-        let mut messages = PaxiniBoard::open(board.link.to_str().unwrap(), None, &map).unwrap();
+        let mut messages = on_line(&board, &map).unwrap();
         board.unplug();
         let _other = Board::plugged(folder.path(), Says { connected: [0b100, 0, 0, 0], ..TWO });
         let mut refused = || (0..2_000).find_map(|_| messages.next(&mut Vec::new()).err()).unwrap().to_string();
