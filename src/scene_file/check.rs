@@ -31,9 +31,9 @@ impl SceneFile {
             ));
         }
         let has_no_bad = |source: &SourceSpec| {
-            use SourceSpec::{LeRobot, Mcap, Ros2, Serial, Sim, Zenoh};
+            use SourceSpec::{LeRobot, Mcap, Paxini, Ros2, Serial, Sim, Zenoh};
             let is_own = matches!(source, Mcap(_) | Ros2 { .. }) && self.map.is_none();
-            is_own || matches!(source, LeRobot(_) | Sim(_) | Serial { .. } | Zenoh(_))
+            is_own || matches!(source, LeRobot(_) | Paxini { .. } | Sim(_) | Serial { .. } | Zenoh(_))
         };
         if self.skip_bad && self.joint_states.is_none() && self.sources.iter().any(has_no_bad) {
             return Err(Error::usage("`skip_bad` is for CSV, NDJSON, exports and ROS 2 bags; leave it out here"));

@@ -164,7 +164,7 @@ fn messages_of_bags_that_do_not_fit_are_left_out() {
 
 #[test]
 fn what_has_no_wrong_lines_does_not_take_the_flag() {
-    for source in ["sim:a.toml", "mcap:a.mcap", "serial:/dev/null"] {
+    for source in ["sim:a.toml", "mcap:a.mcap", "serial:/dev/null", "paxini:/dev/null"] {
         let why = fails(2, &["run", "--source", source, "--skip-bad"]);
         assert!(why.contains("--skip-bad is for CSV, NDJSON, exports and ROS 2 bags"), "{source}: {why}");
     }

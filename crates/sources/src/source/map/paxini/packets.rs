@@ -9,6 +9,16 @@ use std::collections::VecDeque;
 /// Functions.
 pub(super) const READ: u8 = 0x03;
 pub(super) const WRITE: u8 = 0x10;
+/// Registers: bits of the sensors that are connected, numbers of taxels in 16 bits each, what frames hold, and whether frames are sent.
+pub(super) const CONNECTED: u16 = 0x10;
+pub(super) const TAXELS: u16 = 0x30;
+pub(super) const CONTENT: u16 = 0x16;
+pub(super) const SENDING: u16 = 0x17;
+/// What is asked about. A frame with a damaged second byte begins as an answer does, but hardly one of these registers.
+const REGISTERS: [u16; 4] = [CONNECTED, TAXELS, CONTENT, SENDING];
+/// Sensors, those of the palm too: the longest answer has a number of 16 bits for each.
+pub(super) const SENSORS: usize = 28;
+const MAX_ANSWER_BYTES: usize = 2 * SENSORS;
 /// What a packet begins with. The third byte is 0.
 const REQUEST: [u8; 3] = [0x55, 0xAA, 0];
 const ANSWER: [u8; 3] = [0xAA, 0x55, 0];
@@ -16,8 +26,9 @@ const PUSHED: [u8; 3] = [0xAA, 0x56, 0];
 /// Bytes of either before its data.
 const ANSWER_HEAD: usize = 8;
 const PUSHED_HEAD: usize = 5;
-/// A packet with more is a damaged length: twenty sensors with all the taxels that the board has room for have under 11,000 bytes.
-const MAX_BYTES: usize = 1 << 14;
+/// Data of a frame while the sensors are not known; more is a damaged length. Twenty sensors with all the taxels that the board has room for
+/// have under 11,000 bytes.
+const MAX_FRAME_BYTES: usize = 1 << 14;
 
 /// A packet of the board whose checksum is right.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,6 +63,10 @@ pub(super) struct Packets {
     bytes: VecDeque<u8>,
     /// Bytes that were left out since the last packet.
     left_out: bool,
+    /// Bytes of data that a frame has at most, once that is known.
+    most: Option<usize>,
+    /// How many bytes of data frames would have that are longer, and how many came since the last frame, all with the same length.
+    long: (usize, u32),
     /// Pieces between packets that are none.
     pub(super) damaged: u64,
 }
@@ -59,6 +74,20 @@ pub(super) struct Packets {
 impl Packets {
     pub(super) fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend(bytes);
+    }
+
+    /// Has frames of more than `most` bytes of data be damage: else a single damaged length would swallow many of them.
+    pub(super) fn limit(&mut self, most: usize) {
+        (self.most, self.long) = (Some(most), (0, 0));
+    }
+
+    /// The length that `times` frames had, one after the other, which were left out as too long. That is no damage: it begins to count anew.
+    pub(super) fn too_long(&mut self, times: u32) -> Option<usize> {
+        let (bytes, count) = self.long;
+        (count >= times).then(|| {
+            self.long = (0, 0);
+            bytes
+        })
     }
 
     /// Forgets what has come: the next byte may be in the middle of a packet, and is no damage.
@@ -77,17 +106,25 @@ impl Packets {
                 self.skip();
                 continue;
             };
-            let number = |at: usize| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
-            let wanted = match start {
-                _ if bytes.len() < ANSWER_HEAD.min(PUSHED_HEAD) => return None,
-                ANSWER if bytes.len() < ANSWER_HEAD => return None,
-                ANSWER => ANSWER_HEAD + number(6) + 1,
-                _ => PUSHED_HEAD + number(3) + 1,
+            let head = if start == ANSWER { ANSWER_HEAD } else { PUSHED_HEAD };
+            if bytes.len() < head {
+                return None;
+            }
+            let number = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+            let count = usize::from(number(head - 2));
+            let is_sound = match start {
+                ANSWER => count <= MAX_ANSWER_BYTES && REGISTERS.contains(&number(4)),
+                _ => (1..=self.most.unwrap_or(MAX_FRAME_BYTES) + 1).contains(&count),
             };
-            if wanted > MAX_BYTES || (start == PUSHED && wanted == PUSHED_HEAD + 1) {
+            if !is_sound {
+                if start == PUSHED && count > 0 {
+                    let (bytes, before) = self.long;
+                    self.long = (count - 1, if bytes == count - 1 { before + 1 } else { 1 });
+                }
                 self.skip();
                 continue;
             }
+            let wanted = head + count + 1;
             let whole = bytes.get(..wanted)?;
             if checksum(whole) != 0 {
                 self.skip();
@@ -99,7 +136,10 @@ impl Packets {
                     register: u16::from_le_bytes([whole[4], whole[5]]),
                     data: whole[ANSWER_HEAD..wanted - 1].to_vec(),
                 },
-                _ => Packet::Pushed { error: whole[PUSHED_HEAD], data: whole[PUSHED_HEAD + 1..wanted - 1].to_vec() },
+                _ => {
+                    self.long = (0, 0);
+                    Packet::Pushed { error: whole[PUSHED_HEAD], data: whole[PUSHED_HEAD + 1..wanted - 1].to_vec() }
+                }
             };
             self.bytes.drain(..wanted);
             self.left_out = false;
@@ -136,7 +176,11 @@ pub(super) mod tests {
     }
 
     fn all(bytes: &[u8]) -> (Vec<Packet>, u64) {
-        let mut packets = Packets::default();
+        all_up_to(None, bytes)
+    }
+
+    fn all_up_to(most: Option<usize>, bytes: &[u8]) -> (Vec<Packet>, u64) {
+        let mut packets = Packets { most, ..Packets::default() };
         packets.push(bytes);
         (std::iter::from_fn(|| packets.next()).collect(), packets.damaged)
     }
@@ -174,27 +218,108 @@ pub(super) mod tests {
     #[test]
     fn a_damaged_byte_costs_its_packet_and_no_other() {
         let (one, two) = (pushed(0, &[0x11; 20]), pushed(0, &[0x23; 20]));
-        // Far enough for a damaged length to end.
-        let tail = pushed(0, &[0; 9]).repeat(MAX_BYTES / 15 + 2);
-        let mut wrong = 0;
-        for (at, by) in (0..one.len()).flat_map(|at| [1, 2, 0x55, 0x80, 0xFF].map(|by| (at, by))) {
+        let of_two = Packet::Pushed { error: 0, data: vec![0x23; 20] };
+        // Nothing comes after it for a damaged length to end in.
+        for (at, by) in (0..one.len()).flat_map(|at| (1..=u8::MAX).map(move |by| (at, by))) {
             let mut damaged = one.clone();
             damaged[at] ^= by;
-            let (found, pieces) = all(&[&damaged[..], &two, &tail].concat());
-            let of_two = Packet::Pushed { error: 0, data: vec![0x23; 20] };
-            match found.contains(&of_two) {
-                true => assert!(pieces == 1 && found[0] == of_two, "{at} {by}"),
-                // By chance a longer piece adds up to 0; its length is not that of a frame.
-                false => {
-                    assert!(matches!(&found[0], Packet::Pushed { data, .. } if data.len() > 20), "{at} {by}");
-                    wrong += 1;
-                }
-            }
+            let (found, pieces) = all_up_to(Some(20), &[&damaged[..], &two].concat());
+            assert!(found.last() == Some(&of_two) && pieces == 1, "{at} {by}: {found:?}");
+            // By chance a shorter piece adds up to 0; its length is not that of a frame.
+            let short = |packet: &Packet| matches!(packet, Packet::Pushed { data, .. } if data.len() < 20);
+            assert!(found.len() == 1 || (at == 3 && found.len() == 2 && short(&found[0])), "{at} {by}: {found:?}");
         }
-        assert!(wrong <= 1, "{wrong}");
+    }
+
+    #[test]
+    fn frames_that_are_all_too_long_are_no_damage() {
+        let mut packets = Packets::default();
+        packets.limit(20);
+        packets.push(&pushed(0, &[1; 21]).repeat(9));
+        assert_eq!((packets.next(), packets.too_long(10)), (None, None));
+        packets.push(&[pushed(0, &[1; 20]), pushed(0, &[1; 21]).repeat(9), pushed(0, &[1; 22])].concat());
+        assert!(packets.next().is_some());
+        assert_eq!((packets.next(), packets.too_long(10)), (None, None));
+        packets.push(&pushed(0, &[1; 22]).repeat(9));
+        assert_eq!((packets.next(), packets.too_long(10), packets.too_long(10)), (None, Some(22), None));
+    }
+
+    /// What may happen to a packet: a byte is another one, its end is missing, or bytes come before it.
+    #[derive(Clone, Debug)]
+    enum Harm {
+        None,
+        Changed(usize, u8),
+        Cut(usize),
+        After(Vec<u8>),
+    }
+
+    /// Bytes with which no packet begins.
+    fn bytes(count: impl Into<prop::collection::SizeRange>) -> impl Strategy<Value = Vec<u8>> {
+        prop::collection::vec(any::<u8>().prop_filter("begins a packet", |byte| *byte != PUSHED[0]), count)
+    }
+
+    fn harm() -> impl Strategy<Value = Harm> {
+        prop_oneof![
+            3 => Just(Harm::None),
+            2 => (any::<usize>(), 1..=u8::MAX).prop_map(|(at, by)| Harm::Changed(at, by)),
+            // Lengths are two bytes of many.
+            2 => (3..5_usize, 1..=u8::MAX).prop_map(|(at, by)| Harm::Changed(at, by)),
+            1 => (1..30_usize).prop_map(Harm::Cut),
+            1 => bytes(1..40).prop_map(Harm::After),
+        ]
     }
 
     proptest! {
+        #[test]
+        fn packets_between_damaged_ones_are_found(
+            sent in prop::collection::vec((bytes(30), any::<bool>(), harm()), 1..20),
+            step in 1..200_usize,
+        ) {
+            let (mut line, mut whole, mut is_damaged) = (Vec::new(), Vec::new(), false);
+            for (data, is_answer, harm) in sent {
+                let (mut one, packet) = match is_answer {
+                    true => (answer(READ, TAXELS, &data), Packet::Answer { function: READ, register: TAXELS, data }),
+                    false => (pushed(data[0], &data), Packet::Pushed { error: data[0], data }),
+                };
+                is_damaged |= !matches!(harm, Harm::None);
+                match harm {
+                    Harm::None => whole.push(packet),
+                    Harm::Changed(at, by) => {
+                        let at = at % one.len();
+                        one[at] ^= by;
+                    }
+                    Harm::Cut(count) => one.truncate(one.len() - count),
+                    Harm::After(noise) => {
+                        one.splice(0..0, noise);
+                        whole.push(packet);
+                    }
+                }
+                line.extend(one);
+            }
+            // What is cut may wait for its end.
+            let last = Packet::Pushed { error: 0, data: vec![1; 30] };
+            whole.extend([last.clone(), last.clone(), last]);
+            line.extend(pushed(0, &[1; 30]).repeat(3));
+            let mut packets = Packets::default();
+            packets.limit(30);
+            let mut found = Vec::new();
+            for bytes in line.chunks(step) {
+                packets.push(bytes);
+                found.extend(std::iter::from_fn(|| packets.next()));
+            }
+            let (mut next, mut lost) = (0, 0);
+            for packet in &whole {
+                match found[next..].iter().position(|own| own == packet) {
+                    Some(at) => next += at + 1,
+                    None => lost += 1,
+                }
+            }
+            // A piece that adds up to 0 by chance may end within a packet.
+            let strange = found.len() - (whole.len() - lost);
+            prop_assert!(lost <= strange, "{lost} lost, {strange} strange");
+            prop_assert!(is_damaged == (packets.damaged > 0) || strange > 0);
+        }
+
         #[test]
         fn any_bytes_are_read_to_their_end(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
             let (found, _) = all(&bytes);
