@@ -339,6 +339,27 @@ fn a_plan_and_a_trade_tell_what_each_letter_costs() {
 }
 
 #[test]
+fn what_runs_has_a_plan_also_if_touches_have_shear_and_no_field_has() {
+    let scenes: [&[&str]; 4] = [
+        &["--outputs", "touches"],
+        &["--outputs", "touches.wrench,touches.total"],
+        &["--fields", "hand/palm"],
+        &["--letters", "sustained,shear", "--outputs", "total,touches.friction_sigma"],
+    ];
+    for asked in scenes {
+        let flags = [&["--body", "sensing-hand", "--backend", "cpu"][..], asked].concat();
+        let run = done(&[&["run", "--quiet", "--sink", "csv:-"][..], &flags].concat());
+        assert!(run.lines().count() > 1, "{asked:?}");
+        let bill: serde_json::Value = serde_json::from_str(&done(&[&["plan", "--json"][..], &flags].concat())).unwrap();
+        let stages = bill["stages"].as_array().unwrap();
+        let touches = stages.iter().find(|stage| stage["stage"] == "touches").unwrap();
+        assert!(touches["us"].is_number() && bill["agrees"] == true, "{asked:?}: {bill}");
+        let sum: f64 = stages.iter().filter_map(|stage| stage["us"].as_f64()).sum();
+        assert!(sum >= bill["us"].as_f64().unwrap() - 0.01, "{asked:?}: {bill}");
+    }
+}
+
+#[test]
 fn the_bundled_meeting_is_read_in_its_own_units() {
     let header = |more: &[&str]| {
         let asked = ["run", "--body", "sensing-hand", "--outputs", "total,slip_ratio", "--sink", "csv:-"];
