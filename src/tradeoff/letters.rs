@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::CallMode;
 use super::errors::rank;
-use super::frames::{Calls, TURN_TIME, TestFrames};
+use super::frames::{Calls, TURN_TIME, TestFrames, made_up_value};
 use super::measure::MeasureOptions;
 use crate::backend::BackendKind;
 use crate::body::Body;
@@ -17,15 +17,12 @@ use crate::engine::{Engine, Options};
 use crate::error::Result;
 use crate::percept::Outputs;
 use crate::scene::Plan;
-use crate::signal::{Channel, Frame, Letter, RawValue};
+use crate::signal::{Channel, Frame, Letter};
 
 /// The part of the whole time in which letters take turns.
 const TIME_SHARE: f64 = 0.1;
 /// Minimum number of rounds; the first one warms up.
 const MIN_ROUNDS: usize = 4;
-/// Frames that are made up where none are given, and how far apart they are, s.
-const MADE_UP: usize = 64;
-const STEP_S: f64 = 0.01;
 
 /// What a letter costs that the host makes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,13 +56,6 @@ pub(super) fn of_pressure(options: &Options) -> Options {
     }
     let outputs = scene.outputs - Outputs::OF_OTHER_LETTERS;
     options.clone().scene(scene.letters(letters).outputs(outputs))
-}
-
-/// Frames in which every value of `body` is made up.
-pub(super) fn made_up(body: &Body) -> TestFrames {
-    let frame = |index: usize| Frame { t_s: index as f64 * STEP_S, ..Frame::default() };
-    let none = TestFrames { frames: (0..MADE_UP).map(frame).collect(), ..TestFrames::default() };
-    TestFrames { source: "made-up values".to_owned(), ..filled(body, &none) }
 }
 
 /// What each letter of `options` that the host makes costs, beside the others: a plan with all of them takes turns with one without it.
@@ -130,11 +120,10 @@ fn outputs_of_others(plan: &Plan, letters: &[Letter]) -> Outputs {
 fn filled(body: &Body, played: &TestFrames) -> TestFrames {
     let there: BTreeMap<u32, usize> = played.taxels.iter().copied().zip(0..).collect();
     let taxels = Channel::all_of(body);
-    let made = |frame: usize, index: usize| RawValue::new(((index * 7 + frame * 131) % 977 + 1) as f64);
     let fill = |(number, frame): (usize, &Frame)| {
         let value = |(index, channel): (usize, &u32)| match there.get(channel) {
             Some(&at) => frame.values[at],
-            None => made(number, index),
+            None => made_up_value(index, number),
         };
         Frame { values: taxels.iter().enumerate().map(value).collect(), ..frame.clone() }
     };
@@ -179,14 +168,17 @@ mod tests {
     use super::*;
     use crate::bundled;
     use crate::scene::Scene;
-    use crate::signal::Receptor;
+    use crate::signal::{RawValue, Receptor};
 
     fn costs(letters: &[Receptor]) -> (bool, Vec<LetterCost>) {
         let body = Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
         let options = Options::default().scene(Scene::default().letters(Letter::all_of(letters, &[])));
         let ways = CallMode::ALL.to_vec();
         let how = MeasureOptions { seconds: 0.1, batch: 16, ways, backends: vec![BackendKind::Cpu] };
-        (has_options(&body, &options).unwrap(), letter_costs(&body, &options, &made_up(&body), &how).unwrap())
+        (
+            has_options(&body, &options).unwrap(),
+            letter_costs(&body, &options, &TestFrames::made_up(&body, 1), &how).unwrap(),
+        )
     }
 
     #[test]

@@ -27,6 +27,9 @@ const FRAMES: usize = 512;
 /// Values that these hold at most, about.
 const VALUES: usize = 1 << 24;
 
+/// Made-up frames, at least, where none are played.
+const MADE_UP: usize = 32;
+
 /// The number of frames for `taxels` taxels that is worth its memory.
 #[must_use]
 pub fn usual_frames(taxels: usize) -> usize {
@@ -107,7 +110,7 @@ impl Tested {
     /// simulate.
     pub fn new(body: &Body, options: &Options, played: Option<TestFrames>, most: usize) -> Result<Self> {
         if !letters::has_options(body, options)? {
-            let played = played.unwrap_or_else(|| letters::made_up(body));
+            let played = played.unwrap_or_else(|| TestFrames::made_up(body, MADE_UP));
             let touches = Err(Error::failed("no letter is made of pressures"));
             return Ok(Self { played, options: options.clone(), touches });
         }

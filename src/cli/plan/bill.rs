@@ -6,12 +6,12 @@ use somatic::field::{Field, FieldSet};
 use somatic::internal::scene::{PlannedStage, SensedTaxels};
 use somatic::internal::setup::Setup;
 use somatic::internal::setup::{Input, RECORDED_BATCH};
-use somatic::internal::signal::{Channel, Letter};
-use somatic::internal::tradeoff::{Combination, ladder};
+use somatic::internal::signal::Letter;
+use somatic::internal::tradeoff::{Combination, TestFrames, ladder};
 use somatic::scene::OrientationBy;
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Plan, Result, TouchOutputs, touch};
 
-use super::timed::{Played, measured, pressed};
+use super::timed::{Played, measured};
 use crate::cli::tradeoff::{Settled, settled};
 use crate::cli::words::count;
 
@@ -163,7 +163,7 @@ fn played(
         }
     }
     if frames.is_empty() {
-        frames = pressed(Channel::all_of(body).len(), batch);
+        frames = TestFrames::made_up(body, batch).frames;
     }
     Ok((Played { calls: frames.chunks(batch).map(<[Frame]>::to_vec).collect() }, on))
 }
