@@ -291,7 +291,8 @@ fn a_skin_of_temperatures_alone_is_planned_compared_drawn_and_has_nothing_to_tra
     done(&["plot", "--body", body, warm, "-o", text_of(&plot)]);
     assert!(std::fs::read_to_string(&plot).unwrap().contains("warmest [°C]"));
     let trade = done(&["tradeoff", "--body", body, "--source", warm, "--seconds", "0.1"]);
-    assert!(trade.contains("nothing to trade") && trade.contains("100 %") && !trade.contains("combination"), "{trade}");
+    assert!(trade.contains("nothing to trade; timed on the CPU, without touches") && trade.contains("of all fields"));
+    assert!(trade.contains("100 %") && !trade.contains("combination"), "{trade}");
     for (command, code) in [("tradeoff", 2), ("run", 2)] {
         let wish = [command, "--body", body, "--source", warm, "--within", "3 mm", "--sink", "csv:no.csv"];
         let why = fails(code, &wish);
