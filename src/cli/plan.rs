@@ -15,7 +15,6 @@ use somatic::scene::file::SceneFile;
 use somatic::{Error, Result};
 
 use self::bill::Bill;
-pub(super) use self::timed::pressed;
 use super::scene::{RunFlags, grouped, in_flags};
 use super::stdio::{DONE, print};
 

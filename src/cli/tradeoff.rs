@@ -212,7 +212,7 @@ fn letters(report: &Report) -> String {
     let of_way = |way: CallMode| report.letters.iter().filter(move |cost| cost.way == way);
     let ways: Vec<CallMode> = CallMode::ALL.into_iter().filter(|&way| of_way(way).next().is_some()).collect();
     let headings: Vec<String> =
-        ways.iter().flat_map(|way| [format!("{}, µs", way.word()), "of a frame".to_owned()]).collect();
+        ways.iter().flat_map(|way| [format!("{}, µs", way.word()), "of all fields".to_owned()]).collect();
     let mut table = plain(headings.iter().map(String::as_str).chain(["letter"]), 0..2 * ways.len());
     for first in of_way(ways[0]) {
         let costs = ways.iter().filter_map(|&way| of_way(way).find(|cost| cost.letter == first.letter));
@@ -220,7 +220,8 @@ fn letters(report: &Report) -> String {
         table.add_row(cells.chain([first.letter.clone()]));
     }
     let what = "the host makes them in double precision, the same bits with every option: nothing to trade";
-    format!("\n{}: {what}\n{}", style("other letters").bold(), shown(&table))
+    let how = "timed on the CPU, without touches";
+    format!("\n{}: {what}; {how}\n{}", style("other letters").bold(), shown(&table))
 }
 
 /// A number, or a dash where nothing was compared.

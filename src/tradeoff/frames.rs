@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use crate::signal::Frame;
+use crate::body::Body;
+use crate::signal::{Channel, Frame, RawValue};
 use crate::source::Truth;
 
 /// Frames, and their truth if known.
@@ -16,6 +17,29 @@ pub struct TestFrames {
     pub frames: Vec<Frame>,
     /// Per frame; empty if unknown.
     pub truth: Vec<Vec<Truth>>,
+}
+
+/// Values that made-up frames hold, about, and how far apart these are, s.
+const MADE_UP_VALUES: usize = 1 << 22;
+const MADE_UP_STEP_S: f64 = 0.01;
+
+impl TestFrames {
+    /// Frames for a body that nobody has recorded, or cannot be read again, in which every channel has a value, each time another: enough
+    /// for a call of `at_once`, and for motion.
+    #[must_use]
+    pub fn made_up(body: &Body, at_once: usize) -> Self {
+        let taxels = Channel::all_of(body);
+        let count = at_once.max((MADE_UP_VALUES / taxels.len().max(1)).clamp(2, 64));
+        let values = |frame| (0..taxels.len()).map(|index| made_up_value(index, frame)).collect();
+        let made = |frame| Frame { t_s: frame as f64 * MADE_UP_STEP_S, values: values(frame), ..Frame::default() };
+        let frames = (0..count).map(made).collect();
+        Self { source: "made-up values".to_owned(), taxels, frames, truth: Vec::new() }
+    }
+}
+
+/// The value of channel `index` of a body in made-up frame `frame`.
+pub(super) fn made_up_value(index: usize, frame: usize) -> RawValue {
+    RawValue::new(((index * 7 + frame * 131) % 977 + 1) as f64)
 }
 
 /// Time of a turn of what is measured beside others, about.

@@ -11,18 +11,23 @@ pub struct Rung {
     pub outputs: Outputs,
     /// What is given of touches, where these are among them.
     pub touches: Option<TouchOutputs>,
-    /// The letters of all up to here: those of pressures, and others from their own stages on.
+    /// The letters of all up to here: those of pressures, and others from their own stages on. None stands for the scene's own, which give
+    /// touches what no field has.
     pub letters: Vec<Letter>,
     /// Which of [`Plan::explain`] they are; what is timed is shown at the last.
     pub stages: std::ops::Range<usize>,
 }
 
+/// What touches have of tangential forces, and of all letters that the host makes.
+const OF_SHEAR: TouchOutputs = TouchOutputs::SHEAR.union(TouchOutputs::FRICTION_SIGMA);
+const OF_LETTERS: TouchOutputs = OF_SHEAR.union(TouchOutputs::TEMPERATURE);
+
 /// The plans that `plan` is made of, each with one stage more that is asked for. What only serves others comes with the
 /// first of those that it serves; calibration comes with contact. Where no letter is of pressures, all else comes with the first letter.
+/// If touches have the shear or temperature of taxels that no field reads so, the last is the whole plan, which adds that to *touches*.
 #[must_use]
 pub fn ladder(plan: &Plan) -> Vec<Rung> {
     let mut rungs: Vec<Rung> = Vec::new();
-    let of_letters = TouchOutputs::SHEAR | TouchOutputs::TEMPERATURE;
     let (mut outputs, mut touches) = (Outputs::empty(), None);
     let (mut letters, others): (Vec<Letter>, Vec<Letter>) =
         plan.letters().iter().partition(|letter| letter.receptor.is_of_pressure());
@@ -40,9 +45,9 @@ pub fn ladder(plan: &Plan) -> Vec<Rung> {
         letters.extend(own);
         let asked_of = |of_stage: TouchOutputs| plan.touch_outputs().map(|outputs| outputs & of_stage);
         let of_touches = match stage.name {
-            "touches" => asked_of(TouchOutputs::all() - TouchOutputs::FIT - of_letters),
-            "fit" => asked_of(TouchOutputs::all() - of_letters),
-            "shear" => touches.zip(asked_of(TouchOutputs::SHEAR)).map(|(before, own)| before | own),
+            "touches" => asked_of(TouchOutputs::all() - TouchOutputs::FIT - OF_LETTERS),
+            "fit" => asked_of(TouchOutputs::all() - OF_LETTERS),
+            "shear" => touches.zip(asked_of(OF_SHEAR)).map(|(before, own)| before | own),
             "temperature" => touches.zip(asked_of(TouchOutputs::TEMPERATURE)).map(|(before, own)| before | own),
             _ => None,
         };
@@ -53,6 +58,13 @@ pub fn ladder(plan: &Plan) -> Vec<Rung> {
         outputs |= if is_contact && asked.is_empty() { Outputs::TOTAL } else { asked };
         let first = rungs.last().map_or(0, |rung| rung.stages.end);
         rungs.push(Rung { outputs, touches, letters: letters.clone(), stages: first..index + 1 });
+    }
+    let lacks = |(asked, timed): (TouchOutputs, TouchOutputs)| (asked - timed).intersects(OF_LETTERS);
+    if plan.touch_outputs().zip(touches).is_some_and(lacks)
+        && let Some(index) = explained.iter().position(|stage| stage.name == "touches")
+    {
+        let (outputs, touches) = (plan.outputs(), plan.touch_outputs());
+        rungs.push(Rung { outputs, touches, letters: Vec::new(), stages: index..index + 1 });
     }
     rungs
 }
@@ -113,6 +125,41 @@ mod tests {
         let rungs = ladder(&alone);
         assert_eq!(rungs.iter().map(|rung| rung.letters.len()).collect::<Vec<_>>(), [1, 2]);
         assert_eq!((rungs[0].stages.start, rungs[1].outputs), (0, alone.outputs()));
+    }
+
+    #[test]
+    fn what_touches_have_of_letters_is_timed_whether_fields_have_it_or_not() {
+        let body = crate::Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
+        let engine = |scene: Scene| Engine::new(&body, Options::default().scene(scene).backend(BackendKind::Reference));
+        let asked = |outputs: TouchOutputs| touch::Options { outputs, ..touch::Options::default() };
+        let usual = Scene::default().touches(asked(TouchOutputs::USUAL));
+        let sigma = asked(TouchOutputs::USUAL | TouchOutputs::FRICTION_SIGMA);
+        let named = Scene::default().letters(Letter::all_of(&[Receptor::Sustained, Receptor::Shear], &[]));
+        let scenes = [
+            (usual.clone().outputs(Outputs::empty()), "touches"),
+            (usual.clone().outputs(Outputs::TOTAL).touches(sigma), "touches"),
+            (usual.clone().fields(["hand/palm"]), "touches"),
+            (named.outputs(Outputs::TOTAL).touches(sigma), "shear"),
+            (usual, "proximity"),
+        ];
+        for (scene, last_stage) in scenes {
+            let whole = engine(scene.clone()).unwrap();
+            let rungs = ladder(whole.plan());
+            for rung in &rungs {
+                let touches = rung.touches.map(asked);
+                let mut of_rung = scene.clone().outputs(rung.outputs).touches(touches);
+                if !rung.letters.is_empty() {
+                    of_rung = of_rung.letters(rung.letters.clone());
+                }
+                let plan = engine(of_rung).unwrap_or_else(|e| panic!("{rung:?}: {e}")).plan().clone();
+                assert_eq!(plan.touch_outputs(), rung.touches);
+            }
+            let last = rungs.last().unwrap();
+            assert_eq!(whole.plan().explain()[last.stages.end - 1].name, last_stage);
+            assert_eq!(last.touches, whole.plan().touch_outputs());
+            let names = |rung: &Rung| rung.touches.is_some_and(|outputs| outputs.intersects(OF_SHEAR));
+            assert_eq!(rungs.iter().filter(|rung| names(rung)).count(), if last_stage == "proximity" { 3 } else { 1 });
+        }
     }
 
     #[test]

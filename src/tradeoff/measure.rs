@@ -144,8 +144,12 @@ pub fn measure(
 fn go_on(progress: &mut dyn FnMut(f64) -> bool, done: f64) -> Result<()> {
     match progress(done) {
         true => Ok(()),
-        false => Err(Error::failed("stopped before everything had been measured once")),
+        false => Err(stopped_early()),
     }
+}
+
+pub(super) fn stopped_early() -> Error {
+    Error::failed("stopped before everything had been measured once")
 }
 
 /// Times all trials in turns for some seconds. The first turn, in which memory is fetched, does not count.

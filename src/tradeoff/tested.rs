@@ -1,10 +1,12 @@
 //! What is measured on, as people ask for it: which backends, which frames, which touches.
 
+use super::measure::stopped_early;
 use super::{CallMode, MeasureOptions, Report, SimulatedTouches, TestFrames, letters, measure};
 use crate::backend::BackendKind;
 use crate::body::Body;
 use crate::engine::Options;
 use crate::error::{Error, Result};
+use crate::scene::Plan;
 use crate::signal::Frame;
 use crate::source::{SimulatedSource, Source};
 
@@ -26,6 +28,9 @@ pub fn software() -> Option<String> {
 const FRAMES: usize = 512;
 /// Values that these hold at most, about.
 const VALUES: usize = 1 << 24;
+
+/// Made-up frames, at least, where none are played.
+const MADE_UP: usize = 32;
 
 /// The number of frames for `taxels` taxels that is worth its memory.
 #[must_use]
@@ -100,47 +105,108 @@ pub struct Tested {
     pub options: Options,
     /// Touches to hold percepts against the truth on, or why there are none.
     pub touches: Result<SimulatedTouches>,
+    /// What is computed: it says which letters there are.
+    plan: Plan,
 }
 
 impl Tested {
     /// `played`, or else simulated touches; up to `most` of these. Where no letter is made of pressures, there are no touches to
     /// simulate.
     pub fn new(body: &Body, options: &Options, played: Option<TestFrames>, most: usize) -> Result<Self> {
-        if !letters::has_options(body, options)? {
-            let played = played.unwrap_or_else(|| letters::made_up(body));
+        let plan = letters::plan(body, options)?;
+        if !letters::has_options(&plan) {
+            let played = played.unwrap_or_else(|| TestFrames::made_up(body, MADE_UP));
             let touches = Err(Error::failed("no letter is made of pressures"));
-            return Ok(Self { played, options: options.clone(), touches });
+            return Ok(Self { played, options: options.clone(), touches, plan });
         }
         let touches = SimulatedTouches::on(body, options, most);
         match (played, touches) {
-            (Some(played), touches) => Ok(Self { played, options: options.clone(), touches }),
+            (Some(played), touches) => Ok(Self { played, options: options.clone(), touches, plan }),
             (None, Ok(touches)) => {
                 let options = options.clone().calibration(touches.calibration.clone());
                 let played = TestFrames { truth: Vec::new(), ..touches.frames.clone() };
-                Ok(Self { played, options, touches: Ok(touches) })
+                Ok(Self { played, options, touches: Ok(touches), plan })
             }
             (None, Err(e)) => Err(e),
         }
     }
 
-    /// Measures it, see [`measure`].
+    /// Measures it, see [`measure`]; letters that the host makes come last.
     pub fn measure(
         &self,
         body: &Body,
         measure_options: &MeasureOptions,
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Report> {
-        let costs = letters::letter_costs(body, &self.options, &self.played, measure_options)?;
-        if !letters::has_options(body, &self.options)? {
-            progress(1.0);
+        let has_options = letters::has_options(&self.plan);
+        let of_letters = match letters::of_host(&self.plan).len() {
+            0 => 0.0,
+            _ if has_options => letters::TIME_SHARE,
+            _ => 1.0,
+        };
+        let mut report = if has_options {
+            let touches = self.touches.as_ref().ok();
+            let options = letters::of_pressure(&self.options);
+            let mut first = |share: f64| progress((1.0 - of_letters) * share);
+            let mut report = measure(body, &options, &self.played, touches, measure_options, &mut first)?;
+            report.left_out.extend(self.touches.as_ref().err().map(|e| format!("against the truth: {e}")));
+            report
+        } else {
             let (source, frames) = (self.played.source.clone(), self.played.frames.len());
-            return Ok(Report { body: body.name.clone(), source, frames, letters: costs, ..Report::default() });
+            Report { body: body.name.clone(), source, frames, ..Report::default() }
+        };
+        let asked = (&self.options, &self.plan);
+        let mut last = |share: f64| progress(1.0 - of_letters * (1.0 - share));
+        report.letters = letters::letter_costs(body, asked, &self.played, measure_options, &mut last)?;
+        if !has_options && report.letters.is_empty() {
+            return Err(stopped_early());
         }
-        let touches = self.touches.as_ref().ok();
-        let options = letters::of_pressure(&self.options);
-        let mut report = measure(body, &options, &self.played, touches, measure_options, progress)?;
-        report.letters = costs;
-        report.left_out.extend(self.touches.as_ref().err().map(|e| format!("against the truth: {e}")));
         Ok(report)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+    use crate::percept::Outputs;
+    use crate::scene::{Arithmetic, Knobs, Scene};
+    use crate::signal::{Letter, Receptor};
+
+    fn measured(scene: Scene, goes_on: bool) -> (Vec<f64>, Result<Report>) {
+        let body = Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
+        let options = Options::default().scene(scene).backend(BackendKind::Cpu);
+        let tested = Tested::new(&body, &options, Some(TestFrames::made_up(&body, 1)), 8).unwrap();
+        let how = MeasureOptions::of_backend(BackendKind::Cpu, 0.05, 16).unwrap();
+        let mut shares = Vec::new();
+        let report = tested.measure(&body, &how, &mut |share| {
+            shares.push(share);
+            goes_on
+        });
+        (shares, report)
+    }
+
+    fn of_letters(receptors: &[Receptor]) -> Scene {
+        let scene = Scene::default().outputs(Outputs::TOTAL | Outputs::CENTROID | Outputs::TEMPERATURE);
+        scene.letters(Letter::all_of(receptors, &[])).fields(["hand/palm"])
+    }
+
+    #[test]
+    fn arithmetic_may_be_set_and_all_that_is_done_is_reported_once() {
+        let scene = of_letters(&[Receptor::Sustained, Receptor::Temperature]);
+        let scene = scene.knobs(Knobs::default().arithmetic(Some(Arithmetic::Compensated)));
+        let (shares, report) = measured(scene, true);
+        let report = report.unwrap();
+        assert!(!report.rows.is_empty() && report.rows.iter().all(|row| row.words.arithmetic == "compensated"));
+        assert_eq!(report.letters.len(), 2);
+        assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.last() == Some(&1.0), "{shares:?}");
+    }
+
+    #[test]
+    fn what_is_stopped_before_a_letter_is_measured_is_an_error() {
+        for letters in [&[Receptor::Sustained, Receptor::Temperature][..], &[Receptor::Temperature]] {
+            let (shares, report) = measured(of_letters(letters), false);
+            assert!(report.unwrap_err().to_string().contains("stopped before") && shares.len() == 1, "{letters:?}");
+        }
     }
 }

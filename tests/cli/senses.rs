@@ -291,7 +291,8 @@ fn a_skin_of_temperatures_alone_is_planned_compared_drawn_and_has_nothing_to_tra
     done(&["plot", "--body", body, warm, "-o", text_of(&plot)]);
     assert!(std::fs::read_to_string(&plot).unwrap().contains("warmest [°C]"));
     let trade = done(&["tradeoff", "--body", body, "--source", warm, "--seconds", "0.1"]);
-    assert!(trade.contains("nothing to trade") && trade.contains("100 %") && !trade.contains("combination"), "{trade}");
+    assert!(trade.contains("nothing to trade; timed on the CPU, without touches") && trade.contains("of all fields"));
+    assert!(trade.contains("100 %") && !trade.contains("combination"), "{trade}");
     for (command, code) in [("tradeoff", 2), ("run", 2)] {
         let wish = [command, "--body", body, "--source", warm, "--within", "3 mm", "--sink", "csv:no.csv"];
         let why = fails(code, &wish);
@@ -336,6 +337,27 @@ fn a_plan_and_a_trade_tell_what_each_letter_costs() {
     let both = |way: &str| ["shear", "temperature", "proximity"].map(|letter| format!("{way} {letter}"));
     assert_eq!(trade(&[]), [both("live"), both("batch")].concat());
     assert!(trade(&["--letters", "sustained"]).is_empty());
+}
+
+#[test]
+fn what_runs_has_a_plan_also_if_touches_have_shear_and_no_field_has() {
+    let scenes: [&[&str]; 4] = [
+        &["--outputs", "touches"],
+        &["--outputs", "touches.wrench,touches.total"],
+        &["--fields", "hand/palm"],
+        &["--letters", "sustained,shear", "--outputs", "total,touches.friction_sigma"],
+    ];
+    for asked in scenes {
+        let flags = [&["--body", "sensing-hand", "--backend", "cpu"][..], asked].concat();
+        let run = done(&[&["run", "--quiet", "--sink", "csv:-"][..], &flags].concat());
+        assert!(run.lines().count() > 1, "{asked:?}");
+        let bill: serde_json::Value = serde_json::from_str(&done(&[&["plan", "--json"][..], &flags].concat())).unwrap();
+        let stages = bill["stages"].as_array().unwrap();
+        let touches = stages.iter().find(|stage| stage["stage"] == "touches").unwrap();
+        assert!(touches["us"].is_number() && bill["agrees"] == true, "{asked:?}: {bill}");
+        let sum: f64 = stages.iter().filter_map(|stage| stage["us"].as_f64()).sum();
+        assert!(sum >= bill["us"].as_f64().unwrap() - 0.01, "{asked:?}: {bill}");
+    }
 }
 
 #[test]

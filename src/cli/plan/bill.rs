@@ -6,12 +6,12 @@ use somatic::field::{Field, FieldSet};
 use somatic::internal::scene::{PlannedStage, SensedTaxels};
 use somatic::internal::setup::Setup;
 use somatic::internal::setup::{Input, RECORDED_BATCH};
-use somatic::internal::signal::{Channel, Letter};
-use somatic::internal::tradeoff::{Combination, ladder};
+use somatic::internal::signal::Letter;
+use somatic::internal::tradeoff::{Combination, TestFrames, ladder};
 use somatic::scene::OrientationBy;
 use somatic::{Agreement, BackendKind, Body, Engine, Frame, Outputs, Plan, Result, TouchOutputs, touch};
 
-use super::timed::{Played, measured, pressed};
+use super::timed::{Played, measured};
 use crate::cli::tradeoff::{Settled, settled};
 use crate::cli::words::count;
 
@@ -63,13 +63,16 @@ impl Bill {
         let chosen = engine.backend();
         let kind: BackendKind = chosen.name.parse()?;
         let backend = (chosen.name.to_owned(), chosen.device, picked.unwrap_or_else(|| chosen.reason.to_owned()));
-        let plan = engine.plan();
+        let plan = engine.plan().clone();
         let knobs = Combination { backend: kind, knobs: plan.knobs() };
-        let rungs = ladder(plan);
+        let kept_charts = engine.kept_charts().map(|(name, why)| format!("{name}: {why}")).collect();
+        let rungs = ladder(&plan);
         let made = |outputs: Outputs, of_touches: Option<TouchOutputs>, letters: &[Letter]| -> Result<Engine> {
             let mut options = options.clone().backend(kind);
             options.scene.outputs = outputs;
-            options.scene.letters = letters.to_vec();
+            if !letters.is_empty() {
+                options.scene.letters = letters.to_vec();
+            }
             let touches = options.scene.touches.unwrap_or_default();
             options.scene.touches = of_touches.map(|outputs| touch::Options { outputs, ..touches });
             let fits = of_touches.is_some_and(|outputs| outputs.intersects(TouchOutputs::FIT));
@@ -84,15 +87,14 @@ impl Bill {
         let mut stages: Vec<Stage> = planned.map(|planned| Stage { planned, measured_us: None }).collect();
         let mut engines =
             rungs.iter().map(|rung| made(rung.outputs, rung.touches, &rung.letters)).collect::<Result<Vec<_>>>()?;
-        let whole = || made(plan.outputs(), plan.touch_outputs(), plan.letters());
-        let compared = (kind != BackendKind::Reference).then(whole).transpose()?;
-        engines.extend(compared);
+        // What is compared is what a run has: the scene as it is asked for.
+        engines.extend((kind != BackendKind::Reference).then_some(engine));
         let (mut played, on) = played(asked, recorded, body, batch, &mut engines)?;
         let mut compared = (kind != BackendKind::Reference).then(|| engines.pop()).flatten();
         let us = measured(&mut engines, &mut played)?;
         let below = std::iter::once(0.0).chain(us.iter().copied());
         for ((rung, us), below) in rungs.iter().zip(&us).zip(below) {
-            stages[rung.stages.end - 1].measured_us = Some((us - below).max(0.0));
+            *stages[rung.stages.end - 1].measured_us.get_or_insert(0.0) += (us - below).max(0.0);
         }
         #[cfg(feature = "zenoh")]
         let network = match engines.last_mut() {
@@ -104,13 +106,13 @@ impl Bill {
         let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;
         Ok(Self {
             body: body.name.clone(),
-            taxels: [taxels_read(plan, body), body.taxels.len()],
-            fields: [plan.fields().len(), fields_of_letters(plan, body)?],
+            taxels: [taxels_read(&plan, body), body.taxels.len()],
+            fields: [plan.fields().len(), fields_of_letters(&plan, body)?],
             memberships: plan.memberships(),
             bytes: [plan.bytes_up(), plan.bytes_down()],
             backend,
             knobs,
-            kept_charts: engine.kept_charts().map(|(name, why)| format!("{name}: {why}")).collect(),
+            kept_charts,
             kept,
             batch,
             stages,
@@ -161,7 +163,7 @@ fn played(
         }
     }
     if frames.is_empty() {
-        frames = pressed(Channel::all_of(body).len(), batch);
+        frames = TestFrames::made_up(body, batch).frames;
     }
     Ok((Played { calls: frames.chunks(batch).map(<[Frame]>::to_vec).collect() }, on))
 }

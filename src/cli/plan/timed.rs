@@ -3,25 +3,14 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use somatic::{Agreement, Engine, Frame, RawValue, Result};
+use somatic::{Agreement, Engine, Frame, Result};
 
 /// Rounds that are measured, in which every plan has its turn.
 const ROUNDS: usize = 15;
 /// A round's turn, s.
 const TURN_S: f64 = 2e-3;
-/// Values that made-up frames hold, about.
-const VALUES: usize = 1 << 22;
 /// From the last frame to the first one of the next time, s.
 const STEP_S: f64 = 0.01;
-
-/// Frames in which every one of `taxels` is pressed, each time otherwise: enough for a call of `batch`, and for motion.
-pub(in crate::cli) fn pressed(taxels: usize, batch: usize) -> Vec<Frame> {
-    let frames = batch.max((VALUES / taxels.max(1)).clamp(2, 64));
-    let value = |index: usize, frame: usize| RawValue::new(((index * 7 + frame * 131) % 977 + 1) as f64);
-    let values = |frame| (0..taxels).map(|index| value(index, frame)).collect();
-    let frame = |frame: usize| Frame { t_s: frame as f64 * 0.01, values: values(frame), ..Frame::default() };
-    (0..frames).map(frame).collect()
-}
 
 /// Frames as calls get them, again and again, in a time that goes on.
 pub(super) struct Played {

@@ -2,12 +2,10 @@
 
 use somatic::internal::setup::Setup;
 use somatic::internal::setup::{Input, RECORDED_BATCH};
-use somatic::internal::signal::Channel;
 use somatic::internal::tradeoff::{MeasureOptions, Measurement, Pick, Store, Target, TestFrames};
 use somatic::source::{SimulatedSource, SourceSpec};
 use somatic::{Body, Error, Options, Result};
 
-use crate::cli::plan::pressed;
 use crate::cli::words::number;
 
 /// What `pick` misses of `target`, which nothing grants.
@@ -56,11 +54,4 @@ pub(super) fn in_words(row: &Measurement) -> String {
         words.push(format!("given for {:.0} % of the touches, absent for the others", 100.0 * truth.given));
     }
     words.join(", ")
-}
-
-/// Frames for a body that nobody has recorded, or cannot be read again: every taxel pressed, each time otherwise.
-pub(super) fn made_up(body: &Body) -> TestFrames {
-    let taxels = Channel::all_of(body);
-    let frames = pressed(taxels.len(), 32);
-    TestFrames { source: "every taxel pressed".to_owned(), taxels, frames, truth: Vec::new() }
 }

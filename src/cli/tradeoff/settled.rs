@@ -3,12 +3,12 @@
 use somatic::internal::setup::Input;
 use somatic::internal::setup::Setup;
 use somatic::internal::tradeoff::{
-    CallMode, Combination, Found, Measurement, Pick, Report, Store, Tested, day, software,
+    CallMode, Combination, Found, Measurement, Pick, Report, Store, TestFrames, Tested, day, software,
 };
 use somatic::scene::Coverage;
 use somatic::{BackendKind, Body, Error, Options, Result};
 
-use super::measured::{in_words, made_up, measure_options, missed, nothing_to_choose, played};
+use super::measured::{in_words, measure_options, missed, nothing_to_choose, played};
 use crate::cli::stdio::say;
 
 /// Seconds of a brief measurement, and its frames.
@@ -75,12 +75,12 @@ pub(in crate::cli) fn settled(asked: &Setup, input: Option<&Input>, body: &Body,
         None => {
             let again = input.filter(|input| input.is_recording());
             let played = again.map(|input| played(input, asked, body, BRIEF_FRAMES)).transpose()?;
-            let played = played.unwrap_or_else(|| made_up(body));
+            let played = played.unwrap_or_else(|| TestFrames::made_up(body, BRIEF_FRAMES));
             let brief = measure_options(asked, &options, BRIEF_S)?;
             let mut tested = Tested::new(body, &options, Some(played), BRIEF_FRAMES)?;
             let measured = tested.measure(body, &brief, &mut |_| true).or_else(|_| {
                 // The first frames of a recording may touch nothing.
-                tested.played = made_up(body);
+                tested.played = TestFrames::made_up(body, BRIEF_FRAMES);
                 tested.measure(body, &brief, &mut |_| true)
             })?;
             let when = format!("briefly, just now, on {}", measured.source);
