@@ -1,7 +1,7 @@
 //! Lines of text, live: real pseudo-terminals and sockets, and what `somatic run` makes of what comes over them.
 
 use std::fs::File;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::net::{TcpListener, UdpSocket};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -52,6 +52,8 @@ pub struct Board {
 impl Board {
     pub fn start(every: Duration, line: impl Fn(u64) -> Vec<u8> + Send + 'static) -> Self {
         let (mut device, name) = pty();
+        // Or it would wait for a reader that has ended, and whoever stops it with it.
+        rustix::io::ioctl_fionbio(&device, true).unwrap();
         let (stop, stopped) = channel::<()>();
         let thread = thread::spawn(move || {
             let is_stopped = |wait: Duration| stopped.recv_timeout(wait) != Err(RecvTimeoutError::Timeout);
@@ -64,8 +66,16 @@ impl Board {
             let mut sent = 0;
             loop {
                 let due = start + every * u32::try_from(sent).unwrap();
-                if is_stopped(due.saturating_duration_since(Instant::now())) || device.write_all(&line(sent)).is_err() {
+                if is_stopped(due.saturating_duration_since(Instant::now())) {
                     return sent;
+                }
+                let (bytes, mut written) = (line(sent), 0);
+                while written < bytes.len() {
+                    match device.write(&bytes[written..]) {
+                        Ok(more) => written += more,
+                        Err(e) if e.kind() == ErrorKind::WouldBlock && !is_stopped(Duration::from_millis(1)) => {}
+                        Err(_) => return sent,
+                    }
                 }
                 sent += 1;
             }
