@@ -106,10 +106,10 @@ impl LeRobotSource {
         Channel::side_by_side(&mut taxels);
         if taxels.len() != width {
             let what = format!(
-                "`{}` has {width} values a frame, and the body {} for {} taxels; give the body of this sensor with --body",
+                "`{}` has {width} values a frame, and the body has {} taxels with {} values; give the body of this sensor with --body",
                 feature.name,
-                taxels.len(),
-                Channel::taxels_of(&taxels).len()
+                Channel::taxels_of(&taxels).len(),
+                taxels.len()
             );
             return Err(Error::usage(what).at(&place));
         }

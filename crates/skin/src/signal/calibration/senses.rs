@@ -395,7 +395,7 @@ mod tests {
         );
         assert_eq!(
             with("1e30", "3950", "1e4", "1023"),
-            format!("line 2: `ohm_at_25` is {}; a resistance in Ω is from 0.1 to 1000000000", 1e30)
+            format!("line 2: `ohm_at_25` is {}; a resistance in Ω is from 0.000001 to 1000000000", 1e30)
         );
         assert!(with("1e4", "3950", "0", "1023").starts_with("line 2: `series_ohm` is 0; a resistance"));
         assert!(with("1e4", "3950", "1e4", "nan").starts_with("line 2: `full_raw` is NaN; it must be over 0"));
