@@ -45,7 +45,7 @@ ELSEWHERE = {
         "cells": "Body.grid",
     },
     "inspect": {"json": ITS_RESULT, "strict": "it is the exit code of a process; `findings` are empty or not"},
-    "render": {"output": "Picture.save", "force": "Picture.save", "source": "=what", "letter": "Body.plot"},
+    "render": {"output": "Picture.save", "force": "Picture.save", "source": "=what"},
     "calibrate": {"output": "Calibration.save", "force": "Calibration.save", "json": ITS_RESULT, "plot": "Calibrated.plot"},
     "plan": {"json": ITS_RESULT, "schema": "it prints what editors of scene files read, whatever the scene"},
     "tradeoff": {"json": ITS_RESULT, "plot": "Tradeoff.plot"},
