@@ -56,6 +56,7 @@ ELSEWHERE = {
             "the command measures made-up skins; this measures a body, from Python",
         ),
         "outputs": "=scene",
+        "letters": "=scene",
         "calls": "=seconds",
         "json": ITS_RESULT,
     },
