@@ -67,15 +67,20 @@ impl Skin {
         let [body, calibration, touch, to] = ["pad.glb", "senses.toml", "touch.csv", "a.png"].map(|name| self.at(name));
         let from = ["render", text_of(&body), "--source", text_of(&touch), "--calibration", text_of(&calibration)];
         let how = ["--at", "2s", "--view", "front", "--size", "900", "-o", text_of(&to), "--force"];
-        let output = output(&[&from[..], &how, letter].concat());
-        let said = stderr(&output);
-        if said.contains("no GPU driver answers") {
-            skip("GPU", "no adapter answers");
-            return None;
-        }
-        assert_eq!((output.status.code(), said.as_str()), (Some(0), ""));
-        Some(pixels(&to))
+        drawn(&[&from[..], &how, letter].concat(), &to)
     }
+}
+
+/// The colours of the picture that `arguments` draw at `to`, or none where no adapter answers.
+fn drawn(arguments: &[&str], to: &Path) -> Option<Vec<[u8; 3]>> {
+    let output = output(arguments);
+    let said = stderr(&output);
+    if said.contains("no GPU driver answers") {
+        skip("GPU", "no adapter answers");
+        return None;
+    }
+    assert_eq!((output.status.code(), said.as_str()), (Some(0), ""));
+    Some(pixels(to))
 }
 
 fn pixels(path: &Path) -> Vec<[u8; 3]> {
@@ -174,14 +179,7 @@ fn chart(field: &str, letter: &str, at: &[&str]) -> Option<Vec<[u8; 3]>> {
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("chart.png");
     let from = ["render", "sensing-hand", "--source", MEETING, "--calibration", CALIBRATION, "--size", "600"];
-    let output = output(&[&from[..], &["--uv", field, "--letter", letter, "-o", text_of(&to)], at].concat());
-    let said = stderr(&output);
-    if said.contains("no GPU driver answers") {
-        skip("GPU", "no adapter answers");
-        return None;
-    }
-    assert_eq!((output.status.code(), said.as_str()), (Some(0), ""));
-    Some(pixels(&to))
+    drawn(&[&from[..], &["--uv", field, "--letter", letter, "-o", text_of(&to)], at].concat(), &to)
 }
 
 const MEETING: &str = concat!("csv:", env!("CARGO_MANIFEST_DIR"), "/bodies/meeting.csv");
