@@ -384,10 +384,10 @@ impl Engine {
     /// are held.
     pub fn pressures(&self, frame: &Frame, to: &mut Vec<(u32, f64)>) {
         to.clear();
-        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+        for (place, &taxel) in self.intake.taxel_of_value().iter().enumerate().take(frame.values.len()) {
             let Some(channel) = self.channel_of_taxel[taxel].map(|channel| channel as usize) else { continue };
             let curve = self.plan.curves.table(self.plan.taxels[channel].response);
-            let value = self.intake.read(taxel, value);
+            let value = self.intake.read_alone(place, &frame.values);
             let pressure = calibrate::pressure(value, &self.plan.calibrations[channel], curve);
             to.extend(pressure.map(|pressure| (self.ids[taxel], pressure)));
         }

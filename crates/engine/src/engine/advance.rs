@@ -47,9 +47,9 @@ impl Engine {
     /// The values of `frame` by the plan's channels.
     fn raw_in(&self, frame: &Frame) -> Vec<RawValue> {
         let mut raw = vec![RawValue::MISSING; self.plan.channels()];
-        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+        for (place, &taxel) in self.intake.taxel_of_value().iter().enumerate().take(frame.values.len()) {
             if let Some(channel) = self.channel_of_taxel[taxel] {
-                raw[channel as usize] = self.intake.read(taxel, value);
+                raw[channel as usize] = self.intake.read_alone(place, &frame.values);
             }
         }
         raw

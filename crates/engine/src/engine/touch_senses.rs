@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::pulls::{tangential, tangential_gain};
+use super::pulls::{Sides, tangential};
 use crate::backend::RawBatch;
 use crate::body::{Body, Modality};
 use crate::percept::{Flags, LinkShare, Touch, TouchFlags, TouchFrame, TouchOutputs};
@@ -44,8 +44,8 @@ struct Pull {
     pressure: f64,
     /// s on the body at rest.
     shear: DVec3,
-    /// P for a raw unit of s.
-    gain: f64,
+    /// P for a raw unit of each tangential value.
+    gains: [f64; 2],
 }
 
 /// The frame of a call that touches are of.
@@ -196,15 +196,16 @@ impl TouchSenses {
         if !by.has_gain(own.taxel, calibration.response) {
             return None;
         }
-        let gain = tangential_gain(by, own.taxel, calibration);
+        let sides = Sides::of(by, own.taxel, calibration);
         let values = own.values.map(|value| row.get(value).copied().unwrap_or(RawValue::MISSING));
-        let pulls = tangential(by, own.taxel, gain, pressure, values);
+        let pulls = tangential(by, sides, pressure, values);
         Some(match pulls {
             Ok([su, sv]) => {
                 let [tu, tv] = own.tangents_in_body;
-                Ok(Pull { node, pressure, shear: su * tu + sv * tv, gain })
+                Ok(Pull { node, pressure, shear: su * tu + sv * tv, gains: sides.gains })
             }
             Err(why) if why.contains(Flags::INCOMPLETE) => Err(TouchFlags::INCOMPLETE),
+            Err(why) if why.contains(Flags::OUT_OF_RANGE) => Err(TouchFlags::OUT_OF_RANGE),
             Err(_) => Err(TouchFlags::FAULTY_INPUT),
         })
     }
@@ -271,13 +272,13 @@ impl TouchSenses {
             let number = sensed.raw.rows.value(sensed.offset, node).number()?;
             let noise = Noise {
                 of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
-                of_sides: pull.gain.abs() * by.noise_of(own.taxel).unwrap_or(noise),
+                of_sides: pull.gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),
             };
             let along = own.tangents_in_body.map(|tangent| turned(pull.node, tangent).dot(direction));
             // Where nothing pulls, every direction is as good.
             let along = if direction == DVec3::ZERO { [1.0, 0.0] } else { along };
             total += pull.pressure;
-            variance += noise.variance(&by.cross_axis, along, friction);
+            variance += noise.variance(by, along, friction);
         }
         Some(variance.sqrt() / total)
     }

@@ -99,13 +99,14 @@ mod tests {
 
     #[test]
     fn a_corrected_value_has_the_noise_of_all_three() {
-        let cells = [1, 2].map(|id: u32| {
-            SheetCell::rectangle(id, [0.01 * f64::from(id), 0.0], 0.01, 0.01).with_axes(id == 1)
-        });
+        let cells =
+            [1, 2].map(|id: u32| SheetCell::rectangle(id, [0.01 * f64::from(id), 0.0], 0.01, 0.01).with_axes(id == 1));
         let bytes = sheets(&[Sheet::new("pad", cells.to_vec())]).unwrap().to_bytes().unwrap();
         let body = Body::from_bytes("pad", &bytes).unwrap();
         let read = |row: &str| {
-            let text = format!("[all]\ngain = 2\nnoise = 3\n[shear]\ngain = [4, 1]\ncross_axis = [{row}[0, 1, 0], [0, 0, 1]]\n");
+            let text = format!(
+                "[all]\ngain = 2\nnoise = 3\n[shear]\ngain = [4, 1]\ncross_axis = [{row}[0, 1, 0], [0, 0, 1]]\n"
+            );
             Calibration::parse(&text, &[1, 2]).unwrap()
         };
         let leaking = read("[2, 1, -1], ");

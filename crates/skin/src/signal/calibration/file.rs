@@ -7,12 +7,12 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
-use super::{kinds, shear_keys};
 use super::layer::LayerKeys;
 use super::senses::{ProximityKeys, TemperatureKeys};
 use super::shear_keys::ShearKeys;
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
+use super::{kinds, shear_keys};
 use crate::body::Modality;
 use crate::error::{Error, Result, failed};
 use crate::keys::Text;

@@ -291,11 +291,9 @@ mod tests {
 
     #[test]
     fn lists_of_another_length_are_refused() {
-        for text in [
-            "[all]\nraw_range = [0, 10, 20]",
-            "[temperature]\nraw_range = [0]",
-            "[proximity]\nraw_range = [0, 1, 2]",
-        ] {
+        for text in
+            ["[all]\nraw_range = [0, 10, 20]", "[temperature]\nraw_range = [0]", "[proximity]\nraw_range = [0, 1, 2]"]
+        {
             let why = read(text).unwrap_err();
             assert!(why.starts_with("line 2: a list has ") && why.contains("here; give it "), "{text}: {why}");
         }
@@ -323,5 +321,4 @@ mod tests {
         assert!(with("1e4", "3950", "0", "1023").starts_with("line 2: `series_ohm` is 0; a resistance"));
         assert!(with("1e4", "3950", "1e4", "nan").starts_with("line 2: `full_raw` is NaN; it must be over 0"));
     }
-
 }

@@ -215,7 +215,8 @@ mod tests {
     #[test]
     fn a_scale_multiplies_gains_along_the_skin_too() {
         let gains = |scale: &str| {
-            let text = format!("[all]\n{scale}gain = 3\nunit = \"kPa\"\n[shear]\ngain = [2, 5]\n[taxel.7]\nshear_gain = 7\n");
+            let text =
+                format!("[all]\n{scale}gain = 3\nunit = \"kPa\"\n[shear]\ngain = [2, 5]\n[taxel.7]\nshear_gain = 7\n");
             let read = read(&text).unwrap();
             [0, 1].map(|taxel| {
                 let own = &read.taxels[taxel];
@@ -251,10 +252,7 @@ mod tests {
             ("[[1e8, 1, 1], [0, 0, 1]]", "has 100000000; its numbers are at most 1000000 in size"),
             ("[[0, 0, 0], [0, 0, 0]]", "leaves no shear; its rows are all 0"),
             ("[[1, 0, 0], [0, 0, 0], [0, 0, 0]]", "leaves no shear; its rows are all 0"),
-            (
-                "[[0, 1, 0], [0, 1, 0], [0, 0, 1]]",
-                "has 0 of the normal force in itself; that is about 1, and over 0",
-            ),
+            ("[[0, 1, 0], [0, 1, 0], [0, 0, 1]]", "has 0 of the normal force in itself; that is about 1, and over 0"),
         ] {
             let is = why(&format!("[shear]\ncross_axis = {wrong}"));
             assert_eq!(is, format!("line 2: `cross_axis` {why_not}: {rows}"));
@@ -263,10 +261,7 @@ mod tests {
         assert!(why("[taxel.7]\nshear_noise = nan").starts_with("line 2: `shear_noise` is NaN"));
         assert!(why("[shear]\nslips_at = 0").starts_with("line 2: `slips_at` is 0"));
         assert!(why("[shear]\ngain = [1, 0]").starts_with("line 2: `gain` is 0; it must be between"));
-        assert_eq!(
-            why("[shear]\ngain = \"much\""),
-            "line 2: expected a number, or a list of two: of u and of v"
-        );
+        assert_eq!(why("[shear]\ngain = \"much\""), "line 2: expected a number, or a list of two: of u and of v");
         assert_eq!(
             why("[shear]\nraw_range = [5, 5]"),
             "line 2: `raw_range` is [5, 5]; give the lowest and the highest raw value"
@@ -292,7 +287,8 @@ mod tests {
         let curve = "[curve.a]\nraw = [0, 10]\np = [0, 4]\n[shear]\ngain = 1\ncross_axis = [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]\n";
         let text = format!("{curve}[taxel.7]\ncurve = \"a\"\n");
         let kinds = |three| [(3, crate::body::Modality::Force3), (7, three)];
-        let for_kinds = |three| Calibration::parse_for(&text, &kinds(three)).map_err(|e| without_column(&e.to_string()));
+        let for_kinds =
+            |three| Calibration::parse_for(&text, &kinds(three)).map_err(|e| without_column(&e.to_string()));
         assert_eq!(
             for_kinds(crate::body::Modality::Force3).unwrap_err(),
             "line 6: `cross_axis` in [shear] corrects normal forces, which taxel 7 has by a curve or as an FSR; give two rows"
