@@ -102,10 +102,8 @@ impl Pulls {
             let mut felt = Pull { pressure, newtons_per_p: own.newtons_per_p, ..Pull::default() };
             if pressure > 0.0 {
                 self.is_pressed = true;
-                match numbers_of(own.values.map(|value| row[value])) {
-                    Ok(raw) => {
-                        felt.shear = Some(by.forces(own.rest, own.gain, pressure, raw));
-                    }
+                match tangential(by, (own.rest, own.gain), pressure, own.values.map(|value| row[value])) {
+                    Ok(shear) => felt.shear = Some(shear),
                     Err(why) => flags |= why,
                 }
             }
@@ -145,13 +143,14 @@ fn numbers_of(raw: [RawValue; 2]) -> Result<[f64; 2], Flags> {
     }
 }
 
-/// The tangential forces of the body's taxel `taxel` along t and n × t, where it is pressed by `pressure` and reads `raw`.
+/// The tangential forces along t and n × t of a taxel with this `rest` and `gain`, where it is pressed by `pressure` and reads `raw`; or why
+/// they are not known. What is beyond 2⁶⁰ is not believed, as of P.
 pub(super) fn tangential(
     by: &ShearCalibration,
-    taxel: usize,
-    gain: f64,
+    (rest, gain): ([f64; 2], f64),
     pressure: f64,
     raw: [RawValue; 2],
 ) -> Result<[f64; 2], Flags> {
-    numbers_of(raw).map(|raw| by.forces(by.rest_of(taxel), gain, pressure, raw))
+    let forces = by.forces(rest, gain, pressure, numbers_of(raw)?);
+    if forces.iter().all(|force| force.abs() <= calibrate::HUGE) { Ok(forces) } else { Err(Flags::FAULTY_INPUT) }
 }
