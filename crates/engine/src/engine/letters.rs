@@ -79,6 +79,8 @@ impl Cell<'_> {
         trend: &mut Trend,
     ) {
         percepts.set_present(cell, Outputs::empty());
+        // As it was in a frame of another call.
+        percepts.in_world[cell] = false;
         let mut made = Made { percepts, cell, flags: Flags::empty(), is_there: false };
         if self.step.restarts() {
             trend.clear();

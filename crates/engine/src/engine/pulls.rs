@@ -158,6 +158,7 @@ fn numbers_of(raw: [RawValue; 2]) -> Result<[f64; 2], Flags> {
 }
 
 /// The tangential forces along t and n × t of a taxel that is pressed by `pressure` and reads `raw`; or why they are not known.
+/// What is beyond 2⁶⁰ is not believed, as of P.
 pub(super) fn tangential(
     by: &ShearCalibration,
     sides: Sides,
@@ -168,5 +169,6 @@ pub(super) fn tangential(
     if numbers.iter().any(|number| !(low..=high).contains(number)) {
         return Err(Flags::OUT_OF_RANGE);
     }
-    Ok(by.forces(sides.rest, sides.gains, pressure, numbers))
+    let forces = by.forces(sides.rest, sides.gains, pressure, numbers);
+    if forces.iter().all(|force| force.abs() <= calibrate::HUGE) { Ok(forces) } else { Err(Flags::FAULTY_INPUT) }
 }

@@ -206,5 +206,8 @@ fn pulled(
     }
     let gains = by.gains_of(taxel, calibration.gain, calibration.unit_factor);
     let forces = by.forces(by.rest_of(taxel), gains, own.value, [u, v]);
+    if !forces.iter().all(|force| force.abs() <= calibrate::HUGE) {
+        return (Reading::Faulty, [0.0; 2]);
+    }
     (Reading::Value(libm::hypot(forces[0], forces[1]), true), forces)
 }

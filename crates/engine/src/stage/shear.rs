@@ -134,7 +134,8 @@ impl Sums {
 
     /// Of Σ ws in the chart; absent where nothing pulls.
     pub(crate) fn direction(&self) -> Option<f64> {
-        (self.along_chart.length() > ROUNDING * self.size).then(|| self.along_chart.to_angle())
+        let DVec2 { x, y } = self.along_chart;
+        (self.along_chart.length() > ROUNDING * self.size).then(|| libm::atan2(y + 0.0, x + 0.0))
     }
 
     /// Absent where that of one taxel is known: it has no arm.
