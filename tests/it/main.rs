@@ -56,6 +56,7 @@ mod state;
 mod sure;
 mod sure_on_skin;
 mod touch;
+mod touch_senses;
 mod validator;
 mod verify;
 mod wire;

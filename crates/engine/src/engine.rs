@@ -22,6 +22,7 @@ mod spread;
 mod state;
 mod touch_check;
 mod touch_senses;
+mod touch_warmth;
 
 use self::cadence::OnChange;
 use self::check::Check;

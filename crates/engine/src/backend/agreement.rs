@@ -123,6 +123,9 @@ impl fmt::Display for Agreement {
             if c.worst_error > 0.0 {
                 write!(f, "; worst error {:.1e}, {:.0} % of its bound", c.worst_error, 100.0 * c.worst_share)?;
             }
+            if Outputs::named(name).is_some_and(|output| OF_HOST.contains(output)) {
+                write!(f, "; the same code on every backend")?;
+            }
         }
         for failure in &self.failures {
             write!(f, "\n  {failure}")?;
@@ -130,6 +133,10 @@ impl fmt::Display for Agreement {
         Ok(())
     }
 }
+
+/// What is made of raw values in double precision by one code for all backends: that both sides agree says that nothing was lost.
+const OF_HOST: Outputs =
+    Outputs::of_stage("shear").union(Outputs::of_stage("temperature")).union(Outputs::of_stage("proximity"));
 
 /// Disagreements that are put in words; the rest is counted.
 const MOST_WORDS: usize = 10;
@@ -508,6 +515,18 @@ mod tests {
                 assert_eq!(speed.compared - speed.agreeing, u64::from(!agreement.holds()));
             }
         }
+    }
+
+    #[test]
+    fn the_verdict_says_which_quantities_have_one_code_on_every_backend() {
+        let counts = Comparison { compared: 3, agreeing: 3, ..Comparison::default() };
+        let quantities = ["shear", "nearest", "warmest_taxel", "total", "touches.shear"];
+        let agreement =
+            Agreement { quantities: quantities.map(|name| (name.to_owned(), counts)).into(), ..Agreement::default() };
+        let text = agreement.to_string();
+        let alike: Vec<&str> = text.lines().filter(|line| line.ends_with("the same code on every backend")).collect();
+        let names: Vec<&str> = alike.iter().filter_map(|line| line.split_whitespace().next()).collect();
+        assert_eq!(names, ["nearest", "shear", "warmest_taxel"], "{text}");
     }
 
     #[test]

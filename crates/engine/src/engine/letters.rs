@@ -378,7 +378,7 @@ impl Cell<'_> {
             // Without a chart, each along its own direction.
             let along = match charted {
                 true => member.tangents_in_chart.map(|tangent| tangent.dot(direction)),
-                false => DVec2::from_array(shear).normalize_or(DVec2::X).to_array(),
+                false => DVec2::from_array(shear.forces).normalize_or(DVec2::X).to_array(),
             };
             Some(sum + member.weight.powi(2) * noise.variance(by, along, friction))
         })
@@ -396,10 +396,12 @@ struct Readings<T> {
 
 /// Adds what `member` feels to `sums`, in whose space it has these tangents and this normal.
 fn add(sums: &mut Sums, member: &SensedMember, pull: &Pull, (tangents, normal): (&[DVec3; 2], DVec3)) {
+    let shear = pull.shear.unwrap_or_default();
     let taxel = Pulled {
         weight: member.weight,
         pressure: pull.pressure,
-        shear: pull.shear.unwrap_or_default(),
+        shear: shear.forces,
+        size: shear.size,
         tangents_in_chart: &member.tangents_in_chart,
         tangents,
         normal,

@@ -12,6 +12,7 @@ use super::skin_fits::{FitTrails, Moment, SkinFits};
 use super::skin_sigmas::SkinSigmas;
 use super::touch_check::TouchCheck;
 use super::touch_senses::{Sensed, TouchSenses};
+use super::touch_warmth::Trends;
 use crate::backend::RawBatch;
 use crate::body::Body;
 use crate::field::TaxelGraph;
@@ -61,6 +62,7 @@ pub(super) struct OnSkinState {
     touches: TouchState,
     pressed: Vec<(u32, f64)>,
     row: Vec<RawValue>,
+    trends: Trends,
     self_contacts: Option<Memory>,
     fits: FitTrails,
 }
@@ -124,6 +126,7 @@ impl OnSkin {
             touches: self.touches.state(),
             pressed: self.touches.pressed().collect(),
             row: self.row.clone(),
+            trends: self.senses.as_ref().map(TouchSenses::trends).unwrap_or_default(),
             fits: self.fits.as_ref().map(SkinFits::state).unwrap_or_default(),
             self_contacts: self.self_contacts.as_ref().map(SelfContacts::state),
         }
@@ -133,6 +136,7 @@ impl OnSkin {
         self.touches.restore(&state.touches);
         self.touches.set_pressed(&state.pressed);
         self.row.clone_from(&state.row);
+        self.senses.iter_mut().for_each(|senses| senses.set_trends(&state.trends));
         if let Some(fits) = &mut self.fits {
             fits.restore(&state.fits);
         }
@@ -188,7 +192,7 @@ impl OnSkin {
                 sigmas.add((plan, self.touches.skin()), raw, offset, pressures, &mut found);
             }
             if let Some(senses) = &mut self.senses {
-                let sensed = Sensed { raw, offset, row: sensed.row(index), pressures };
+                let sensed = Sensed { t_s: frame.t_s, raw, offset, row: sensed.row(index), pressures };
                 senses.add((plan, self.touches.skin()), &sensed, &mut found);
             }
             self.poses.clear();

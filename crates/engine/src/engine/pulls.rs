@@ -14,11 +14,20 @@ pub(super) struct Pull {
     /// P.
     pub(super) pressure: f64,
     /// Along t and n × t, where that is known and it is pressed.
-    pub(super) shear: Option<[f64; 2]>,
+    pub(super) shear: Option<Tangential>,
     /// N for each unit of P, where that is known.
     pub(super) newtons_per_p: Option<f64>,
     /// What its fields are flagged with.
     flags: Flags,
+}
+
+/// What a taxel feels along the skin.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tangential {
+    /// Along t and n × t.
+    pub(super) forces: [f64; 2],
+    /// What they are made of, sizes added up.
+    pub(super) size: f64,
 }
 
 /// How a taxel's tangential raw values are read.
@@ -30,16 +39,25 @@ pub(super) struct Sides {
     rest: [f64; 2],
     /// Of those that are believed.
     range: [f64; 2],
+    /// How much of both forces P makes, and a raw unit of each: sizes added up.
+    sizes: [f64; 3],
 }
 
 impl Sides {
     /// Those of the body's taxel `taxel`.
     pub(super) fn of(by: &ShearCalibration, taxel: usize, calibration: &TaxelCalibration) -> Self {
-        Self {
-            gains: by.gains_of(taxel, calibration.gain, calibration.unit_factor),
-            rest: by.rest_of(taxel),
-            range: by.range_of(taxel),
-        }
+        let gains = by.gains_of(taxel, calibration.gain, calibration.unit_factor);
+        let [along, across] = by.cross_axis;
+        let shares = [0, 1, 2].map(|of| along[of].abs() + across[of].abs());
+        let sizes = [shares[0], shares[1] * gains[0].abs(), shares[2] * gains[1].abs()];
+        Self { gains, rest: by.rest_of(taxel), range: by.range_of(taxel), sizes }
+    }
+
+    /// What the forces are made of at these `raw` values.
+    fn size(&self, pressure: f64, raw: [f64; 2]) -> f64 {
+        let [of_p, of_u, of_v] = self.sizes;
+        let [u, v] = [0, 1].map(|axis| raw[axis].abs() + self.rest[axis].abs());
+        of_p * pressure + of_u * u + of_v * v
     }
 }
 
@@ -164,11 +182,13 @@ pub(super) fn tangential(
     sides: Sides,
     pressure: f64,
     raw: [RawValue; 2],
-) -> Result<[f64; 2], Flags> {
+) -> Result<Tangential, Flags> {
     let (numbers, [low, high]) = (numbers_of(raw)?, sides.range);
     if numbers.iter().any(|number| !(low..=high).contains(number)) {
         return Err(Flags::OUT_OF_RANGE);
     }
     let forces = by.forces(sides.rest, sides.gains, pressure, numbers);
-    if forces.iter().all(|force| force.abs() <= calibrate::HUGE) { Ok(forces) } else { Err(Flags::FAULTY_INPUT) }
+    let is_believed = forces.iter().all(|force| force.abs() <= calibrate::HUGE);
+    let felt = Tangential { forces, size: sides.size(pressure, numbers) };
+    if is_believed { Ok(felt) } else { Err(Flags::FAULTY_INPUT) }
 }

@@ -1,28 +1,23 @@
 //! What touches are beside pressure: how they pull along the skin, and how warm they are.
 //!
-//! Σs and Σ(x − c) × s · n go over the taxels of a touch that have three axes and whose tangential forces are known, x being
-//! where they are on the body at rest, c the mean of x by P and n the normal of the taxel at which the touch's chart is based. In
-//! that chart each s is turned by the smallest turn that takes its taxel's normal to the chart's; the friction is ‖Σs‖/ΣP of
-//! these. The force has the normal part of the others, too, also where there are only those. Tangential forces are a part of wrenches. A
-//! touch is as warm as the mean
-//! of the taxels of temperature whose nearest pressure taxel on the same link is one of its taxels.
+//! Sums, direction, torsion and friction are those of stage *shear*, over the taxels of a touch that have three axes and whose tangential
+//! forces are known, in the touch's chart: a taxel counts as in the touch's place, and s and torsion are scaled by ΣP/ΣwP, so that they
+//! are in the unit of the touch's total. The force has the normal part of all other taxels of the touch, too. Around a limb, where there is
+//! no chart, forces are added up in space, and the torsion is that across the plane of the touch's base. Tangential forces are a part
+//! of wrenches.
 
-use std::collections::BTreeMap;
+use glam::{DMat3, DQuat, DVec2, DVec3};
 
-use glam::{DMat3, DQuat, DVec3};
-
-use super::pulls::{Sides, tangential};
+use super::pulls::{Sides, Tangential, tangential};
+use super::touch_warmth::{Trends, Warmth};
 use crate::backend::RawBatch;
-use crate::body::{Body, Modality};
+use crate::body::Body;
 use crate::percept::{Flags, LinkShare, Touch, TouchFlags, TouchFrame, TouchOutputs};
 use crate::scene::Plan;
-use crate::signal::{Axis, Channel, RawValue, Reading};
-use crate::stage::shear::{Noise, ROUNDING};
+use crate::signal::{Axis, Channel, RawValue};
+use crate::stage::shear::{Noise, Pulled, Sums};
 use crate::stage::{calibrate, force};
 use crate::touch::Skin;
-
-/// How far a taxel of temperature may be from its nearest pressure taxel, in widths of that one's cell.
-const REACH: f64 = 1.5;
 
 /// What touches have of tangential forces.
 const OF_PULLS: TouchOutputs = TouchOutputs::SHEAR.union(TouchOutputs::FRICTION_SIGMA).union(TouchOutputs::WRENCH);
@@ -37,21 +32,30 @@ struct PulledTaxel {
     tangents_in_body: [DVec3; 2],
 }
 
-/// What such a taxel feels along the skin.
+/// A taxel of a touch.
 #[derive(Clone, Copy, Debug)]
 struct Pull {
     node: u32,
     /// P > 0.
     pressure: f64,
-    /// s on the body at rest.
-    shear: DVec3,
-    /// P for a raw unit of each tangential value.
-    gains: [f64; 2],
+    /// What it feels along the skin, where that is known.
+    felt: Option<Tangential>,
+    /// Its tangents on the body at rest, if it has three axes.
+    tangents_in_body: [DVec3; 2],
+}
+
+impl Pull {
+    /// s on the body at rest, where it is known.
+    fn shear(&self) -> Option<DVec3> {
+        let [along, across] = self.tangents_in_body;
+        self.felt.map(|felt| felt.forces[0] * along + felt.forces[1] * across)
+    }
 }
 
 /// The frame of a call that touches are of.
 #[derive(Clone, Copy)]
 pub(super) struct Sensed<'a> {
+    pub(super) t_s: f64,
     pub(super) raw: &'a RawBatch<'a>,
     /// Its number in `raw`.
     pub(super) offset: usize,
@@ -67,14 +71,11 @@ pub(super) struct TouchSenses {
     wanted: TouchOutputs,
     /// By node of the skin.
     pulled: Vec<Option<PulledTaxel>>,
-    /// By node, the taxels of temperature nearest to it: place in the body, and where its value is.
-    warm: BTreeMap<u32, Vec<[usize; 2]>>,
+    warmth: Option<Warmth>,
     /// By link, turns directions of the body at rest into the link.
     link_from_body: Vec<DMat3>,
-    /// Memory: those of a touch.
+    /// Memory: the taxels of a touch.
     pulls: Vec<Pull>,
-    /// Memory: the taxels of a touch whose tangential forces are not known, and their P.
-    normal_only: Vec<(u32, f64)>,
 }
 
 impl TouchSenses {
@@ -93,83 +94,93 @@ impl TouchSenses {
         });
         let pulled: Vec<Option<PulledTaxel>> =
             if plan.senses.shear.is_some() { pulled.collect() } else { vec![None; plan.body_taxels.len()] };
-        let mut warm: BTreeMap<u32, Vec<[usize; 2]>> = BTreeMap::new();
-        let is_warm =
-            |taxel: usize| plan.senses.temperature.is_some() && body.taxels[taxel].modality == Modality::Temperature;
-        for taxel in (0..body.taxels.len()).filter(|&taxel| is_warm(taxel)) {
-            let own = &body.taxels[taxel];
-            let at = body.links[own.link].body_from_link.transform_point3(own.position_in_link);
-            let Some(value) = value(own.id, Axis::Normal) else { continue };
-            let on_link = skin.taxels().iter().zip(0_u32..).filter(|(node, _)| node.link as usize == own.link);
-            let nearest = on_link.min_by(|(a, _), (b, _)| a.position.distance(at).total_cmp(&b.position.distance(at)));
-            if let Some((node, number)) = nearest
-                && node.position.distance(at) <= REACH * node.cell_m2.sqrt()
-            {
-                warm.entry(number).or_default().push([taxel, value]);
-            }
-        }
-        let has_any = pulled.iter().any(Option::is_some) || !warm.is_empty();
-        has_any.then(|| Self {
-            wanted: plan.touch_outputs().unwrap_or(TouchOutputs::empty()),
+        let wanted = plan.touch_outputs().unwrap_or(TouchOutputs::empty());
+        let warmth = if wanted.contains(TouchOutputs::TEMPERATURE) { Warmth::new(body, plan, skin) } else { None };
+        (pulled.iter().any(Option::is_some) || warmth.is_some()).then(|| Self {
+            wanted,
             pulled,
-            warm,
+            warmth,
             pulls: Vec::new(),
-            normal_only: Vec::new(),
             link_from_body: body.links.iter().map(|link| link.body_from_link.matrix3.transpose()).collect(),
         })
     }
 
     /// Whether touches need lists of their taxels for it.
     pub(super) fn needs_taxels(&self) -> bool {
-        self.wanted.intersects(OF_PULLS) || !self.warm.is_empty()
+        self.wanted.intersects(OF_PULLS) || self.warmth.is_some()
+    }
+
+    /// What the next touches depend on beside the next frames.
+    pub(super) fn trends(&self) -> Trends {
+        self.warmth.as_ref().map(|warmth| warmth.trends().clone()).unwrap_or_default()
+    }
+
+    /// Goes on from these.
+    pub(super) fn set_trends(&mut self, trends: &Trends) {
+        self.warmth.iter_mut().for_each(|warmth| warmth.set_trends(trends));
     }
 
     /// Puts them into the touches `found` of a frame, in the frames of their links, and what pulls into their wrenches.
     pub(super) fn add(&mut self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, found: &mut TouchFrame) {
-        for index in 0..found.touches.len() {
-            let nodes = found.taxels(&found.touches[index]);
-            let (temperature, mut flags) = self.temperature(plan, sensed.row, nodes);
-            self.pulls.clear();
-            self.normal_only.clear();
-            if self.wanted.intersects(OF_PULLS) {
-                for &node in nodes {
-                    let pressed = (node, sensed.pressures[node as usize]);
-                    match self.pull(plan, sensed.row, pressed) {
-                        Some(Ok(pull)) => self.pulls.push(pull),
-                        Some(Err(why)) => {
-                            flags |= why;
-                            self.normal_only.push(pressed);
-                        }
-                        None => {}
-                    }
-                }
+        if let Some(warmth) = &mut self.warmth {
+            warmth.keep(&found.touches, sensed.raw.steps[sensed.offset].restarts());
+        }
+        let TouchFrame { touches, links, taxels, .. } = found;
+        for touch in touches {
+            let [from, to] = touch.taxels.map(|end| end as usize);
+            let nodes = &taxels[from..to];
+            if let Some(warmth) = &mut self.warmth {
+                warmth.add((plan, skin), (sensed.t_s, sensed.row), nodes, touch);
             }
-            let touch = &mut found.touches[index];
-            touch.temperature_celsius = temperature;
-            touch.flags |= flags;
-            if self.pulls.is_empty() && self.normal_only.is_empty() {
-                continue;
-            }
-            if self.wanted.contains(TouchOutputs::SHEAR) {
-                let turn = self.link_from_body[touch.link as usize];
-                touch.force_vector_newton = self.force(plan, skin).map(|force| turn * force);
-            }
-            if self.pulls.is_empty() {
-                // It is not known how any of them pulls.
-                continue;
-            }
-            if self.wanted.contains(TouchOutputs::SHEAR) {
-                self.shear((plan, skin), touch);
-            }
-            if self.wanted.contains(TouchOutputs::FRICTION_SIGMA) {
-                touch.friction_sigma = self.friction_sigma((plan, skin), sensed, touch);
-                if touch.friction_sigma.is_none() {
-                    touch.flags |= TouchFlags::NOISE_UNKNOWN;
-                }
-            }
-            if self.wanted.contains(TouchOutputs::WRENCH) {
+            if self.wanted.intersects(OF_PULLS) && self.look(plan, sensed, nodes, touch) {
                 let [from, to] = touch.links.map(|end| end as usize);
-                self.pulls.iter().for_each(|pull| add_to_wrench((plan, skin), pull, &mut found.links[from..to]));
+                self.pull((plan, skin), sensed, touch, &mut links[from..to]);
+            }
+        }
+    }
+
+    /// Notes what the taxels at `nodes` feel; whether any has three axes. Flags of `touch` say why it is not known how one pulls.
+    fn look(&mut self, plan: &Plan, sensed: &Sensed<'_>, nodes: &[u32], touch: &mut Touch) -> bool {
+        self.pulls.clear();
+        let mut any = false;
+        for &node in nodes {
+            let pressure = sensed.pressures[node as usize];
+            let felt = self.felt(plan, sensed.row, (node, pressure));
+            any |= felt.is_some();
+            let tangents_in_body = self.pulled[node as usize].as_ref().map(|own| own.tangents_in_body);
+            let felt = felt.and_then(|felt| felt.map_err(|why| touch.flags |= why).ok());
+            self.pulls.push(Pull { node, pressure, felt, tangents_in_body: tangents_in_body.unwrap_or_default() });
+        }
+        any
+    }
+
+    /// Gives `touch` what is wanted of what its taxels feel; its wrenches are in `links`.
+    fn pull(&self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, touch: &mut Touch, links: &mut [LinkShare]) {
+        let found = self.sums((plan, skin), touch);
+        if self.wanted.contains(TouchOutputs::SHEAR) {
+            let turn = self.link_from_body[touch.link as usize];
+            touch.force_vector_newton = found.force().map(|force| turn * force);
+        }
+        if found.pull <= 0.0 {
+            // It is not known how any of them pulls.
+            return;
+        }
+        let friction = found.friction(!touch.flags.contains(TouchFlags::WRAPPED));
+        if self.wanted.contains(TouchOutputs::SHEAR) {
+            touch.friction = Some(friction);
+            touch.slip_ratio = plan.senses.shear.as_ref().and_then(|by| by.slips_at).map(|at| friction / at);
+            self.shear(&found, touch);
+        }
+        if self.wanted.contains(TouchOutputs::FRICTION_SIGMA) {
+            let variance = self.friction_variance((plan, skin), sensed, (&found, friction), touch);
+            touch.friction_sigma = variance.map(|variance| variance.sqrt() / found.pull);
+            touch
+                .flags
+                .set(TouchFlags::NOISE_UNKNOWN, touch.flags.contains(TouchFlags::NOISE_UNKNOWN) || variance.is_none());
+        }
+        if self.wanted.contains(TouchOutputs::WRENCH) {
+            for (node, shear) in self.pulls.iter().filter_map(|pull| Some((pull.node, pull.shear()?))) {
+                add_to_wrench((plan, skin), (node, shear), links);
             }
         }
     }
@@ -184,9 +195,13 @@ impl TouchSenses {
         links: &mut [LinkShare],
     ) {
         for (node, pressure) in pressed {
-            match self.pull(plan, row, (node, pressure)) {
-                Some(Ok(pull)) => add_to_wrench((plan, skin), &pull, links),
-                Some(Err(_)) => {
+            let tangents_in_body = self.pulled[node as usize].as_ref().map(|own| own.tangents_in_body);
+            match self.felt(plan, row, (node, pressure)).zip(tangents_in_body) {
+                Some((Ok(felt), tangents_in_body)) => {
+                    let shear = felt.forces[0] * tangents_in_body[0] + felt.forces[1] * tangents_in_body[1];
+                    add_to_wrench((plan, skin), (node, shear), links);
+                }
+                Some((Err(_), _)) => {
                     let link = skin.taxels()[node as usize].link;
                     links.iter_mut().filter(|share| share.link == link).for_each(|share| share.wrench = None);
                 }
@@ -196,7 +211,12 @@ impl TouchSenses {
     }
 
     /// What the taxel of `node` feels along the skin, pressed by P, if it has three axes; or why that is not known.
-    fn pull(&self, plan: &Plan, row: &[RawValue], (node, pressure): (u32, f64)) -> Option<Result<Pull, TouchFlags>> {
+    fn felt(
+        &self,
+        plan: &Plan,
+        row: &[RawValue],
+        (node, pressure): (u32, f64),
+    ) -> Option<Result<Tangential, TouchFlags>> {
         let by = plan.senses.shear.as_ref()?;
         let own = self.pulled[node as usize].as_ref()?;
         let calibration = &plan.calibrations[node as usize];
@@ -206,16 +226,11 @@ impl TouchSenses {
         }
         let sides = Sides::of(by, own.taxel, calibration);
         let values = own.values.map(|value| row.get(value).copied().unwrap_or(RawValue::MISSING));
-        let pulls = tangential(by, sides, pressure, values);
-        Some(match pulls {
-            Ok([su, sv]) => {
-                let [tu, tv] = own.tangents_in_body;
-                Ok(Pull { node, pressure, shear: su * tu + sv * tv, gains: sides.gains })
-            }
-            Err(why) if why.contains(Flags::INCOMPLETE) => Err(TouchFlags::INCOMPLETE),
-            Err(why) if why.contains(Flags::OUT_OF_RANGE) => Err(TouchFlags::OUT_OF_RANGE),
-            Err(_) => Err(TouchFlags::FAULTY_INPUT),
-        })
+        Some(tangential(by, sides, pressure, values).map_err(|why| match why {
+            why if why.contains(Flags::INCOMPLETE) => TouchFlags::INCOMPLETE,
+            why if why.contains(Flags::OUT_OF_RANGE) => TouchFlags::OUT_OF_RANGE,
+            _ => TouchFlags::FAULTY_INPUT,
+        }))
     }
 
     /// The nodes of which some value beside pressure is `stale`: channels of the body, ascending.
@@ -226,105 +241,123 @@ impl TouchSenses {
             .iter()
             .zip(0..)
             .filter(move |(own, _)| own.as_ref().is_some_and(|own| own.values.into_iter().any(is_stale)));
-        let warm = self.warm.iter().filter(move |(_, taxels)| taxels.iter().any(|&[_, value]| is_stale(value)));
-        pulled.map(|(_, node)| node).chain(warm.map(|(&node, _)| node))
+        let warm = self.warmth.iter().flat_map(move |warmth| warmth.nodes_with(is_stale));
+        pulled.map(|(_, node)| node).chain(warm)
     }
 
-    /// The force on the skin by the taxels of a touch that have three axes, with their normal part alone where it is not known how they
-    /// pull: N on the body at rest, where it is known.
-    fn force(&self, plan: &Plan, skin: &Skin) -> Option<DVec3> {
-        let pushed = self.normal_only.iter().map(|&(node, pressure)| (node, pressure, DVec3::ZERO));
-        let pulled = self.pulls.iter().map(|pull| (pull.node, pull.pressure, pull.shear));
-        pulled.chain(pushed).try_fold(DVec3::ZERO, |sum, (node, pressure, shear)| {
-            let normal = skin.taxels()[node as usize].normal;
-            Some(sum + newtons_per_p(plan, node)? * (shear - pressure * normal))
-        })
-    }
-
-    /// What the taxels of `touch` that are pulled feel together.
-    fn shear(&self, (plan, skin): (&Plan, &Skin), touch: &mut Touch) {
-        let taxel = |pull: &Pull| &skin.taxels()[pull.node as usize];
-        let outward = skin.taxels()[touch.base as usize].normal;
-        let [u, v, up] = skin.chart_axes(touch.base, touch.link);
-        let total: f64 = self.pulls.iter().map(|pull| pull.pressure).sum();
-        let middle = self.pulls.iter().map(|pull| pull.pressure * taxel(pull).position).sum::<DVec3>() / total;
-        let (mut shear, mut torsion, mut size) = (DVec3::ZERO, 0.0, 0.0);
-        let mut in_chart = DVec3::ZERO;
+    /// The sums over the taxels of `touch`, in its chart.
+    fn sums(&self, (plan, skin): (&Plan, &Skin), touch: &Touch) -> Sums {
+        let chart = TouchChart::new(skin, touch);
+        let mut sums = Sums::default();
         for pull in &self.pulls {
-            let own = taxel(pull);
-            shear += pull.shear;
-            size += pull.shear.length();
-            torsion += (own.position - middle).cross(pull.shear).dot(outward);
-            in_chart += DQuat::from_rotation_arc(own.normal.normalize(), up) * pull.shear;
+            let own = &skin.taxels()[pull.node as usize];
+            let tangents_in_chart = chart.tangents(pull);
+            let felt = pull.felt.unwrap_or_default();
+            let taxel = Pulled {
+                weight: own.weight(),
+                pressure: pull.pressure,
+                shear: felt.forces,
+                size: felt.size,
+                tangents_in_chart: &tangents_in_chart,
+                tangents: &pull.tangents_in_body,
+                normal: own.normal,
+                place_m: chart.place(pull.node),
+                newtons_per_p: newtons_per_p(plan, pull.node),
+            };
+            if pull.felt.is_some() { sums.add(&taxel) } else { sums.add_normal(&taxel) }
         }
-        let turn = self.link_from_body[touch.link as usize];
-        // Around a limb there is no chart.
-        let is_wrapped = touch.flags.contains(TouchFlags::WRAPPED);
-        let friction = if is_wrapped { shear.length() } else { in_chart.length() } / total;
-        touch.shear = Some(turn * shear);
+        sums
+    }
+
+    /// Gives `touch` what it `found` of shear.
+    fn shear(&self, found: &Sums, touch: &mut Touch) {
+        let known = self.pulls.iter().filter(|pull| pull.felt.is_some());
+        let scale = known.map(|pull| pull.pressure).sum::<f64>() / found.pull;
+        touch.shear = Some(self.link_from_body[touch.link as usize] * (scale * found.in_space()));
+        touch.torsion = found.torsion().map(|torsion| scale * torsion);
         // One taxel has no arm. Where it is not known how others with three axes pull, that is said.
-        touch.torsion = (self.pulls.len() > 1).then_some(torsion);
-        if touch.torsion.is_none() && self.normal_only.is_empty() {
+        let others = self.pulls.iter().filter(|pull| pull.felt.is_none());
+        if touch.torsion.is_none() && others.into_iter().all(|pull| self.pulled[pull.node as usize].is_none()) {
             touch.flags |= TouchFlags::ONE_TAXEL;
         }
-        touch.friction = Some(friction);
-        touch.slip_ratio = plan.senses.shear.as_ref().and_then(|by| by.slips_at).map(|slips_at| friction / slips_at);
-        if is_wrapped {
+        if touch.flags.contains(TouchFlags::WRAPPED) {
             return;
         }
-        // −0 becomes 0, so that what points along −u is at π, and never at −π.
-        let [along_u, along_v] = [u, v].map(|axis| in_chart.dot(axis) + 0.0);
-        touch.shear_in_chart = Some([along_u, along_v]);
-        let is_still = libm::hypot(along_u, along_v) <= ROUNDING * size;
-        touch.shear_direction_rad = (!is_still).then(|| libm::atan2(along_v, along_u));
-        touch.flags.set(TouchFlags::STILL, is_still);
+        // −0 becomes 0.
+        touch.shear_in_chart = Some((scale * found.along_chart).to_array().map(|along| along + 0.0));
+        touch.shear_direction_rad = found.direction();
+        touch.flags.set(TouchFlags::STILL, touch.shear_direction_rad.is_none());
     }
 
-    /// The standard deviation of the friction of `touch`, as stage *shear* has it; `None` where a taxel's noise is not known.
-    fn friction_sigma(&self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, touch: &Touch) -> Option<f64> {
-        let (friction, by) = (touch.friction?, plan.senses.shear.as_ref()?);
+    /// The variance of the `friction` of `touch` times Σ wP, as stage *shear* has it; `None` where a taxel's noise is not known.
+    fn friction_variance(
+        &self,
+        (plan, skin): (&Plan, &Skin),
+        sensed: &Sensed<'_>,
+        (found, friction): (&Sums, f64),
+        touch: &Touch,
+    ) -> Option<f64> {
+        let by = plan.senses.shear.as_ref()?;
         let first_slot = plan.touched_from.unwrap_or(0);
-        let up = (!touch.flags.contains(TouchFlags::WRAPPED)).then(|| skin.chart_axes(touch.base, touch.link)[2]);
-        let turned = |node: u32, vector: DVec3| match up {
-            Some(up) => DQuat::from_rotation_arc(skin.taxels()[node as usize].normal.normalize(), up) * vector,
-            None => vector,
-        };
-        let direction = self.pulls.iter().map(|pull| turned(pull.node, pull.shear)).sum::<DVec3>().normalize_or_zero();
-        let (mut total, mut variance) = (0.0, 0.0);
-        for pull in &self.pulls {
+        let chart = TouchChart::new(skin, touch);
+        let in_chart = found.along_chart.normalize_or(DVec2::X);
+        let in_space = found.in_space().try_normalize();
+        self.pulls.iter().filter(|pull| pull.felt.is_some()).try_fold(0.0, |sum, pull| {
             let node = pull.node as usize;
             let (calibration, own) = (&plan.calibrations[node], self.pulled[node].as_ref()?);
             let noise = calibration.noise?;
             let number = sensed.raw.rows.value(sensed.offset, node).number()?;
+            let gains = Sides::of(by, own.taxel, calibration).gains;
             let noise = Noise {
                 of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
-                of_sides: pull.gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),
+                of_sides: gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),
             };
-            let along = own.tangents_in_body.map(|tangent| turned(pull.node, tangent).dot(direction));
-            // Where nothing pulls, every direction is as good.
-            let along = if direction == DVec3::ZERO { [1.0, 0.0] } else { along };
-            total += pull.pressure;
-            variance += noise.variance(by, along, friction);
-        }
-        Some(variance.sqrt() / total)
+            let along = match in_space {
+                _ if !chart.is_wrapped => chart.tangents(pull).map(|tangent| tangent.dot(in_chart)),
+                Some(in_space) => pull.tangents_in_body.map(|tangent| tangent.dot(in_space)),
+                // Where nothing pulls, every direction is as good.
+                None => [1.0, 0.0],
+            };
+            Some(sum + skin.taxels()[node].weight().powi(2) * noise.variance(by, along, friction))
+        })
+    }
+}
+
+/// The chart of a touch; around a limb, the plane of its base.
+struct TouchChart<'a> {
+    skin: &'a Skin,
+    base: u32,
+    /// u, v and the normal.
+    axes: [DVec3; 3],
+    is_wrapped: bool,
+}
+
+impl<'a> TouchChart<'a> {
+    fn new(skin: &'a Skin, touch: &Touch) -> Self {
+        let is_wrapped = touch.flags.contains(TouchFlags::WRAPPED);
+        Self { skin, base: touch.base, axes: skin.chart_axes(touch.base, touch.link), is_wrapped }
     }
 
-    /// How warm the touch of `nodes` is, °C, and what is to be said of the taxels under it.
-    fn temperature(&self, plan: &Plan, row: &[RawValue], nodes: &[u32]) -> (Option<f64>, TouchFlags) {
-        let (mut sum, mut count, mut flags) = (0.0, 0.0, TouchFlags::empty());
-        let by = plan.senses.temperature.as_ref().filter(|_| self.wanted.contains(TouchOutputs::TEMPERATURE));
-        let Some(by) = by else { return (None, flags) };
-        for &[taxel, value] in nodes.iter().filter_map(|node| self.warm.get(node)).flatten() {
-            match by.of_taxel(taxel).read(row[value]) {
-                Reading::Value(celsius, is_in_range) => {
-                    (sum, count) = (sum + celsius, count + 1.0);
-                    flags.set(TouchFlags::OUT_OF_RANGE, flags.contains(TouchFlags::OUT_OF_RANGE) || !is_in_range);
-                }
-                Reading::Missing => flags |= TouchFlags::INCOMPLETE,
-                Reading::Faulty => flags |= TouchFlags::FAULTY_INPUT,
-            }
-        }
-        ((count > 0.0).then(|| sum / count), flags)
+    /// Where the taxel of `node` is, m.
+    fn place(&self, node: u32) -> DVec2 {
+        let ([u, v, _], taxels) = (self.axes, self.skin.taxels());
+        let own = &taxels[node as usize];
+        let in_chart = self.skin.place_in_chart(self.base, [u, v], own.position, own.mean_normal);
+        in_chart.filter(|_| !self.is_wrapped).unwrap_or_else(|| {
+            let offset = own.position - taxels[self.base as usize].position;
+            DVec2::new(offset.dot(u), offset.dot(v))
+        })
+    }
+
+    /// The tangents of the taxel of `pull` along u and v.
+    fn tangents(&self, pull: &Pull) -> [DVec2; 2] {
+        let [u, v, up] = self.axes;
+        let normal = self.skin.taxels()[pull.node as usize].normal.normalize();
+        let turn = if self.is_wrapped { DQuat::IDENTITY } else { DQuat::from_rotation_arc(normal, up) };
+        pull.tangents_in_body.map(|tangent| {
+            let turned = turn * tangent;
+            DVec2::new(turned.dot(u), turned.dot(v))
+        })
     }
 }
 
@@ -333,16 +366,15 @@ fn newtons_per_p(plan: &Plan, node: u32) -> Option<f64> {
     force::newtons_per_p(plan.calibrations[node as usize].quantity, plan.areas[node as usize])
 }
 
-/// Adds what `pull` does to the wrench of its link among `links`, if that is known.
-fn add_to_wrench((plan, skin): (&Plan, &Skin), pull: &Pull, links: &mut [LinkShare]) {
-    let taxel = &skin.taxels()[pull.node as usize];
+/// Adds the tangential force s of `node`, on the body at rest, to the wrench of its link among `links`, if that is known.
+fn add_to_wrench((plan, skin): (&Plan, &Skin), (node, shear): (u32, DVec3), links: &mut [LinkShare]) {
+    let taxel = &skin.taxels()[node as usize];
     let share = links.iter_mut().find(|share| share.link == taxel.link);
-    let Some((wrench, newtons)) = share.and_then(|share| share.wrench.as_mut()).zip(newtons_per_p(plan, pull.node))
-    else {
+    let Some((wrench, newtons)) = share.and_then(|share| share.wrench.as_mut()).zip(newtons_per_p(plan, node)) else {
         return;
     };
     let link_from_body = skin.link_from_body(taxel.link);
-    let force = newtons * link_from_body.transform_vector3(pull.shear);
+    let force = newtons * link_from_body.transform_vector3(shear);
     wrench.force_newton += force;
     wrench.torque_newton_m += link_from_body.transform_point3(taxel.position).cross(force);
 }

@@ -57,6 +57,10 @@ bitflags! {
         const YOUNG_FIT = 1 << 20;
         /// Its taxels have three axes, and nothing pulls along them: no direction of its shear.
         const STILL = 1 << 21;
+        /// Under three of its temperature taxels have a reading, or they lie in a line, or it is wrapped: no gradient.
+        const NO_GRADIENT = 1 << 22;
+        /// Its temperature taxels have not been read for half of the window: no rate.
+        const NO_PREVIOUS = 1 << 23;
     }
 }
 
@@ -139,6 +143,18 @@ pub struct Touch {
     pub slip_ratio: Option<f64>,
     /// Mean of the temperature taxels that are nearest to its taxels, °C.
     pub temperature_celsius: Option<f64>,
+    /// The highest temperature of these, °C.
+    pub warmest_celsius: Option<f64>,
+    /// The id of the taxel that has it; of equal ones the lowest.
+    pub warmest_taxel: Option<u32>,
+    /// The lowest temperature of these, °C.
+    pub coldest_celsius: Option<f64>,
+    /// The id of the taxel that has it; of equal ones the lowest.
+    pub coldest_taxel: Option<u32>,
+    /// Gradient of their temperature along u and v of the touch's chart, K/m.
+    pub temperature_gradient_kelvin_per_m: Option<[f64; 2]>,
+    /// How fast their mean changes, K/s, over the window of the calibration.
+    pub temperature_rate_kelvin_per_s: Option<f64>,
     /// Whether its place and directions are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the frame carried a pose of its
     /// link.
     pub in_world: bool,

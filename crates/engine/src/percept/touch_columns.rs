@@ -73,7 +73,7 @@ bitflags! {
         const PLACE = 1 << 29;
         /// How it pulls along the skin: shear, force as a vector, torsion and friction; given by default where taxels have three axes.
         const SHEAR = 1 << 30;
-        /// The mean temperature of the taxels under it; given by default where some measure temperature.
+        /// How warm the taxels under it are, mean, extremes, gradient and rate; given by default where some measure temperature.
         const TEMPERATURE = 1 << 31;
         /// The standard deviation of its friction; only on request.
         const FRICTION_SIGMA = 1 << 32;
@@ -233,4 +233,10 @@ touch_columns! {
     SHEAR "slip_ratio" One 1 "Friction over that at which it slips, slips_at of the calibration: a slip begins at 0.95." |touch| one_of(touch.slip_ratio);
     FRICTION_SIGMA "friction_sigma" One 1 "The standard deviation of its friction, from the sensors' noise." |touch| one_of(touch.friction_sigma);
     TEMPERATURE "temperature" Celsius 1 "Mean of the temperature taxels that are nearest to its taxels, °C." |touch| one_of(touch.temperature_celsius);
+    TEMPERATURE "warmest" Celsius 1 "The highest temperature of these, °C." |touch| one_of(touch.warmest_celsius);
+    TEMPERATURE "warmest_taxel" One 1 "The id of the taxel that has it." |touch| one_of(touch.warmest_taxel.map(f64::from));
+    TEMPERATURE "coldest" Celsius 1 "The lowest temperature of these, °C." |touch| one_of(touch.coldest_celsius);
+    TEMPERATURE "coldest_taxel" One 1 "The id of the taxel that has it." |touch| one_of(touch.coldest_taxel.map(f64::from));
+    TEMPERATURE "temperature_gradient" KelvinPerMetre 2 "Gradient of their temperature along u and v of its own chart, K/m." |touch| touch.temperature_gradient_kelvin_per_m.map(|[u, v]| [u, v, 0.0]);
+    TEMPERATURE "temperature_rate" KelvinPerSecond 1 "How fast that mean changes, over the window of the calibration, K/s." |touch| one_of(touch.temperature_rate_kelvin_per_s);
 }

@@ -27,6 +27,8 @@ pub(crate) struct Pulled<'a> {
     pub(crate) pressure: f64,
     /// s along t and n × t.
     pub(crate) shear: [f64; 2],
+    /// What s is made of, sizes added up: its rounding is a share of that.
+    pub(crate) size: f64,
     /// t and n × t along u and v of the chart.
     pub(crate) tangents_in_chart: &'a [DVec2; 2],
     /// t and n × t in space.
@@ -52,7 +54,7 @@ pub(crate) struct Sums {
     /// Σ wPx, and Σ wx × s · n.
     moment: DVec2,
     turn: f64,
-    /// Σ w(|sᵤ| + |sᵥ|): what the sums' rounding is a share of.
+    /// Σ w of what each s is made of: what the sums' rounding is a share of.
     size: f64,
     space: InSpace,
 }
@@ -72,7 +74,8 @@ pub(crate) const ROUNDING: f64 = 1.0 / (1_u32 << 24) as f64;
 impl Sums {
     #[inline]
     pub(crate) fn add(&mut self, taxel: &Pulled<'_>) {
-        let &Pulled { weight, pressure, shear: [su, sv], tangents_in_chart, tangents, normal, place_m, .. } = taxel;
+        let &Pulled { weight, pressure, shear: [su, sv], size, tangents_in_chart, tangents, normal, place_m, .. } =
+            taxel;
         let pull = weight * pressure;
         let along_chart = weight * (su * tangents_in_chart[0] + sv * tangents_in_chart[1]);
         let in_space = su * tangents[0] + sv * tangents[1];
@@ -81,7 +84,7 @@ impl Sums {
         self.along_chart += along_chart;
         self.moment += pull * place_m;
         self.turn += place_m.perp_dot(along_chart);
-        self.size += weight * (su.abs() + sv.abs());
+        self.size += weight * size;
         self.space.shear += weight * in_space;
         match taxel.newtons_per_p {
             Some(newtons) => self.space.force += newtons * (in_space - pressure * normal),
@@ -183,6 +186,7 @@ mod tests {
             weight: 1.0,
             pressure,
             shear,
+            size: shear[0].abs() + shear[1].abs(),
             tangents_in_chart: &PLANE.0,
             tangents: &PLANE.1,
             normal: DVec3::Z,

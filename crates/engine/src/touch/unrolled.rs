@@ -28,18 +28,32 @@ impl Skin {
     /// from the base, are left out.
     #[must_use]
     pub fn unrolled(&self, base: u32, link: u32, nodes: impl IntoIterator<Item = u32>) -> Unrolled {
-        let origin = self.taxel(base);
-        let axes = chart::directions(origin.mean_normal, self.axes_of(link));
+        let axes = chart::directions(self.taxel(base).mean_normal, self.axes_of(link));
         let mut unrolled = Unrolled { base, axes, ..Unrolled::default() };
         for node in nodes {
             let taxel = self.taxel(node);
-            if taxel.mean_normal.dot(origin.mean_normal) >= WRAPPED_COSINE {
-                let place = chart::place(taxel.position - origin.position, origin.mean_normal, taxel.mean_normal);
+            if let Some(place_m) = self.place_in_chart(base, axes, taxel.position, taxel.mean_normal) {
                 unrolled.nodes.push(node);
-                unrolled.places_m.push(DVec2::new(place.dot(axes[0]), place.dot(axes[1])));
+                unrolled.places_m.push(place_m);
             }
         }
         unrolled
+    }
+
+    /// Where a point of the skin with this normal, on the body at rest, is in the chart that is based at `base`, along its `axes`, m;
+    /// `None` where it is on the other side of a limb, over 120° from the base.
+    pub(crate) fn place_in_chart(
+        &self,
+        base: u32,
+        axes: [DVec3; 2],
+        position: DVec3,
+        mean_normal: DVec3,
+    ) -> Option<DVec2> {
+        let origin = self.taxel(base);
+        (mean_normal.dot(origin.mean_normal) >= WRAPPED_COSINE).then(|| {
+            let place = chart::place(position - origin.position, origin.mean_normal, mean_normal);
+            DVec2::new(place.dot(axes[0]), place.dot(axes[1]))
+        })
     }
 }
 

@@ -98,7 +98,13 @@ fn field() -> Value {
         ("link", described("string", "The frame of its place and normal: its anchor, or the world.")),
         ("letter", described("string", "Its letter, where there are several.")),
         ("signal", described("string", "Its signal, where there are several.")),
-        ("contact", described("boolean", "Whether it is touched.")),
+        (
+            "contact",
+            described(
+                "boolean",
+                "Whether it is touched; of letter proximity whether something is in range, of temperature whether there is a reading.",
+            ),
+        ),
     ];
     let columns = COLUMNS.iter().map(|column| {
         let is_count = column.is_whole();

@@ -61,7 +61,7 @@ fn letter_columns(names: &[FieldNames]) -> impl Iterator<Item = TableColumn> {
 #[must_use]
 pub fn percept_columns(session: &Session<'_>) -> Vec<TableColumn> {
     let mut columns = keys(session);
-    columns.push(TableColumn::new("contact", "", TableType::Bool, "Whether the field is touched.", ValueOf::Contact));
+    columns.push(TableColumn::new("contact", "", TableType::Bool, "Whether the field is touched; of letter proximity whether something is in range, of temperature whether there is a reading.", ValueOf::Contact));
     columns.extend(output_columns(session));
     let help = "Why quantities are absent or in doubt, by name.";
     columns.push(TableColumn::new("flags", "", TableType::Words, help, ValueOf::Flags));
