@@ -146,8 +146,8 @@ mod tests {
         assert!(text.contains("[taxel.1]\n") && text.contains("shear_baseline = [510, 530]"), "{text}");
         assert!(text.contains("shear_baseline = [7, 9]"), "{text}");
         // At rest there is no shear, as `run` reads the file.
-        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
-        let calibration = Calibration::parse(&text, &ids).unwrap();
+        let kinds: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+        let calibration = Calibration::parse_for(&text, &kinds).unwrap();
         assert_eq!(calibration.shear.own_baselines[&0], [510.0, 530.0]);
         // The first's tangential values stray as its normal ones do; the second's are whole numbers that stay.
         let [first, second] = [0, 1].map(|taxel| calibration.shear.noise_of(taxel).unwrap());

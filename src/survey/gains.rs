@@ -112,6 +112,17 @@ mod tests {
         Calibration::parse_for(&written, &taxels).unwrap();
     }
 
+    #[test]
+    fn gains_keep_what_a_calibration_has_along_the_skin() {
+        let text = "[all]\ngain = 2\n[shear]\ngain = [0.5, 0.25]\nraw_range = [-9, 9]\ncross_axis = [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]\n\
+                    [taxel.9]\nshear_gain = 3\nshear_raw_range = [0, 7]\n[temperature]\ninvert = true\n";
+        let taxels = [(3, Modality::Force3), (7, Modality::Temperature), (9, Modality::Force3)];
+        let written = with_gains(text, &taxels, &estimate(&[Some(0.8), None, Some(1.25)])).unwrap();
+        let [before, after] = [text, &written].map(|text| Calibration::parse_for(text, &taxels).unwrap());
+        assert_eq!((after.taxels[0].gain, after.taxels[2].gain), (2.5, 1.6));
+        assert_eq!((after.shear, after.temperature), (before.shear, before.temperature));
+    }
+
     fn estimate(gains: &[Option<f64>]) -> GainsEstimate {
         let mut estimate = GainsEstimate::default();
         (estimate.gains, estimate.sigma_m) = (gains.to_vec(), 0.002_345_67);

@@ -169,4 +169,29 @@ mod tests {
         let own = with_scale("[taxel.3]\nunit = \"kPa\"\n", &estimate).unwrap_err().to_string();
         assert_eq!(own, "[taxel.3] has a unit of its own; remove it");
     }
+
+    #[test]
+    fn a_scale_keeps_what_a_calibration_has_for_other_kinds_of_taxel() {
+        use crate::body::Modality::{Force3, Proximity, Temperature};
+        let text = "[all]\ngain = 2\n[shear]\nbaseline = [5, 6]\ngain = [0.5, 0.25]\nraw_range = [-9, 9]\nnoise = 1\nslips_at = 0.5\n\
+                    cross_axis = [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]\n[taxel.7]\nshear_baseline = [1, 2]\nshear_gain = 3\n\
+                    shear_raw_range = [0, 7]\nshear_noise = 2\n[temperature]\ngain = 0.1\ninvert = true\nraw_range = [0, 900]\n\
+                    [proximity]\ninvert = true\nrange = 80\n[taxel.8]\ninvert = false\n";
+        let taxels = [(3, Force3), (7, Force3), (8, Temperature), (9, Proximity)];
+        let estimate = ScaleEstimate { scale: 0.01, presses: 1, remark: String::new(), becomes_newton: true };
+        let read = |text: &str| Calibration::parse_for(text, &taxels).unwrap();
+        let (before, after) = (read(text), read(&with_scale(text, &estimate).unwrap()));
+        // How a pull compares with a press stays.
+        let gains = |of: &Calibration, taxel: usize| of.shear.gains_of(taxel, of.taxels[taxel].gain, 1.0);
+        for taxel in [0, 1] {
+            assert_eq!(gains(&after, taxel), gains(&before, taxel).map(|gain| 0.01 * gain));
+            assert_eq!(after.taxels[taxel].gain, 0.01 * before.taxels[taxel].gain);
+        }
+        let mut same = after.shear.clone();
+        (same.gain, same.own_gains) = (before.shear.gain, before.shear.own_gains.clone());
+        assert_eq!(
+            (same, &after.temperature, &after.proximity),
+            (before.shear, &before.temperature, &before.proximity)
+        );
+    }
 }

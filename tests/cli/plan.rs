@@ -115,6 +115,11 @@ fn a_plan_counts_what_a_scene_needs_and_leaves_out_the_rest() {
     assert_eq!(centroid["taxels"], centroid["of_taxels"]);
     let text = done(&["plan", "--body", "humanoid", "--outputs", "centroid", "--backend", "reference"]);
     assert!(text.contains("no output needs it") && text.contains("memberships"), "{text}");
+    // Touches are of the whole skin, whatever fields there are.
+    let skin = ["--body", "hand", "--fields", "hand/palm", "--outputs", "total,touches", "--backend", "reference"];
+    let text = done(&[&["plan"][..], &skin].concat());
+    let row = |stage: &str| text.lines().find(|line| line.trim_start().starts_with(stage)).unwrap().to_owned();
+    assert!(row("touches").contains(" 40 taxels ") && row("contact").contains(" 1 field "), "{text}");
 }
 
 #[test]

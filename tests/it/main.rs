@@ -55,6 +55,7 @@ mod slow;
 mod state;
 mod sure;
 mod sure_on_skin;
+mod three_axes;
 mod touch;
 mod touch_senses;
 mod validator;

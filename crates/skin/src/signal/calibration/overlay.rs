@@ -21,7 +21,7 @@ const OF_CIRCUIT: [&str; 3] = ["wiper", "signal", "full_scale_newton"];
 
 impl Calibration {
     /// Lays the calibration `given` over `own`, both TOML. A key of `given` under `[all]` also replaces those under the
-    /// `[taxel.N]` of `own`, as it holds for every taxel.
+    /// `[taxel.N]` of `own`, as it holds for every taxel; so does one under `[shear]`.
     ///
     /// # Errors
     /// One of them is not TOML. Whether the result makes sense is for [`Calibration::parse`].
@@ -36,6 +36,12 @@ impl Calibration {
                         keys.iter().for_each(|(key, value)| without_rivals(taxel, key, value));
                     }
                     lay_keys(table(&mut own, "all"), keys);
+                }
+                ("shear", Value::Table(keys)) => {
+                    for taxel in tables_in(&mut own, "taxel") {
+                        keys.keys().for_each(|key| drop(taxel.remove(&format!("shear_{key}"))));
+                    }
+                    lay_keys(table(&mut own, "shear"), keys);
                 }
                 ("taxel", Value::Table(taxels)) => {
                     for (id, keys) in taxels {
@@ -151,6 +157,15 @@ mod tests {
         assert_eq!((read.contact.on, read.contact.off), (2000.0, 2000.0));
         assert_eq!(laid.stays, ["gain = 2", "unit = \"kPa\"", "[taxel.17]"]);
         assert_eq!(laid.replaced_unit, None);
+    }
+
+    #[test]
+    fn what_is_given_of_three_axes_holds_for_every_taxel() {
+        let own = "[shear]\nslips_at = 0.5\n[taxel.3]\nshear_gain = 4\nshear_baseline = [1, 2]\n";
+        let (_, read) = laid(own, "[shear]\ngain = [2, 3]\nraw_range = [0, 9]\n[taxel.17]\nshear_gain = 5\n");
+        assert_eq!([0, 1].map(|taxel| read.shear.gains_of(taxel, 1.0, 1.0)), [[2.0, 3.0], [5.0, 5.0]]);
+        assert_eq!((read.shear.rest_of(0), read.shear.range_of(0)), ([1.0, 2.0], [0.0, 9.0]));
+        assert_eq!(read.shear.slips_at, Some(0.5));
     }
 
     #[test]
