@@ -92,7 +92,7 @@ class TouchesOf:
                 self.warm_of.setdefault(node, []).append(place)
 
     def right(self, frame, touch):
-        """What is right of a touch: quantities, and a list of those in each chart that it may have."""
+        """What is right of a touch: quantities, and those in each chart that it may have."""
         nodes = np.array([self.node_of[taxel] for taxel in touch["taxels"]])
         turn = self.poses[self.link_of[touch["link"]]][0].T
         p = self.gain[nodes] * (self.raw[frame, nodes] - self.baseline[nodes])
@@ -116,7 +116,10 @@ class TouchesOf:
         if np.isfinite(force).all():
             sizes = (self.newtons[own] * terms).sum() + (self.newtons[nodes] * p_size)[presses].sum()
             found["force_vector"] = Value(turn @ force, sizes)
-        return found, [self.in_chart(touch, base, own, (p[there], p_size[there]), (each, terms)) for base in nodes]
+        # The nearest to its middle first: it is mostly that.
+        away = np.linalg.norm(self.at[nodes] - p @ self.at[nodes] / p.sum(), axis=1)
+        pressures, pulls = (p[there], p_size[there]), (each, terms)
+        return found, (self.in_chart(touch, base, own, pressures, pulls) for base in nodes[away.argsort(kind="stable")])
 
     def in_chart(self, touch, base, own, pressures, pulls):
         (p, p_size), (each, terms) = pressures, pulls
@@ -150,7 +153,13 @@ class TouchesOf:
     def wrong(self, frame, touch, largest):
         """What is wrong with a touch: by quantity what is reported and what is right."""
         found, charts = self.right(frame, touch)
-        return min((self.off(touch, found | chart, largest) for chart in charts), key=len)
+        least = None
+        for chart in charts:
+            wrong = self.off(touch, found | chart, largest)
+            if not wrong:
+                return wrong
+            least = wrong if least is None or len(wrong) < len(least) else least
+        return least
 
     def off(self, touch, found, largest):
         wrong, over_by = {}, {}
