@@ -2,9 +2,11 @@
 
 use super::{commands, root, shell, workplace};
 
-/// By letter: the field that the README speaks of, and what its figures are, in their order: a column, and how many of the README's units
-/// are one of the column's.
-const FIGURES: [(&str, &str, &[(&str, f64)]); 4] = [
+/// A figure: a column, and how many of the README's units are one of the column's.
+type Figure = (&'static str, f64);
+
+/// By letter: the field that the README speaks of, and what its figures are, in their order.
+const FIGURES: [(&str, &str, &[Figure]); 4] = [
     ("proximity", "hand/palm", &[("nearest [m]", 1e3), ("approach_speed [m/s]", 1.0)]),
     ("sustained", "hand/palm", &[("total [N]", 1.0)]),
     ("temperature", "hand/palm", &[("temperature [°C]", 1.0), ("warmest [°C]", 1.0), ("temperature_rate [K/s]", 1.0)]),
