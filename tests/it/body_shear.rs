@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use somatic::body::{FieldSpec, MemberSpec, Modality, Taxel};
 use somatic::internal::body::{Glb, MeshData};
 use somatic::percept::{Touch, Wrench};
@@ -212,6 +212,46 @@ fn twists_and_turns_of_the_whole_body_have_their_sign() {
         }
     }
     assert!(count > 30 && reaches.iter().all(|&reach| reach > 5e-3), "{count} {reaches:?}");
+}
+
+/// The truth of a pair of balls `apart_m` from each other that turns from `degrees` on and is dragged along the limb.
+fn pair(apart_m: f64, degrees: f64) -> Vec<[Truth; 2]> {
+    let touch = format!(
+        "indenter = \"pair\"\nradius_m = 0.008\napart_m = {apart_m}\nfriction = {MU}\n\
+         angle_deg = [[0, {degrees}], [0.4, {}]]\npath = [{{ link = \"limb\", at = [0, -0.01, 0.04] }}, {{ link = \"limb\", \
+         at = [0, 0.01, 0.04] }}]\nspeed_m_s = 0.1\npress = {{ from_s = 0, to_s = 9, newton = 8, ramp_s = 0.05 }}",
+        degrees + 4.0
+    );
+    let mut source = simulated(&limb(), "", [20.0, 0.4], &touch);
+    let mut frame = Frame::missing(0.0, source.taxels().len());
+    let mut found = Vec::new();
+    while source.next_frame(&mut frame).unwrap() {
+        found.extend(<[Truth; 2]>::try_from(source.truth().to_vec()));
+    }
+    found
+}
+
+#[test]
+fn a_pair_points_from_its_first_to_its_second_also_around_a_limb() {
+    // The path runs along y, and angles are from there: −90° is around the limb, its far ends more than a quarter of a turn away.
+    for (apart_m, degrees) in [(0.03, 0.0), (0.03, -90.0), (0.15, -90.0)] {
+        let run = pair(apart_m, degrees);
+        assert!(run.len() >= 6, "{apart_m} m, {degrees}°: {} frames", run.len());
+        for pressed in &run {
+            let [first, second] =
+                pressed.each_ref().map(|truth| (truth.position_in_link, truth.direction_in_link.unwrap()));
+            let turn = |place: DVec3| place.x.atan2(place.z);
+            let way = DVec2::new(RADIUS * (turn(second.0) - turn(first.0)), second.0.y - first.0.y);
+            assert!((way.length() / apart_m - 1.0).abs() < 0.1, "{apart_m} m, {degrees}°: {way}");
+            for (place, direction) in [first, second] {
+                let around = DVec3::new(turn(place).cos(), 0.0, -turn(place).sin());
+                let right = (way.x * around + way.y * DVec3::Y).normalize();
+                let off = direction.angle_between(right).to_degrees();
+                assert!(off < 3.0 && (direction.length() - 1.0).abs() < 1e-9, "{apart_m} m, {degrees}°: off by {off}°");
+            }
+            assert!(pressed.iter().all(|truth| truth.angle.is_some()));
+        }
+    }
 }
 
 /// The wrench of `ids` by its definition, of sensors that deliver newtons.

@@ -11,22 +11,22 @@ use somatic::{
 
 use crate::common::{Flat, backends};
 
-const PITCH: f64 = 0.005;
-const SIDE: u32 = 5;
+pub const PITCH: f64 = 0.005;
+pub const SIDE: u32 = 5;
 /// Ids of the first taxel of each kind.
-const WARM: u32 = 100;
-const NEAR: u32 = 200;
-const CALIBRATION: &str = "[all]\nunit = \"N\"\nnoise = 0.01\n[shear]\nslips_at = 0.5\n[proximity]\nunit = \"mm\"\nrange = 80\n\
+pub const WARM: u32 = 100;
+pub const NEAR: u32 = 200;
+pub const CALIBRATION: &str = "[all]\nunit = \"N\"\nnoise = 0.01\n[shear]\nslips_at = 0.5\n[proximity]\nunit = \"mm\"\nrange = 80\n\
                            window_s = 0.2\n[temperature]\nwindow_s = 0.5\n";
 
-fn grid() -> impl Iterator<Item = (u32, DVec2)> {
+pub fn grid() -> impl Iterator<Item = (u32, DVec2)> {
     let half = f64::from(SIDE - 1) / 2.0;
     (0..SIDE * SIDE).map(move |i| (i, PITCH * DVec2::new(f64::from(i % SIDE) - half, f64::from(i / SIDE) - half)))
 }
 
 /// A sheet whose normal is +y in its link, with 25 taxels of each kind, and one field over the first `kinds` of them.
 /// Its chart's +u is +x and its +v −z; tangents are turned by 90° against that.
-fn skin(kinds: usize) -> Body {
+pub fn skin(kinds: usize) -> Body {
     let mut glb = Glb::new();
     let link = glb.node("skin", None, DVec3::ZERO);
     let all = [(0, Modality::Force3), (WARM, Modality::Temperature), (NEAR, Modality::Proximity)];
@@ -51,7 +51,7 @@ fn skin(kinds: usize) -> Body {
     Body::from_bytes("skin", &glb.to_bytes().unwrap()).unwrap()
 }
 
-fn engine(body: &Body, kind: BackendKind, scene: Scene) -> Engine {
+pub fn engine(body: &Body, kind: BackendKind, scene: Scene) -> Engine {
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let calibration = Calibration::parse(CALIBRATION, &ids).unwrap();
     Engine::new(body, Options::default().scene(scene).calibration(Some(calibration)).backend(kind).batch(16)).unwrap()
@@ -65,20 +65,20 @@ fn pressure(at: DVec2, of: DVec2) -> f64 {
 
 /// What a touch does in a frame.
 #[derive(Clone, Copy)]
-struct Touch {
-    at: DVec2,
+pub struct Touch {
+    pub at: DVec2,
     /// Tangential force over pressure, along u and v of the chart.
-    drag: DVec2,
+    pub drag: DVec2,
     /// The same, about the middle, for each metre of distance.
-    twist: f64,
+    pub twist: f64,
     /// Of what comes near, m.
-    distance_m: f64,
+    pub distance_m: f64,
     /// Of a plane of temperatures in the middle, °C.
-    celsius: f64,
+    pub celsius: f64,
 }
 
 impl Touch {
-    fn frame(self, engine: &Engine, t_s: f64) -> Frame {
+    pub fn frame(self, engine: &Engine, t_s: f64) -> Frame {
         let mut frame = engine.frame(t_s);
         let mut set = |name: String, value: f64| {
             if let Some(index) = engine.index_of(&name) {
@@ -99,7 +99,8 @@ impl Touch {
     }
 }
 
-const TOUCH: Touch = Touch { at: DVec2::ZERO, drag: DVec2::new(0.3, 0.1), twist: 0.0, distance_m: 0.03, celsius: 31.0 };
+pub const TOUCH: Touch =
+    Touch { at: DVec2::ZERO, drag: DVec2::new(0.3, 0.1), twist: 0.0, distance_m: 0.03, celsius: 31.0 };
 
 /// The percepts of `frames`, which are the same however they are cut and agree with the reference.
 fn run(body: &Body, kind: BackendKind, scene: &Scene, touches: &[(f64, Touch)]) -> Vec<Vec<Percept>> {

@@ -46,6 +46,9 @@ def sensed(recording, letter, taxels):
         own = every | file.get("taxel", {}).get(str(body.ids[taxel]), {})
         # What a masked taxel reads is faulty, whatever it is.
         codes[:, column] &= not own.get("mask")
+        if "ntc" in own and own.get("invert") and own["baseline"] == 0:
+            # Above its resistor.
+            own["baseline"] = own["ntc"]["full_raw"]
         above = (own["baseline"] - raw[:, column]) if own.get("invert") else (raw[:, column] - own["baseline"])
         if "ntc" in own and "curve" not in own:
             ntc = own["ntc"]

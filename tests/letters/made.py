@@ -182,6 +182,7 @@ def random_body(rng, kinds):
 def random_calibration(rng, body):
     """The tables of a calibration file."""
     number = lambda low, high, digits=4: float(round(rng.uniform(low, high), digits))
+    gains = lambda: [number(0.001, 1), number(0.001, 1)] if rng.random() < 0.5 else number(0.001, 1)
     every = {"baseline": number(0, 300), "gain": number(0.001, 2), "dead_band": number(0, 20)}
     every |= {"unit": str(rng.choice(["N", "mN", "kPa", "Pa"]))} if rng.random() < 0.8 else {}
     every |= {"noise": number(0.1, 3)} if rng.random() < 0.7 else {}
@@ -189,6 +190,7 @@ def random_calibration(rng, body):
     every |= {"raw_range": [-1000, 900], "missing": [30000]} if rng.random() < 0.4 else {}
     # A limit under what a baseline would be of the largest gain is refused.
     every |= {"p_max": number(620, 1500)} if rng.random() < 0.4 else {}
+    every |= {"scale": number(0.3, 1)} if rng.random() < 0.3 else {}
     every["dead_band"] = round(every["dead_band"] * every["gain"], 6)
     file = {"all": every, "curve": {
         "warm": {"raw": [0.0, 100.5, 400.0, 1000.0], "p": [-10.0, 18.5, 36.0, 90.25]},
@@ -196,8 +198,10 @@ def random_calibration(rng, body):
     }, "taxel": {}}
     if rng.random() < 0.8:
         shear = {"baseline": [number(-50, 50), number(-50, 50)]} if rng.random() < 0.6 else {}
-        shear |= {"gain": number(0.001, 1)} if rng.random() < 0.5 else {}
-        shear |= {"cross_axis": np.round(np.array([[0, 1, 0], [0, 0, 1]]) + rng.normal(0, 0.1, (2, 3)), 4).tolist()} if rng.random() < 0.5 else {}
+        shear |= {"gain": gains()} if rng.random() < 0.5 else {}
+        rows = np.eye(3)[int(rng.integers(2)) :]
+        shear |= {"cross_axis": np.round(rows + rng.normal(0, 0.1, rows.shape), 4).tolist()} if rng.random() < 0.5 else {}
+        shear |= {"raw_range": [-400.0, 350.0]} if rng.random() < 0.3 else {}
         shear |= {"slips_at": number(0.2, 1.2)} if rng.random() < 0.7 else {}
         shear |= {"noise": number(0.1, 3)} if rng.random() < 0.4 else {}
         file["shear"] = shear
@@ -210,11 +214,13 @@ def random_calibration(rng, body):
         case _:
             warm |= {"unit": str(rng.choice(["°C", "K", "°F"])), "gain": number(0.01, 0.5), "baseline": number(-100, 100)}
     warm |= {"raw_range": [20.0, 950.0], "missing": [-999.0, 77.0]} if rng.random() < 0.5 else {}
+    warm |= {"invert": True} if rng.random() < 0.2 else {}
     near = {"unit": str(rng.choice(["mm", "cm", "in"])), "gain": number(0.05, 1)} if rng.random() < 0.7 else {}
     near |= {"curve": "far"} if rng.random() < 0.4 else {"baseline": number(0, 20)}
     near |= {"range": number(50, 300)} if rng.random() < 0.7 else {}
     near |= {"window_s": float(rng.choice([0.11, 0.4]))} if rng.random() < 0.5 else {}
     near |= {"raw_range": [2.0, 900.0], "missing": [0.0]} if rng.random() < 0.4 else {}
+    near |= {"invert": True} if rng.random() < 0.2 else {}
     file |= {"temperature": warm, "proximity": near}
     for taxel, kind in zip(body.ids, body.kind):
         if rng.random() < 0.8:
@@ -223,12 +229,13 @@ def random_calibration(rng, body):
         own |= {"gain": number(0.01, 2)} if rng.random() < 0.5 else {}
         if kind == "force3":
             own |= {"shear_baseline": [number(-30, 30), number(-30, 30)]} if rng.random() < 0.5 else {}
-            own |= {"shear_gain": number(0.001, 1)} if rng.random() < 0.5 else {}
+            own |= {"shear_gain": gains()} if rng.random() < 0.5 else {}
+            own |= {"shear_raw_range": [-150.0, 250.0]} if rng.random() < 0.3 else {}
             own |= {"shear_noise": number(0.1, 3)} if rng.random() < 0.3 else {}
         elif kind != "pressure" and rng.random() < 0.3:
             own |= {"curve": "warm" if kind == "temperature" else "far"}
         if kind in ("temperature", "proximity") and rng.random() < 0.3:
-            own |= {"invert": True}
+            own |= {"invert": bool(rng.random() < 0.7)}
         file["taxel"][str(taxel)] = own
     return file
 

@@ -54,27 +54,39 @@ class TouchesOf:
     def calibrate(self, recording):
         body, file = self.body, self.file
         every, keys = file.get("all", {}), file.get("shear", {})
-        self.quantity, unit_of_p = PRESSURES[every.get("unit")]
+        quantity, unit_of_p = PRESSURES[every.get("unit")]
+        unit_of_p *= every.get("scale", 1.0)
         own = lambda taxel: file.get("taxel", {}).get(str(body.ids[taxel]), {})
-        of = lambda key, default, table=every: np.array([own(taxel).get(key, table.get(key, default)) for taxel in self.taxels])
-        self.baseline, self.gain = of("baseline", 0.0).astype(float), of("gain", 1.0) * unit_of_p
-        self.gain = np.where(of("invert", False).astype(bool), -self.gain, self.gain)
-        own_gain = of("shear_gain", keys.get("gain", np.nan)).astype(float) * unit_of_p
+        of = lambda key, default: [own(taxel).get(key, default) for taxel in self.taxels]
+        both = lambda key, default: np.array([np.broadcast_to(two, 2) for two in of(key, default)], float).reshape(-1, 2).T
+        self.baseline = np.array(of("baseline", every.get("baseline", 0.0)), float)
+        self.gain = np.array(of("gain", every.get("gain", 1.0)), float) * unit_of_p
+        self.gain *= np.where(of("invert", every.get("invert", False)), -1, 1)
+        # Of u and of v.
+        own_gain = both("shear_gain", keys.get("gain", np.nan)) * unit_of_p
         self.side_gain = np.where(np.isnan(own_gain), np.abs(self.gain), own_gain)
-        self.rest = of("shear_baseline", keys.get("baseline", [0.0, 0.0])).reshape(-1, 2).astype(float)
-        self.cross = np.array(keys.get("cross_axis", [[0, 1, 0], [0, 0, 1]]), float)
+        self.rest = both("shear_baseline", keys.get("baseline", 0.0))[:, None]
+        low, high = both("shear_raw_range", keys.get("raw_range", [-np.inf, np.inf]))
+        cross = np.array(keys.get("cross_axis", np.eye(3)), float)
+        self.cross = np.vstack([np.eye(3)[: 3 - len(cross)], cross])
         self.slips_at = keys.get("slips_at")
         area = body.area[self.taxels]
         self.newtons = {
             "N": np.ones(len(area)), "Pa": np.where(area > 0, area, np.nan), None: np.full(len(area), np.nan),
-        }[self.quantity]
-        self.raw, _ = read(recording, self.taxels)
+        }[quantity]
+        raw, _ = read(recording, self.taxels)
         self.has_axes = np.array([body.kind[taxel] == "force3" for taxel in self.taxels], bool)
-        self.sides, self.known = np.full((2, *self.raw.shape), np.nan), np.zeros(self.raw.shape, bool)
+        self.sides = np.full((2, *raw.shape), np.nan)
         for place, axis in enumerate(("u", "v")):
             side, missing = read(recording, [taxel for taxel in self.taxels if body.kind[taxel] == "force3"], axis)
             self.sides[place][:, self.has_axes] = np.where(missing, np.nan, side)
-        self.known = np.isfinite(self.sides).all(axis=0)
+        self.known = (np.isfinite(self.sides) & (self.sides >= low) & (self.sides <= high)).all(axis=0)
+        self.lateral = self.side_gain[:, None] * (self.sides - self.rest)
+        self.large = self.side_gain[:, None] * (np.abs(self.sides) + np.abs(self.rest))
+        # What is along the skin is taken out of raw values, which are singles, where it is known.
+        leak = (self.cross[0, 0] - 1) * (raw - self.baseline) + np.tensordot(self.cross[0, 1:], self.lateral / self.gain, 1)
+        is_leaky = self.known & np.isfinite(leak) & np.any(self.cross[0] != [1, 0, 0])
+        self.raw = np.where(is_leaky, raw + np.where(is_leaky, leak, 0), raw).astype(np.float32).astype(float)
 
     def find_warm(self, recording, listed):
         """By node, the taxels of temperature that are nearest to it on its link."""
@@ -102,20 +114,22 @@ class TouchesOf:
         if under:
             found["temperature"] = Value(self.celsius[frame, under].mean(), np.abs(self.celsius[frame, under]).max() + 300)
         there = self.has_axes[nodes] & self.known[frame, nodes]
-        if not there.any():
-            return found, [{}]
         own, presses = nodes[there], self.has_axes[nodes]
-        side = [self.side_gain[own] * (self.sides[axis][frame, own] - self.rest[own, axis]) for axis in (0, 1)]
-        side_size = [self.side_gain[own] * (np.abs(self.sides[axis][frame, own]) + np.abs(self.rest[own, axis])) for axis in (0, 1)]
-        along = self.cross @ np.stack([p[there], *side])
-        terms = (np.abs(self.cross) @ np.stack([p_size[there], *side_size])).sum(axis=0)
+        # What was measured along the normal, of which the matrix makes P.
+        lateral, large = self.lateral[:, frame, own], self.large[:, frame, own]
+        measured = (p[there] - self.cross[0, 1:] @ lateral) / self.cross[0, 0]
+        size = (p_size[there] + np.abs(self.cross[0, 1:]) @ large) / self.cross[0, 0]
+        along = self.cross[1:] @ np.vstack([measured, lateral])
+        terms = (np.abs(self.cross[1:]) @ np.vstack([size, large])).sum(axis=0)
         each = along[0][:, None] * self.first[own] + along[1][:, None] * self.second[own]
-        found["shear"] = Value(turn @ each.sum(axis=0), terms.sum())
         force = (self.newtons[own, None] * each).sum(axis=0)
         force -= ((self.newtons[nodes] * p)[presses, None] * self.normal[nodes[presses]]).sum(axis=0)
-        if np.isfinite(force).all():
+        if presses.any() and np.isfinite(force).all():
             sizes = (self.newtons[own] * terms).sum() + (self.newtons[nodes] * p_size)[presses].sum()
             found["force_vector"] = Value(turn @ force, sizes)
+        if len(own) == 0:
+            return found, [{}]
+        found["shear"] = Value(turn @ each.sum(axis=0), terms.sum())
         # The nearest to its middle first: it is mostly that.
         away = np.linalg.norm(self.at[nodes] - p @ self.at[nodes] / p.sum(), axis=1)
         pressures, pulls = (p[there], p_size[there]), (each, terms)

@@ -181,17 +181,22 @@ def shears(recording, field, frames):
     of = lambda key, default, table=every: np.array(
         [file.get("taxel", {}).get(str(body.ids[taxel]), {}).get(key, table.get(key, default)) for taxel in field.members]
     )
+    own_of = lambda key, default: [file.get("taxel", {}).get(str(body.ids[taxel]), {}).get(key, default) for taxel in field.members]
+    unit *= every.get("scale", 1.0)
     baseline, gain, mask = of("baseline", 0.0).astype(float), of("gain", 1.0) * unit, of("mask", False).astype(bool)
     gain = np.where(of("invert", False).astype(bool), -gain, gain)
-    dead_band, noise = of("dead_band", 0.0) * unit, of("noise", np.nan).astype(float)
-    most = of("p_max", np.inf).astype(float) * unit
+    dead_band, noise = of("dead_band", 0.0) * PRESSURES[every.get("unit")][1], of("noise", np.nan).astype(float)
+    most = of("p_max", np.inf).astype(float) * PRESSURES[every.get("unit")][1]
     ranges = np.array([file.get("taxel", {}).get(str(body.ids[taxel]), {}).get("raw_range", every.get("raw_range", [-np.inf, np.inf])) for taxel in field.members])
-    own_gain = of("shear_gain", keys.get("gain", np.nan)).astype(float) * unit
+    # Of u and of v.
+    own_gain = np.array([np.broadcast_to(both, 2) for both in own_of("shear_gain", keys.get("gain", np.nan))], float).T * unit
     side_gain = np.where(np.isnan(own_gain), np.abs(gain), own_gain)
-    rest = np.array([file.get("taxel", {}).get(str(body.ids[taxel]), {}).get("shear_baseline", keys.get("baseline", [0.0, 0.0])) for taxel in field.members])
+    rest = np.array(own_of("shear_baseline", keys.get("baseline", [0.0, 0.0])))
+    side_range = np.array(own_of("shear_raw_range", keys.get("raw_range", [-np.inf, np.inf])))
     side_noise = of("shear_noise", keys.get("noise", np.nan)).astype(float)
     side_noise = np.where(np.isnan(side_noise), noise, side_noise)
-    cross = np.array(keys.get("cross_axis", [[0, 1, 0], [0, 0, 1]]), float)
+    cross = np.array(keys.get("cross_axis", np.eye(3)), float)
+    cross = np.vstack([np.eye(3)[: 3 - len(cross)], cross])
     areas = body.area[field.members]
     newtons = {"N": np.ones(len(areas)), "Pa": np.where(areas > 0, areas, np.nan), None: np.full(len(areas), np.nan)}[quantity]
     raw, missing = read(recording, field.members)
@@ -201,17 +206,26 @@ def shears(recording, field, frames):
         bad = ~gone & (mask | ~np.isfinite(raw[frame]))
         flags = flags_of(gone, bad, field)
         usable = ~gone & ~bad
+        side = np.stack([sides[axis][0][frame] for axis in (0, 1)])
+        no_side = sides[0][1][frame] | sides[1][1][frame]
         with np.errstate(invalid="ignore"):
-            outside = usable & ((raw[frame] < ranges[:, 0]) | (raw[frame] > ranges[:, 1]))
-            pressure = gain * (raw[frame] - baseline)
+            off_side = ((side < side_range[:, 0]) | (side > side_range[:, 1])).any(axis=0)
+            lateral = side_gain * (side - rest.T)
+            # What is along the skin is taken out of raw values, which are singles, where it is known.
+            leak = (cross[0, 0] - 1) * (raw[frame] - baseline) + cross[0, 1:] @ (lateral / gain)
+            is_leaky = np.isfinite(leak) & ~gone & ~no_side & ~off_side & np.any(cross[0] != [1, 0, 0])
+            normal_raw = np.where(is_leaky, (raw[frame] + leak).astype(np.float32), raw[frame])
+            outside = usable & ((normal_raw < ranges[:, 0]) | (normal_raw > ranges[:, 1]))
+            pressure = gain * (normal_raw - baseline)
             pressed = usable & (pressure > dead_band) & (pressure > 0)
             flags |= {"saturated"} if (pressed & (pressure > most)).any() else set()
         flags |= {"out_of_range"} if outside.any() else set()
-        no_side = sides[0][1][frame] | sides[1][1][frame]
         bad_side = ~no_side & ~(np.isfinite(sides[0][0][frame]) & np.isfinite(sides[1][0][frame]))
         flags |= {"incomplete"} if (pressed & no_side).any() else set()
         flags |= {"faulty_input"} if (pressed & bad_side).any() else set()
-        there = np.flatnonzero(pressed & ~no_side & ~bad_side)
+        off_side &= ~no_side & ~bad_side
+        flags |= {"out_of_range"} if (pressed & off_side).any() else set()
+        there = np.flatnonzero(pressed & ~no_side & ~bad_side & ~off_side)
         # What presses counts in the force, whether it is known how it pulls or not.
         presses = np.flatnonzero(pressed)
         if len(presses) == 0:
@@ -224,12 +238,14 @@ def shears(recording, field, frames):
             force = Value(normal.sum(axis=0), np.abs(normal).sum())
             yield {} if "no_unit" in flags else {"force_vector": force}, flags, True
             continue
-        p, weights, g = pressure[there], field.weights[there], side_gain[there]
-        felt = np.stack([p] + [g * (sides[axis][0][frame, there] - rest[there, axis]) for axis in (0, 1)])
-        along = cross @ felt
+        p, weights, g = pressure[there], field.weights[there], side_gain[:, there]
+        # What was measured along the normal, of which the matrix makes P.
+        measured = (p - cross[0, 1:] @ lateral[:, there]) / cross[0, 0]
+        along = cross[1:] @ np.vstack([measured, lateral[:, there]])
         in_space = along[0][:, None] * field.tangents[0][there] + along[1][:, None] * field.tangents[1][there]
         # Differences from baselines are of larger numbers.
-        terms = np.abs(cross) @ np.stack([p] + [g * (np.abs(sides[axis][0][frame, there]) + np.abs(rest[there, axis])) for axis in (0, 1)])
+        large = g * (np.abs(side[:, there]) + np.abs(rest[there].T))
+        terms = np.abs(cross[1:]) @ np.vstack([(p + np.abs(cross[0, 1:]) @ large) / cross[0, 0], large])
         size, pull = (weights * terms.sum(axis=0)).sum(), (weights * p).sum()
         vector = (weights[:, None] * in_space).sum(axis=0)
         friction = np.linalg.norm(vector) / pull
@@ -269,12 +285,13 @@ def shears(recording, field, frames):
             else:
                 lengths = np.linalg.norm(along, axis=0)
                 ways = np.where(lengths > 0, along, [[1.0], [0.0]]) / np.where(lengths > 0, lengths, 1)
-            shares = cross.T @ ways
-            of_pull = (weights * (shares[0] - friction) * np.abs(gain[there]) * noise[there]) ** 2
-            of_shear = (weights * np.hypot(shares[1], shares[2]) * np.abs(g) * side_noise[there]) ** 2
-            sigma = np.sqrt((of_shear + of_pull).sum()) / pull
+            # What of each measured force is in the pull, less the friction's share of what of it is in P.
+            shares = cross[1:].T @ ways - friction * cross[0][:, None]
+            of_each = np.vstack([np.abs(gain[there]) * noise[there], np.abs(g) * side_noise[there]])
+            sigma = np.sqrt(((weights * shares * of_each) ** 2).sum()) / pull
             # A standard deviation of P is a difference of values.
-            large = (np.abs(raw[frame, there]) + np.abs(baseline[there]) + noise[there]) / noise[there]
+            noises = np.hypot(cross[0, 0] * noise[there], np.hypot(*(cross[0, 1:, None] * g * side_noise[there] / gain[there])))
+            large = (np.abs(raw[frame, there]) + np.abs(baseline[there]) + noises) / noises
             found["friction_sigma"] = Value(sigma, sigma * large.max() * max(1, size / pull / max(friction, 1e-9)))
         if "slips_at" in keys:
             found["slip_ratio"] = Value(friction / keys["slips_at"], size / pull / keys["slips_at"])

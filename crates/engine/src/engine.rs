@@ -26,7 +26,7 @@ mod touch_senses;
 use self::cadence::OnChange;
 use self::check::Check;
 use self::drift_state::DriftState;
-use self::ids::no_channel;
+use self::ids::{checked_by_pressure, no_channel, taxels_of};
 use self::input::Input;
 use self::links::Links;
 use self::on_skin::OnSkin;
@@ -145,6 +145,7 @@ impl Engine {
         }
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
         let layer = calibration.layer;
+        let calibration = checked_by_pressure(body, calibration);
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
         let mut engine = Self {
             steps: Vec::new(),
@@ -344,7 +345,7 @@ impl Engine {
     pub fn presses_on_links(&self, to: &mut Vec<LinkShare>) {
         to.clear();
         if let Some(on_skin) = &self.on_skin {
-            on_skin.on_links(&self.plan, self.values_sensed(), to);
+            on_skin.on_links(&self.plan, to);
         }
     }
 
@@ -384,10 +385,10 @@ impl Engine {
     /// are held.
     pub fn pressures(&self, frame: &Frame, to: &mut Vec<(u32, f64)>) {
         to.clear();
-        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+        for (place, &taxel) in self.intake.taxel_of_value().iter().enumerate().take(frame.values.len()) {
             let Some(channel) = self.channel_of_taxel[taxel].map(|channel| channel as usize) else { continue };
             let curve = self.plan.curves.table(self.plan.taxels[channel].response);
-            let value = self.intake.read(taxel, value);
+            let value = self.intake.read_alone(place, &frame.values);
             let pressure = calibrate::pressure(value, &self.plan.calibrations[channel], curve);
             to.extend(pressure.map(|pressure| (self.ids[taxel], pressure)));
         }
@@ -435,9 +436,4 @@ impl Engine {
         let judged = self.drift.iter().flat_map(|kept| kept.compensation.taxels());
         judged.zip(&self.plan.body_taxels).filter_map(|((_, unfit), &taxel)| Some((self.ids[taxel], unfit?)))
     }
-}
-
-/// By channel of `body`, the place of its taxel among the body's.
-fn taxels_of(body: &Body, channels: &[u32]) -> Vec<usize> {
-    channels.iter().filter_map(|&channel| body.taxel_index(Channel(channel).taxel())).collect()
 }

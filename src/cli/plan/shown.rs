@@ -41,10 +41,14 @@ impl Bill {
         for Stage { planned: stage, measured_us } in &self.stages {
             let number = |count: usize| if count == 0 { String::new() } else { count.to_string() };
             let place = if stage.on_host { "host" } else { &self.backend.0 };
-            let over = if ["calibrate", "change"].contains(&stage.name) { "value" } else { "field" };
+            let over = match stage.each {
+                // Only a frame tells how many.
+                "touch" => "touches".to_owned(),
+                each => count(stage.over as u64, each),
+            };
             table.add_row([
                 stage.name.to_owned(),
-                if stage.runs { count(stage.over as u64, over) } else { "–".to_owned() },
+                if stage.runs { over } else { "–".to_owned() },
                 number(stage.memberships),
                 match [stage.bytes_up, stage.bytes_down] {
                     [0, 0] => String::new(),

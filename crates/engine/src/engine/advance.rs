@@ -47,9 +47,9 @@ impl Engine {
     /// The values of `frame` by the plan's channels.
     fn raw_in(&self, frame: &Frame) -> Vec<RawValue> {
         let mut raw = vec![RawValue::MISSING; self.plan.channels()];
-        for (&taxel, &value) in self.intake.taxel_of_value().iter().zip(&frame.values) {
+        for (place, &taxel) in self.intake.taxel_of_value().iter().enumerate().take(frame.values.len()) {
             if let Some(channel) = self.channel_of_taxel[taxel] {
-                raw[channel as usize] = self.intake.read(taxel, value);
+                raw[channel as usize] = self.intake.read_alone(place, &frame.values);
             }
         }
         raw
@@ -66,11 +66,27 @@ impl Engine {
     pub(super) fn advance(
         &mut self,
         input: Input<'_>,
+        check: Option<&mut Check>,
+        go_on: Option<GoOn<'_>>,
+    ) -> Result<bool> {
+        self.gather(input)?;
+        let is_whole = self.advance_gathered(input, check, go_on);
+        if !matches!(is_whole, Ok(true)) {
+            // Of a call that stopped half way there is nothing to look at: some of its frames have percepts, others values alone.
+            self.percepts.reset(0);
+            self.raw.clear();
+            self.sensed.clear();
+        }
+        is_whole
+    }
+
+    fn advance_gathered(
+        &mut self,
+        input: Input<'_>,
         mut check: Option<&mut Check>,
         mut go_on: Option<GoOn<'_>>,
     ) -> Result<bool> {
         let frames = input.frames;
-        self.gather(input)?;
         self.percepts.reset(frames.len());
         self.percepts.first_frame = self.frames_done;
         if let Some(check) = check.as_deref_mut() {

@@ -44,13 +44,13 @@ impl Engine {
     ) -> Result<Option<&Percepts>> {
         let before = self.state()?;
         let mut is_whole = false;
-        self.advance_block(block, |engine, input| {
+        let advanced = self.advance_block(block, |engine, input| {
             is_whole = engine.advance(input, None, Some(&mut go_on))?;
             Ok(())
-        })?;
+        });
         if !is_whole {
-            self.restore(&before)?;
-            self.percepts.reset(0);
+            let restored = self.restore(&before);
+            advanced.and(restored)?;
             return Ok(None);
         }
         Ok(Some(&self.percepts))

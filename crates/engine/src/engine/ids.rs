@@ -1,7 +1,8 @@
-//! Ids in words.
+//! Ids in words, and what belongs to which.
 
+use crate::body::Body;
 use crate::error::Error;
-use crate::signal::Channel;
+use crate::signal::{Calibration, Channel};
 
 /// That a body with the taxels `ids`, ascending, does not have `channel`.
 pub(super) fn no_channel(channel: Channel, ids: &[u32]) -> Error {
@@ -29,4 +30,16 @@ fn ranges(ids: &[u32]) -> String {
         words.push("…".into());
     }
     words.join(", ")
+}
+
+/// `calibration`, whose checks leave out taxels that measure no pressure: what [all] says of raw values is not of theirs.
+pub(super) fn checked_by_pressure(body: &Body, mut calibration: Calibration) -> Calibration {
+    let others = body.taxels.iter().zip(&mut calibration.taxels).filter(|(taxel, _)| !taxel.modality.is_pressed());
+    others.for_each(|(_, own)| own.mask = true);
+    calibration
+}
+
+/// By channel of `body`, the place of its taxel among the body's.
+pub(super) fn taxels_of(body: &Body, channels: &[u32]) -> Vec<usize> {
+    channels.iter().filter_map(|&channel| body.taxel_index(Channel(channel).taxel())).collect()
 }

@@ -5,7 +5,7 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::links::Links;
-use super::pulls::{Pull, Pulls, tangential_gain};
+use super::pulls::{Pull, Pulls, Sides};
 use super::spread::{Frames, Now};
 use crate::backend::Step;
 use crate::percept::{Flags, Host, Outputs, Percepts};
@@ -79,6 +79,8 @@ impl Cell<'_> {
         trend: &mut Trend,
     ) {
         percepts.set_present(cell, Outputs::empty());
+        // As it was in a frame of another call.
+        percepts.in_world[cell] = false;
         let mut made = Made { percepts, cell, flags: Flags::empty(), is_there: false };
         if self.step.restarts() {
             trend.clear();
@@ -369,15 +371,16 @@ impl Cell<'_> {
             let (noise, raw) = (calibration.noise?, self.frames.raw.rows.value(self.frames.offset, channel));
             let noise = Noise {
                 of_pressure: calibrate::sigma(raw.number()?, noise, calibration, plan.curve_of(channel)),
-                of_sides: tangential_gain(by, member.taxel, calibration).abs()
-                    * by.noise_of(member.taxel).unwrap_or(noise),
+                of_sides: Sides::of(by, member.taxel, calibration)
+                    .gains
+                    .map(|gain| gain.abs() * by.noise_of(member.taxel).unwrap_or(noise)),
             };
             // Without a chart, each along its own direction.
             let along = match charted {
                 true => member.tangents_in_chart.map(|tangent| tangent.dot(direction)),
                 false => DVec2::from_array(shear).normalize_or(DVec2::X).to_array(),
             };
-            Some(sum + member.weight.powi(2) * noise.variance(&by.cross_axis, along, friction))
+            Some(sum + member.weight.powi(2) * noise.variance(by, along, friction))
         })
     }
 }

@@ -51,12 +51,16 @@ pub(super) struct OnSkin {
     without_value: Vec<u32>,
     notes: Vec<(u32, TouchFlags)>,
     poses: Vec<Option<DAffine3>>,
+    /// What was read beside pressures in the last frame that touches were found in, where that is needed.
+    row: Vec<RawValue>,
 }
 
-/// What the next touches depend on beside the next frames.
+/// What the next touches depend on beside the next frames, and what pressed in the last one.
 #[derive(Clone, Debug)]
 pub(super) struct OnSkinState {
     touches: TouchState,
+    pressed: Vec<(u32, f64)>,
+    row: Vec<RawValue>,
     self_contacts: Option<Memory>,
     fits: FitTrails,
 }
@@ -95,6 +99,7 @@ impl OnSkin {
             without_value: Vec::new(),
             notes: Vec::new(),
             poses: Vec::new(),
+            row: Vec::new(),
         })
     }
 
@@ -117,6 +122,8 @@ impl OnSkin {
     pub(super) fn state(&self) -> OnSkinState {
         OnSkinState {
             touches: self.touches.state(),
+            pressed: self.touches.pressed().collect(),
+            row: self.row.clone(),
             fits: self.fits.as_ref().map(SkinFits::state).unwrap_or_default(),
             self_contacts: self.self_contacts.as_ref().map(SelfContacts::state),
         }
@@ -124,6 +131,8 @@ impl OnSkin {
 
     pub(super) fn restore(&mut self, state: &OnSkinState) {
         self.touches.restore(&state.touches);
+        self.touches.set_pressed(&state.pressed);
+        self.row.clone_from(&state.row);
         if let Some(fits) = &mut self.fits {
             fits.restore(&state.fits);
         }
@@ -132,11 +141,11 @@ impl OnSkin {
         }
     }
 
-    /// What presses on each link in the last frame, as [`Touches::on_links`] has it, and pulls: `row` has what is read beside pressures.
-    pub(super) fn on_links(&self, plan: &Plan, row: &[RawValue], out: &mut Vec<LinkShare>) {
+    /// What presses on each link in the last frame, as [`Touches::on_links`] has it, and pulls.
+    pub(super) fn on_links(&self, plan: &Plan, out: &mut Vec<LinkShare>) {
         self.touches.on_links(out);
         if let Some(senses) = &self.senses {
-            senses.add_to_links((plan, self.touches.skin()), row, self.touches.pressed(), out);
+            senses.add_to_links((plan, self.touches.skin()), &self.row, self.touches.pressed(), out);
         }
     }
 
@@ -155,6 +164,9 @@ impl OnSkin {
             let index = raw.first + offset;
             let stale = stale.get(index).map_or(&[][..], Vec::as_slice);
             self.look_at_values(plan, raw, offset, stale, percepts);
+            if let Some(senses) = self.senses.as_ref().filter(|_| !stale.is_empty()) {
+                self.notes.extend(senses.stale_nodes(plan, stale).map(|node| (node, TouchFlags::STALE)));
+            }
             let mut found = percepts.take_touch_frame(index);
             let slots = plan.slots();
             let pressures = &percepts.pressures[index * slots..][..slots][self.first_slot..][..plan.channels()];
@@ -193,6 +205,10 @@ impl OnSkin {
                 fits.take((plan, self.touches.skin()), raw, moment, &mut found);
             }
             percepts.put_touch_frame(index, found);
+        }
+        if let Some(last) = frames.len().checked_sub(1).filter(|_| self.senses.is_some()) {
+            self.row.clear();
+            self.row.extend_from_slice(sensed.row(raw.first + last));
         }
         if let Some(fits) = &mut self.fits {
             fits.finish(self.touches.skin(), percepts);

@@ -10,7 +10,7 @@ use super::pulls::Pulls;
 use super::spread::{Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::percept::{Flags, Host, Outputs, Percepts, Values};
-use crate::scene::{Plan, PlanField};
+use crate::scene::{Plan, PlanField, SensedMember};
 use crate::signal::{Frame, Quantity, RawValue, Receptor};
 use crate::stage::layout::Member;
 use crate::stage::window::Trend;
@@ -66,7 +66,7 @@ pub(super) struct Post<'a> {
     pub(super) sensed: SensedValues<'a>,
 }
 
-/// Flags every field that holds a taxel that is stale. `stale` has those of each frame, by their places in the body.
+/// Flags every field that holds a taxel that is stale. `stale` has the channels of the body that are, frame by frame.
 pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Percepts) {
     let fields = plan.fields.len();
     for (frame, stale) in stale.iter().enumerate().filter(|(_, stale)| !stale.is_empty()) {
@@ -75,7 +75,12 @@ pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Perce
             channels[channel] = true;
         }
         for (flags, field) in percepts.flags[frame * fields..][..fields].iter_mut().zip(plan.fields.iter()) {
-            if plan.members_of(field).iter().any(|member| channels[plan.channel_of(member.slot as usize)]) {
+            let is_pressed_one = |member: &Member| channels[plan.channel_of(member.slot as usize)];
+            let is_stale = |channel: usize| stale.binary_search(&channel).is_ok();
+            let is_sensed_one = |member: &SensedMember| {
+                is_stale(member.taxel) || member.values.iter().any(|&value| is_stale(plan.senses.channels[value]))
+            };
+            if plan.members_of(field).iter().any(is_pressed_one) || field.sensed.iter().any(is_sensed_one) {
                 *flags |= Flags::STALE;
             }
         }
@@ -88,7 +93,7 @@ pub(super) fn flag_stale_poses(plan: &Plan, links: &Links, frames: &[Frame], per
         let cells = &mut percepts.flags[index * plan.fields.len()..];
         for (flags, field) in cells.iter_mut().zip(plan.fields.iter()) {
             let is_placed = match field.parts.is_empty() {
-                true => links.world_from_anchor(field, index, frame).is_some(),
+                true => links.world_from_anchor(field, index, frame).is_some() && !flags.contains(Flags::NO_POSE),
                 false => !flags.contains(Flags::NO_POSE),
             };
             if !flags.contains(Flags::NO_CONTACT) && !is_placed {

@@ -21,6 +21,28 @@ pub(super) struct Pull {
     flags: Flags,
 }
 
+/// How a taxel's tangential raw values are read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sides {
+    /// P for a raw unit of each.
+    pub(super) gains: [f64; 2],
+    /// At rest.
+    rest: [f64; 2],
+    /// Of those that are believed.
+    range: [f64; 2],
+}
+
+impl Sides {
+    /// Those of the body's taxel `taxel`.
+    pub(super) fn of(by: &ShearCalibration, taxel: usize, calibration: &TaxelCalibration) -> Self {
+        Self {
+            gains: by.gains_of(taxel, calibration.gain, calibration.unit_factor),
+            rest: by.rest_of(taxel),
+            range: by.range_of(taxel),
+        }
+    }
+}
+
 /// One of them.
 #[derive(Clone, Copy, Debug)]
 struct PulledTaxel {
@@ -28,10 +50,8 @@ struct PulledTaxel {
     channel: usize,
     /// Where its tangential values are among those that the host reads.
     values: [usize; 2],
-    /// P for a raw unit of these.
-    gain: f64,
-    /// Their raw values at rest.
-    rest: [f64; 2],
+    /// How these are read.
+    sides: Sides,
     newtons_per_p: Option<f64>,
 }
 
@@ -72,8 +92,7 @@ impl Pulls {
             PulledTaxel {
                 channel,
                 values,
-                gain: tangential_gain(by, taxel, calibration),
-                rest: by.rest_of(taxel),
+                sides: Sides::of(by, taxel, calibration),
                 newtons_per_p: force::newtons_per_p(calibration.quantity, plan.areas[channel]),
             }
         });
@@ -102,10 +121,8 @@ impl Pulls {
             let mut felt = Pull { pressure, newtons_per_p: own.newtons_per_p, ..Pull::default() };
             if pressure > 0.0 {
                 self.is_pressed = true;
-                match numbers_of(own.values.map(|value| row[value])) {
-                    Ok(raw) => {
-                        felt.shear = Some(by.forces(own.rest, own.gain, pressure, raw));
-                    }
+                match tangential(by, own.sides, pressure, own.values.map(|value| row[value])) {
+                    Ok(shear) => felt.shear = Some(shear),
                     Err(why) => flags |= why,
                 }
             }
@@ -131,11 +148,6 @@ impl Pulls {
     }
 }
 
-/// P for a raw unit of a tangential value of the body's taxel `taxel`.
-pub(super) fn tangential_gain(by: &ShearCalibration, taxel: usize, calibration: &TaxelCalibration) -> f64 {
-    by.gain_of(taxel, calibration.gain, calibration.unit_factor)
-}
-
 /// The numbers of two tangential raw values, or why there are none.
 fn numbers_of(raw: [RawValue; 2]) -> Result<[f64; 2], Flags> {
     match raw.map(|raw| raw.number().filter(|number| number.abs() <= calibrate::HUGE)) {
@@ -145,13 +157,18 @@ fn numbers_of(raw: [RawValue; 2]) -> Result<[f64; 2], Flags> {
     }
 }
 
-/// The tangential forces of the body's taxel `taxel` along t and n × t, where it is pressed by `pressure` and reads `raw`.
+/// The tangential forces along t and n × t of a taxel that is pressed by `pressure` and reads `raw`; or why they are not known.
+/// What is beyond 2⁶⁰ is not believed, as of P.
 pub(super) fn tangential(
     by: &ShearCalibration,
-    taxel: usize,
-    gain: f64,
+    sides: Sides,
     pressure: f64,
     raw: [RawValue; 2],
 ) -> Result<[f64; 2], Flags> {
-    numbers_of(raw).map(|raw| by.forces(by.rest_of(taxel), gain, pressure, raw))
+    let (numbers, [low, high]) = (numbers_of(raw)?, sides.range);
+    if numbers.iter().any(|number| !(low..=high).contains(number)) {
+        return Err(Flags::OUT_OF_RANGE);
+    }
+    let forces = by.forces(sides.rest, sides.gains, pressure, numbers);
+    if forces.iter().all(|force| force.abs() <= calibrate::HUGE) { Ok(forces) } else { Err(Flags::FAULTY_INPUT) }
 }

@@ -3,14 +3,15 @@
 //! Σs and Σ(x − c) × s · n go over the taxels of a touch that have three axes and whose tangential forces are known, x being
 //! where they are on the body at rest, c the mean of x by P and n the normal of the taxel at which the touch's chart is based. In
 //! that chart each s is turned by the smallest turn that takes its taxel's normal to the chart's; the friction is ‖Σs‖/ΣP of
-//! these. The force has the normal part of the others, too. Tangential forces are a part of wrenches. A touch is as warm as the mean
+//! these. The force has the normal part of the others, too, also where there are only those. Tangential forces are a part of wrenches. A
+//! touch is as warm as the mean
 //! of the taxels of temperature whose nearest pressure taxel on the same link is one of its taxels.
 
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::pulls::{tangential, tangential_gain};
+use super::pulls::{Sides, tangential};
 use crate::backend::RawBatch;
 use crate::body::{Body, Modality};
 use crate::percept::{Flags, LinkShare, Touch, TouchFlags, TouchFrame, TouchOutputs};
@@ -44,8 +45,8 @@ struct Pull {
     pressure: f64,
     /// s on the body at rest.
     shear: DVec3,
-    /// P for a raw unit of s.
-    gain: f64,
+    /// P for a raw unit of each tangential value.
+    gains: [f64; 2],
 }
 
 /// The frame of a call that touches are of.
@@ -127,8 +128,7 @@ impl TouchSenses {
     pub(super) fn add(&mut self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, found: &mut TouchFrame) {
         for index in 0..found.touches.len() {
             let nodes = found.taxels(&found.touches[index]);
-            let temperature = self.temperature(plan, sensed.row, nodes);
-            let mut flags = TouchFlags::empty();
+            let (temperature, mut flags) = self.temperature(plan, sensed.row, nodes);
             self.pulls.clear();
             self.normal_only.clear();
             if self.wanted.intersects(OF_PULLS) {
@@ -147,7 +147,15 @@ impl TouchSenses {
             let touch = &mut found.touches[index];
             touch.temperature_celsius = temperature;
             touch.flags |= flags;
+            if self.pulls.is_empty() && self.normal_only.is_empty() {
+                continue;
+            }
+            if self.wanted.contains(TouchOutputs::SHEAR) {
+                let turn = self.link_from_body[touch.link as usize];
+                touch.force_vector_newton = self.force(plan, skin).map(|force| turn * force);
+            }
             if self.pulls.is_empty() {
+                // It is not known how any of them pulls.
                 continue;
             }
             if self.wanted.contains(TouchOutputs::SHEAR) {
@@ -196,16 +204,40 @@ impl TouchSenses {
         if !by.has_gain(own.taxel, calibration.response) {
             return None;
         }
-        let gain = tangential_gain(by, own.taxel, calibration);
+        let sides = Sides::of(by, own.taxel, calibration);
         let values = own.values.map(|value| row.get(value).copied().unwrap_or(RawValue::MISSING));
-        let pulls = tangential(by, own.taxel, gain, pressure, values);
+        let pulls = tangential(by, sides, pressure, values);
         Some(match pulls {
             Ok([su, sv]) => {
                 let [tu, tv] = own.tangents_in_body;
-                Ok(Pull { node, pressure, shear: su * tu + sv * tv, gain })
+                Ok(Pull { node, pressure, shear: su * tu + sv * tv, gains: sides.gains })
             }
             Err(why) if why.contains(Flags::INCOMPLETE) => Err(TouchFlags::INCOMPLETE),
+            Err(why) if why.contains(Flags::OUT_OF_RANGE) => Err(TouchFlags::OUT_OF_RANGE),
             Err(_) => Err(TouchFlags::FAULTY_INPUT),
+        })
+    }
+
+    /// The nodes of which some value beside pressure is `stale`: channels of the body, ascending.
+    pub(super) fn stale_nodes<'a>(&'a self, plan: &'a Plan, stale: &'a [usize]) -> impl Iterator<Item = u32> + 'a {
+        let is_stale = |value: usize| stale.binary_search(&plan.senses.channels[value]).is_ok();
+        let pulled = self
+            .pulled
+            .iter()
+            .zip(0..)
+            .filter(move |(own, _)| own.as_ref().is_some_and(|own| own.values.into_iter().any(is_stale)));
+        let warm = self.warm.iter().filter(move |(_, taxels)| taxels.iter().any(|&[_, value]| is_stale(value)));
+        pulled.map(|(_, node)| node).chain(warm.map(|(&node, _)| node))
+    }
+
+    /// The force on the skin by the taxels of a touch that have three axes, with their normal part alone where it is not known how they
+    /// pull: N on the body at rest, where it is known.
+    fn force(&self, plan: &Plan, skin: &Skin) -> Option<DVec3> {
+        let pushed = self.normal_only.iter().map(|&(node, pressure)| (node, pressure, DVec3::ZERO));
+        let pulled = self.pulls.iter().map(|pull| (pull.node, pull.pressure, pull.shear));
+        pulled.chain(pushed).try_fold(DVec3::ZERO, |sum, (node, pressure, shear)| {
+            let normal = skin.taxels()[node as usize].normal;
+            Some(sum + newtons_per_p(plan, node)? * (shear - pressure * normal))
         })
     }
 
@@ -217,38 +249,33 @@ impl TouchSenses {
         let total: f64 = self.pulls.iter().map(|pull| pull.pressure).sum();
         let middle = self.pulls.iter().map(|pull| pull.pressure * taxel(pull).position).sum::<DVec3>() / total;
         let (mut shear, mut torsion, mut size) = (DVec3::ZERO, 0.0, 0.0);
-        let (mut force, mut in_chart) = (Some(DVec3::ZERO), DVec3::ZERO);
+        let mut in_chart = DVec3::ZERO;
         for pull in &self.pulls {
             let own = taxel(pull);
             shear += pull.shear;
             size += pull.shear.length();
             torsion += (own.position - middle).cross(pull.shear).dot(outward);
             in_chart += DQuat::from_rotation_arc(own.normal.normalize(), up) * pull.shear;
-            force = force.zip(newtons_per_p(plan, pull.node)).map(|(sum, newtons)| {
-                let along_normal = pull.pressure * own.normal;
-                sum + newtons * (pull.shear - along_normal)
-            });
-        }
-        for &(node, pressure) in &self.normal_only {
-            let normal = skin.taxels()[node as usize].normal;
-            force = force.zip(newtons_per_p(plan, node)).map(|(sum, newtons)| sum - newtons * pressure * normal);
         }
         let turn = self.link_from_body[touch.link as usize];
         // Around a limb there is no chart.
         let is_wrapped = touch.flags.contains(TouchFlags::WRAPPED);
         let friction = if is_wrapped { shear.length() } else { in_chart.length() } / total;
         touch.shear = Some(turn * shear);
-        // One taxel has no arm. `one_taxel` says so where no other is pressed.
+        // One taxel has no arm. Where it is not known how others with three axes pull, that is said.
         touch.torsion = (self.pulls.len() > 1).then_some(torsion);
+        if touch.torsion.is_none() && self.normal_only.is_empty() {
+            touch.flags |= TouchFlags::ONE_TAXEL;
+        }
         touch.friction = Some(friction);
         touch.slip_ratio = plan.senses.shear.as_ref().and_then(|by| by.slips_at).map(|slips_at| friction / slips_at);
-        touch.force_vector_newton = force.map(|force| turn * force);
         if is_wrapped {
             return;
         }
-        let [along_u, along_v] = [in_chart.dot(u), in_chart.dot(v)];
+        // −0 becomes 0, so that what points along −u is at π, and never at −π.
+        let [along_u, along_v] = [u, v].map(|axis| in_chart.dot(axis) + 0.0);
         touch.shear_in_chart = Some([along_u, along_v]);
-        let is_still = along_u.hypot(along_v) <= ROUNDING * size;
+        let is_still = libm::hypot(along_u, along_v) <= ROUNDING * size;
         touch.shear_direction_rad = (!is_still).then(|| libm::atan2(along_v, along_u));
         touch.flags.set(TouchFlags::STILL, is_still);
     }
@@ -271,26 +298,33 @@ impl TouchSenses {
             let number = sensed.raw.rows.value(sensed.offset, node).number()?;
             let noise = Noise {
                 of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
-                of_sides: pull.gain.abs() * by.noise_of(own.taxel).unwrap_or(noise),
+                of_sides: pull.gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),
             };
             let along = own.tangents_in_body.map(|tangent| turned(pull.node, tangent).dot(direction));
             // Where nothing pulls, every direction is as good.
             let along = if direction == DVec3::ZERO { [1.0, 0.0] } else { along };
             total += pull.pressure;
-            variance += noise.variance(&by.cross_axis, along, friction);
+            variance += noise.variance(by, along, friction);
         }
         Some(variance.sqrt() / total)
     }
 
-    fn temperature(&self, plan: &Plan, row: &[RawValue], nodes: &[u32]) -> Option<f64> {
-        let by = plan.senses.temperature.as_ref()?;
-        let under = nodes.iter().filter_map(|node| self.warm.get(node)).flatten();
-        let read = under.filter_map(|&[taxel, value]| match by.of_taxel(taxel).read(row[value]) {
-            Reading::Value(celsius, _) => Some(celsius),
-            Reading::Missing | Reading::Faulty => None,
-        });
-        let [sum, count] = read.fold([0.0; 2], |[sum, count], celsius| [sum + celsius, count + 1.0]);
-        (count > 0.0).then(|| sum / count)
+    /// How warm the touch of `nodes` is, °C, and what is to be said of the taxels under it.
+    fn temperature(&self, plan: &Plan, row: &[RawValue], nodes: &[u32]) -> (Option<f64>, TouchFlags) {
+        let (mut sum, mut count, mut flags) = (0.0, 0.0, TouchFlags::empty());
+        let by = plan.senses.temperature.as_ref().filter(|_| self.wanted.contains(TouchOutputs::TEMPERATURE));
+        let Some(by) = by else { return (None, flags) };
+        for &[taxel, value] in nodes.iter().filter_map(|node| self.warm.get(node)).flatten() {
+            match by.of_taxel(taxel).read(row[value]) {
+                Reading::Value(celsius, is_in_range) => {
+                    (sum, count) = (sum + celsius, count + 1.0);
+                    flags.set(TouchFlags::OUT_OF_RANGE, flags.contains(TouchFlags::OUT_OF_RANGE) || !is_in_range);
+                }
+                Reading::Missing => flags |= TouchFlags::INCOMPLETE,
+                Reading::Faulty => flags |= TouchFlags::FAULTY_INPUT,
+            }
+        }
+        ((count > 0.0).then(|| sum / count), flags)
     }
 }
 

@@ -10,7 +10,7 @@ bitflags! {
     /// [`Flags`](crate::percept::Flags) where both have one.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     pub struct TouchFlags: u32 {
-        /// Only one taxel is pressed: no axis, no orientation, no spread.
+        /// Only one taxel is pressed: no axis, no orientation, no spread. Or one alone of its taxels has three axes: no torsion.
         const ONE_TAXEL = 1 << 0;
         /// The second and third farthest points are as good as equally far: orientation is in doubt.
         const TIE = 1 << 1;
@@ -29,11 +29,12 @@ bitflags! {
         const MERGED = 1 << 7;
         /// One of its taxels is above its P_max.
         const SATURATED = 1 << 8;
-        /// The value of one of its taxels was altered, or that of a taxel beside it was masked.
+        /// The value of one of its taxels was altered, or that of a taxel beside it was masked, or one of temperature under it, or what
+        /// says how one of its taxels pulls.
         const FAULTY_INPUT = 1 << 9;
-        /// One of its taxels lies outside the range that the calibration says the sensor has.
+        /// One of its taxels, also of those of temperature, lies outside the range that the calibration says the sensor has.
         const OUT_OF_RANGE = 1 << 10;
-        /// The value of a taxel beside it is missing.
+        /// The value of a taxel beside it is missing, or that of a taxel of temperature under it, or how one of its taxels pulls.
         const INCOMPLETE = 1 << 11;
         /// One of its taxels has not been heard from for too long.
         const STALE = 1 << 12;

@@ -23,8 +23,11 @@ pub struct PlannedStage {
     /// The outputs that it gives.
     #[serde(skip)]
     pub gives: Outputs,
-    /// Fields, or of *calibrate* and *change* slots, that it goes over in a frame; 0 where it does not run.
+    /// How many of `each` it goes over in a frame; 0 where it does not run, and where only a frame tells.
     pub over: usize,
+    /// What it goes over, one of them: `field`, of *calibrate* and *change* `value`, of *touches* and *fit* `taxel`, of the whole skin, and
+    /// of *self_contacts* `touch`.
+    pub each: &'static str,
     /// Memberships that it goes over, once or several times; 0 where it works on what others found.
     pub memberships: usize,
     /// Bytes that a frame brings to it.
@@ -132,7 +135,7 @@ impl Plan {
             ("position", stages.position, found, ""),
             ("world_motion", stages.world_motion, found, ""),
             ("touches", self.touched_from.is_some(), (self.channels(), 0), ""),
-            ("self_contacts", stages.self_contacts, found, ""),
+            ("self_contacts", stages.self_contacts, (0, 0), ""),
             ("force", stages.force, counts(&all), ""),
             ("filter", stages.filter, found_charted, ""),
             ("sigma", stages.sigma, found, ""),
@@ -169,6 +172,12 @@ impl Plan {
                 why,
                 gives,
                 over: if runs { over } else { 0 },
+                each: match name {
+                    "calibrate" | "change" => "value",
+                    "touches" | "fit" => "taxel",
+                    "self_contacts" => "touch",
+                    _ => "field",
+                },
                 memberships: if runs { memberships } else { 0 },
                 bytes_up: if name == "calibrate" { self.bytes_up() } else { 0 },
                 bytes_down: self.bytes_from(name),
@@ -234,6 +243,7 @@ mod tests {
     use crate::field::FieldSet;
     use crate::scene::Scene;
     use crate::signal::Calibration;
+    use crate::touch;
 
     fn plan(outputs: Outputs, fields: &[&str]) -> Plan {
         let body = Body::from_bytes("humanoid.glb", bundled::HUMANOID).unwrap();
@@ -254,6 +264,7 @@ mod tests {
         assert_eq!((&plan["knobs"]["charts"], &plan["fields"][0]["field"]), (&"as-authored".into(), &"torso".into()));
         let contact = plan["stages"].as_array().unwrap().iter().find(|stage| stage["stage"] == "contact").unwrap();
         assert_eq!((&contact["runs"], &contact["where"]), (&true.into(), &"backend".into()));
+        assert_eq!((&contact["over"], &contact["each"]), (&1.into(), &"field".into()));
     }
 
     #[test]
@@ -269,6 +280,30 @@ mod tests {
         assert_eq!(why("centroid"), "later stages need it");
         assert_eq!(why("principal_axis"), "no output needs it");
         assert_eq!(why("change"), "no letter is `change`");
+    }
+
+    #[test]
+    fn stages_over_the_whole_skin_count_its_taxels() {
+        let body = Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap();
+        let touches = touch::Options { outputs: TouchOutputs::USUAL | TouchOutputs::FIT, ..touch::Options::default() };
+        let scene = Scene::default().touches(touches).outputs(Outputs::USUAL | Outputs::SELF_CONTACTS);
+        let calibration = Calibration::identity(body.taxels.len());
+        let plan = Plan::new(&body, &FieldSet::new(&body).unwrap(), &scene, &calibration).unwrap();
+        let pressed = body.taxels.iter().filter(|taxel| taxel.modality.is_pressed()).count();
+        assert!(pressed > 0 && pressed < body.taxels.len());
+        let explained = plan.explain();
+        let over = |name: &str| {
+            let stage = explained.iter().find(|stage| stage.name == name).unwrap();
+            assert!(stage.runs, "{name}");
+            (stage.over, stage.each)
+        };
+        assert_eq!(
+            [over("touches"), over("fit"), over("self_contacts")],
+            [(pressed, "taxel"), (pressed, "taxel"), (0, "touch")]
+        );
+        assert_eq!(over("calibrate").1, "value");
+        let warm = plan.fields.iter().filter(|field| plan.letters()[field.letter].receptor == Receptor::Temperature);
+        assert_eq!(over("temperature"), (warm.count(), "field"));
     }
 
     #[test]

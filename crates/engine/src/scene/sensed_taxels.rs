@@ -200,7 +200,14 @@ fn pulled(
         let is_missing = tangential.iter().any(|raw| raw.is_missing());
         return (if is_missing { Reading::Missing } else { Reading::Faulty }, [0.0; 2]);
     };
-    let gain = by.gain_of(taxel, calibration.gain, calibration.unit_factor);
-    let forces = by.forces(by.rest_of(taxel), gain, own.value, [u, v]);
+    let [low, high] = by.range_of(taxel);
+    if [u, v].iter().any(|number| !(low..=high).contains(number)) {
+        return (Reading::Faulty, [0.0; 2]);
+    }
+    let gains = by.gains_of(taxel, calibration.gain, calibration.unit_factor);
+    let forces = by.forces(by.rest_of(taxel), gains, own.value, [u, v]);
+    if !forces.iter().all(|force| force.abs() <= calibrate::HUGE) {
+        return (Reading::Faulty, [0.0; 2]);
+    }
     (Reading::Value(libm::hypot(forces[0], forces[1]), true), forces)
 }

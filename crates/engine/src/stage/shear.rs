@@ -12,9 +12,12 @@
 //!
 //! **Sigma.** A taxel's s along the direction e of the sum is e·C(P, u, v)ᵀ = aₚP + aᵤu + aᵥv, with C its `cross_axis` and u and v
 //! its tangential values. With σₚ and σ the standard deviations of P and of u and v, all of independent noise, that of the friction f is
-//! √(Σ w²((aₚ − f)²σₚ² + (aᵤ² + aᵥ²)σ²))/Σ wP.
+//! √(Σ w²((aₚ − f)²σₚ² + aᵤ²σᵤ² + aᵥ²σᵥ²))/Σ wP. Where P has bᵤu + bᵥv in it, by a third row of `cross_axis`, noise of P and of u goes
+//! together: then aᵤ(aᵤ + 2(aₚ − f)bᵤ) is in the place of aᵤ², and that of v alike.
 
 use glam::{DVec2, DVec3};
+
+use crate::signal::ShearCalibration;
 
 /// A pressed taxel with its tangential force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,7 +134,8 @@ impl Sums {
 
     /// Of Σ ws in the chart; absent where nothing pulls.
     pub(crate) fn direction(&self) -> Option<f64> {
-        (self.along_chart.length() > ROUNDING * self.size).then(|| self.along_chart.to_angle())
+        let DVec2 { x, y } = self.along_chart;
+        (self.along_chart.length() > ROUNDING * self.size).then(|| libm::atan2(y + 0.0, x + 0.0))
     }
 
     /// Absent where that of one taxel is known: it has no arm.
@@ -151,16 +155,20 @@ impl Sums {
 pub(crate) struct Noise {
     /// Standard deviation of P.
     pub(crate) of_pressure: f64,
-    /// Of u and v.
-    pub(crate) of_sides: f64,
+    /// Of u and of v.
+    pub(crate) of_sides: [f64; 2],
 }
 
 impl Noise {
     /// The variance of what a taxel adds to (ΣwP) f, for a weight of 1 and the friction f: `along` are its t and n × t along the direction
     /// of Σ ws.
-    pub(crate) fn variance(self, cross_axis: &[[f64; 3]; 2], along: [f64; 2], friction: f64) -> f64 {
-        let [of_p, of_u, of_v] = [0, 1, 2].map(|of| along[0] * cross_axis[0][of] + along[1] * cross_axis[1][of]);
-        ((of_p - friction) * self.of_pressure).powi(2) + (of_u.powi(2) + of_v.powi(2)) * self.of_sides.powi(2)
+    pub(crate) fn variance(self, by: &ShearCalibration, along: [f64; 2], friction: f64) -> f64 {
+        let [of_p, of_u, of_v] = [0, 1, 2].map(|of| along[0] * by.cross_axis[0][of] + along[1] * by.cross_axis[1][of]);
+        let ([_, into_u, into_v], of_p) = (by.into_normal, of_p - friction);
+        // What of u and v is in P has its part in σₚ already.
+        let of_side = |of: f64, into: f64, noise: f64| of * (of + 2.0 * of_p * into) * noise.powi(2);
+        let sides = of_side(of_u, into_u, self.of_sides[0]) + of_side(of_v, into_v, self.of_sides[1]);
+        ((of_p * self.of_pressure).powi(2) + sides).max(0.0)
     }
 }
 
@@ -216,15 +224,32 @@ mod tests {
 
     #[test]
     fn noise_goes_through_what_mixes_the_axes() {
-        let noise = Noise { of_pressure: 0.1, of_sides: 0.2 };
-        let plain = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        for along in [[1.0, 0.0], [0.6, 0.8]] {
-            assert!((noise.variance(&plain, along, 0.5) - (0.04 + 0.25 * 0.01)).abs() < 1e-15);
+        let noise = Noise { of_pressure: 0.1, of_sides: [0.2, 0.3] };
+        let plain = ShearCalibration::default();
+        for (along, of_sides) in [([1.0, 0.0], 0.04), ([0.6, 0.8], 0.36 * 0.04 + 0.64 * 0.09)] {
+            assert!((noise.variance(&plain, along, 0.5) - (of_sides + 0.25 * 0.01)).abs() < 1e-15);
         }
         // P leaks into s as much as the friction is: what P strays does not matter.
-        let leaking = [[0.5, 5.0, 0.0], [0.0, 0.0, 5.0]];
+        let leaking = ShearCalibration { cross_axis: [[0.5, 5.0, 0.0], [0.0, 0.0, 5.0]], ..plain };
         assert!((noise.variance(&leaking, [1.0, 0.0], 0.5) - 25.0 * 0.04).abs() < 1e-15);
-        assert!((noise.variance(&leaking, [0.0, 1.0], 0.5) - (25.0 * 0.04 + 0.25 * 0.01)).abs() < 1e-15);
+        assert!((noise.variance(&leaking, [0.0, 1.0], 0.5) - (25.0 * 0.09 + 0.25 * 0.01)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn noise_that_p_and_the_sides_share_counts_once() {
+        // P = 2N + u/2 − v and s = (0.3N + u + 0.2v, 0.1u + 1.5v), of N, u and v with noise of their own.
+        let matrix = [[2.0, 0.5, -1.0], [0.3, 1.0, 0.2], [0.0, 0.1, 1.5]];
+        let of_p = |row: [f64; 3]| [row[0] / 2.0, row[1] - row[0] * 0.25, row[2] + row[0] * 0.5];
+        let by = ShearCalibration {
+            into_normal: matrix[0],
+            cross_axis: [of_p(matrix[1]), of_p(matrix[2])],
+            ..ShearCalibration::default()
+        };
+        let (own, along, friction) = ([0.1, 0.2, 0.3], [0.6, 0.8], 0.7);
+        let squares = |shares: [f64; 3]| (0..3).map(|of| (shares[of] * own[of]).powi(2)).sum::<f64>();
+        let noise = Noise { of_pressure: squares(matrix[0]).sqrt(), of_sides: [own[1], own[2]] };
+        let pulled = [0, 1, 2].map(|of| 0.6 * matrix[1][of] + 0.8 * matrix[2][of] - friction * matrix[0][of]);
+        assert!((noise.variance(&by, along, friction) - squares(pulled)).abs() < 1e-12);
     }
 
     #[test]

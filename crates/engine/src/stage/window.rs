@@ -29,8 +29,14 @@ impl Window {
     /// The last sample is the newest value, whatever the distance to the one before: that is replaced until it lies far enough
     /// from its own predecessor. So the slope is the same however frames are cut into calls.
     pub(crate) fn take(&mut self, t_s: f64, value: f64, window_s: f64) -> Option<f64> {
-        if self.samples.back().is_some_and(|&[last, _]| t_s <= last) {
-            self.samples.clear();
+        match self.samples.back() {
+            // Of frames with one time the last counts: coarse clocks give many of them.
+            Some(&[last, _]) if t_s == last => drop(self.samples.pop_back()),
+            Some(&[last, _]) if t_s > last => {}
+            _ => self.samples.clear(),
+        }
+        if !t_s.is_finite() {
+            return None;
         }
         let count = self.samples.len();
         let is_near = count > 1 && self.samples[count - 1][0] - self.samples[count - 2][0] < window_s / SAMPLES;

@@ -184,6 +184,19 @@ impl Touches {
         self.pressed.iter().map(|&node| (node, self.pressures[node as usize]))
     }
 
+    /// Makes these the pressed taxels of the last frame, as [`Touches::pressed`] gave them, for [`Touches::on_links`]; the next frame does
+    /// not depend on them.
+    pub(crate) fn set_pressed(&mut self, pressed: &[(u32, f64)]) {
+        for &node in &self.pressed {
+            self.pressures[node as usize] = 0.0;
+        }
+        self.pressed.clear();
+        for &(node, pressure) in pressed {
+            self.pressures[node as usize] = pressure;
+            self.pressed.push(node);
+        }
+    }
+
     /// Takes the pressures of a frame.
     fn take<P: Copy + Default + PartialOrd + Into<f64>>(&mut self, pressures: &[P]) {
         for &node in &self.pressed {

@@ -15,7 +15,7 @@ const NEIGHBOUR_SPACINGS: f64 = 1.5;
 #[must_use]
 pub fn neighbours(body: &Body) -> Vec<Vec<u32>> {
     let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (index, taxel) in body.taxels.iter().enumerate() {
+    for (index, taxel) in body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality.is_pressed()) {
         by_link.entry(taxel.link).or_default().push(index);
     }
     let mut neighbours = vec![Vec::new(); body.taxels.len()];

@@ -10,6 +10,7 @@ mod old_names;
 mod overlay;
 mod senses;
 mod sensors;
+mod shear_keys;
 mod thresholds;
 
 use std::collections::BTreeMap;

@@ -1,7 +1,11 @@
-//! Selects the raw values that a plan reads from a source's frames; holds missing values and marks rejected ones faulty.
+//! Selects the raw values that a plan reads from a source's frames; holds missing values, marks rejected ones faulty, and corrects normal
+//! values for what is along the skin.
 //!
 //! It runs on the host, frame by frame, so that all backends get the same input for any batch size.
 
+use std::collections::BTreeMap;
+
+use super::leak::Leak;
 use super::{Calibration, RawValue};
 
 /// What selects values.
@@ -15,6 +19,8 @@ pub struct Intake {
     taxel_of_channel: Vec<usize>,
     /// Per value of a source's frame, the channel it belongs to.
     taxel_of_value: Vec<usize>,
+    /// Of taxels whose normal values are corrected, ascending.
+    corrected: Vec<Corrected>,
     state: IntakeState,
     /// Whether the last frame was rejected.
     is_rejected: bool,
@@ -24,6 +30,16 @@ pub struct Intake {
     rise: Vec<f64>,
     /// Per frame since [`Intake::forget_stale`] its stale taxels; `None` if they are not tracked.
     stale: Option<Vec<Vec<usize>>>,
+}
+
+/// A taxel whose normal value is corrected.
+#[derive(Clone, Debug)]
+struct Corrected {
+    leak: Leak,
+    /// Its channels: its own, and those along t and n × t.
+    channels: [usize; 3],
+    /// Where the last two are in a frame.
+    places: [Option<usize>; 2],
 }
 
 /// What it knows of the frames so far.
@@ -50,22 +66,29 @@ impl Intake {
         taxel_of_channel: Vec<usize>,
     ) -> Self {
         let (taxels, channels) = (calibration.taxels.len(), taxel_of_channel.len());
-        Self {
+        let mut made = Self {
+            corrected: corrected(&calibration, &taxel_of_channel),
             calibration,
             neighbours,
             max_age_s,
             taxel_of_channel,
-            taxel_of_value: (0..channels).collect(),
+            taxel_of_value: Vec::new(),
             is_rejected: false,
             state: IntakeState { last: vec![(RawValue::MISSING, 0.0); channels], frames_seen: 0 },
             now: vec![RawValue::MISSING; channels],
             rise: vec![0.0; taxels],
             stale: None,
-        }
+        };
+        made.set_channels((0..channels).collect());
+        made
     }
 
     /// From now on, value i of a frame belongs to channel `taxel_of_value[i]`.
     pub fn set_channels(&mut self, taxel_of_value: Vec<usize>) {
+        for own in &mut self.corrected {
+            let place = |of: usize| taxel_of_value.iter().position(|&channel| channel == own.channels[of]);
+            own.places = [place(1), place(2)];
+        }
         self.taxel_of_value = taxel_of_value;
     }
 
@@ -109,7 +132,7 @@ impl Intake {
         let checks = &self.calibration.checks;
         let checked =
             checks.settle_frames > 0 || checks.broken_frame_share.is_some() || checks.isolated_ratio.is_some();
-        let checked = checked || !self.calibration.missing.is_empty();
+        let checked = checked || !self.calibration.missing.is_empty() || !self.corrected.is_empty();
         if checked || self.max_age_s > 0.0 || self.stale.is_some() {
             return None;
         }
@@ -146,6 +169,9 @@ impl Intake {
             );
             return;
         }
+        for Corrected { leak, channels: [normal, u, v], .. } in &self.corrected {
+            self.now[*normal] = leak.corrected(self.now[*normal], [self.now[*u], self.now[*v]]);
+        }
         if let Some(ratio) = self.calibration.checks.isolated_ratio {
             self.reject_isolated(ratio);
         }
@@ -164,6 +190,17 @@ impl Intake {
     /// `value` of channel `channel`, missing if it is one of those that the calibration calls no reading.
     pub fn read(&self, channel: usize, value: RawValue) -> RawValue {
         if self.calibration.is_no_reading(self.taxel_of_channel[channel], value) { RawValue::MISSING } else { value }
+    }
+
+    /// What value `place` of a frame of `values` is by itself, without what the frames before tell: missing as [`Intake::read`] has it, and
+    /// corrected.
+    pub fn read_alone(&self, place: usize, values: &[RawValue]) -> RawValue {
+        let read = |place: usize| self.read(self.taxel_of_value[place], values[place]);
+        let own = self.corrected.binary_search_by_key(&self.taxel_of_value[place], |own| own.channels[0]);
+        match own.map(|at| (&self.corrected[at].leak, self.corrected[at].places)) {
+            Ok((leak, [Some(u), Some(v)])) => leak.corrected(read(place), [read(u), read(v)]),
+            _ => read(place),
+        }
     }
 
     /// Records stale values, if they are tracked, and makes them missing.
@@ -218,6 +255,22 @@ impl Intake {
             }
         }
     }
+}
+
+/// The taxels whose channels are of all three axes and whose normal values have something of the others in them.
+fn corrected(calibration: &Calibration, taxel_of_channel: &[usize]) -> Vec<Corrected> {
+    if !calibration.shear.leaks_into_normal() {
+        return Vec::new();
+    }
+    let mut sides_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (channel, &taxel) in taxel_of_channel.iter().enumerate().skip(calibration.taxels.len()) {
+        sides_of.entry(taxel).or_default().push(channel);
+    }
+    let made = sides_of.into_iter().filter_map(|(taxel, sides)| match sides[..] {
+        [u, v] => Some(Corrected { leak: calibration.leak_of(taxel)?, channels: [taxel, u, v], places: [None; 2] }),
+        _ => None,
+    });
+    made.collect()
 }
 
 #[cfg(test)]
@@ -302,5 +355,39 @@ mod tests {
         assert_eq!(in_company[1].number(), Some(100.0));
         let faint = take(&mut intake, &frame(0.0, &[Some(0.0), Some(50.0), Some(0.0)]));
         assert_eq!(faint[1].number(), Some(50.0));
+    }
+
+    #[test]
+    fn normal_values_are_without_what_is_along_the_skin() {
+        let text = "[all]\nbaseline = 100\ngain = 2\nunit = \"kPa\"\n[shear]\nbaseline = [10, 20]\ngain = [1, 4]\nraw_range = [0, 50]\n\
+                    cross_axis = [[1, 0.5, -0.25], [0, 1, 0], [0, 0, 1]]\n[taxel.3]\ngain = 1\ninvert = true\n";
+        let calibration = Calibration::parse(text, &[1, 3, 4]).unwrap();
+        // Taxels 1 and 3 have three axes.
+        let mut intake = Intake::new(calibration, Vec::new(), 0.0, vec![0, 1, 2, 0, 1, 0, 1]);
+        assert!(intake.picks(&[0, 1, 2]).is_none());
+        let values = |of: [f64; 7]| frame(0.0, &of.map(Some));
+        // P = 2 (raw − 100) + 0.5 (u − 10) − 0.25 · 4 (v − 20).
+        let seen = values([110.0, 90.0, 130.0, 14.0, 14.0, 26.0, 26.0]);
+        let expected = [Some(110.0 + (2.0 - 6.0) / 2.0), Some(90.0 - (2.0 - 6.0)), Some(130.0)];
+        assert_eq!(numbers(&take(&mut intake, &seen)), expected);
+        let alone = |intake: &Intake, frame: &Frame| {
+            (0..frame.values.len()).map(|place| intake.read_alone(place, &frame.values).number()).collect::<Vec<_>>()
+        };
+        assert_eq!(alone(&intake, &seen)[..3], expected);
+        // What is not known is not taken out, and what is out of range is not believed.
+        for (place, value) in [(5, None), (3, Some(51.0)), (5, Some(f64::NAN))] {
+            let mut seen = seen.clone();
+            seen.values[place] = value.map_or(RawValue::MISSING, RawValue::new);
+            assert_eq!(numbers(&take(&mut intake, &seen))[..2], [Some(110.0), expected[1]]);
+            assert_eq!(alone(&intake, &seen)[..2], [Some(110.0), expected[1]]);
+        }
+        let mut rest = seen.clone();
+        rest.values[0] = RawValue::MISSING;
+        assert!(take(&mut intake, &rest)[0].is_missing());
+        // In another order, without one of the axes.
+        intake.set_channels(vec![6, 4, 1, 0, 3]);
+        let other = frame(0.0, &[26.0, 14.0, 90.0, 110.0, 14.0].map(Some));
+        assert_eq!(numbers(&take(&mut intake, &other)), [Some(110.0), expected[1], None]);
+        assert_eq!(alone(&intake, &other)[2..4], [expected[1], Some(110.0)]);
     }
 }

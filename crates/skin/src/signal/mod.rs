@@ -10,6 +10,7 @@ mod frame;
 mod frame_time;
 mod fsr;
 mod intake;
+mod leak;
 mod letter;
 mod response;
 mod sense;

@@ -12,7 +12,7 @@ use super::response::Response;
 /// 0 °C, K.
 pub(super) const ZERO_CELSIUS_K: f64 = 273.15;
 /// Sizes beyond which a raw value is not believed, as of pressures.
-const UNBELIEVABLE: f64 = 1_152_921_504_606_846_976.0;
+pub(super) const UNBELIEVABLE: f64 = 1_152_921_504_606_846_976.0;
 
 /// What a raw value is in a sense.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +102,17 @@ impl SenseResponse {
 }
 
 impl Sense {
+    /// The same with the baseline of a thermistor above its resistor, if it is one: it is at full scale less the raw value.
+    pub(super) fn above_resistor(mut self) -> Self {
+        if let SenseResponse::Ntc { full_raw, .. } = self.response
+            && self.falls
+            && self.baseline == 0.0
+        {
+            self.baseline = full_raw;
+        }
+        self
+    }
+
     /// What `raw` is.
     #[must_use]
     pub fn read(&self, raw: RawValue) -> Reading {
@@ -149,6 +160,12 @@ impl SenseCalibration {
         Self { all: Sense { gain: 1e-3, ..Sense::default() }, window_s: 0.1, ..Self::of_temperature() }
     }
 
+    /// The same with baselines for thermistors above their resistors.
+    pub(super) fn above_resistors(self) -> Self {
+        let own = self.own.into_iter().map(|(taxel, sense)| (taxel, sense.above_resistor())).collect();
+        Self { all: self.all.above_resistor(), own, ..self }
+    }
+
     /// That of the body's taxel `taxel`.
     #[must_use]
     pub fn of_taxel(&self, taxel: usize) -> &Sense {
@@ -156,23 +173,30 @@ impl SenseCalibration {
     }
 }
 
-/// How tangential raw values become forces along t and n × t, in the unit of P: each less its baseline, times the gain, then
-/// s = C (P, sᵤ, sᵥ).
+/// How raw values of taxels with three axes become forces along n, t and n × t, in the unit of P: each less its baseline, times the gain,
+/// then C times these three.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShearCalibration {
     /// Raw values at rest, along t and n × t.
     pub baselines: [f64; 2],
     /// By the taxel's place in the body, where it has its own.
     pub own_baselines: BTreeMap<usize, [f64; 2]>,
-    /// P for each raw unit; `None` is the size of the taxel's own gain.
-    pub gain: Option<f64>,
+    /// P for each raw unit, along t and n × t; `None` is the size of the taxel's own gain.
+    pub gain: Option<[f64; 2]>,
     /// By the taxel's place in the body, where it has its own.
-    pub own_gains: BTreeMap<usize, f64>,
+    pub own_gains: BTreeMap<usize, [f64; 2]>,
+    /// The range of tangential raw values; others are not believed, and flagged `out_of_range`.
+    pub raw_range: [f64; 2],
+    /// By the taxel's place in the body, where it has its own.
+    pub own_raw_ranges: BTreeMap<usize, [f64; 2]>,
     /// Standard deviation of a tangential raw value, raw units; `None` where it is not given.
     pub noise: Option<f64>,
     /// By the taxel's place in the body, where it has its own.
     pub own_noises: BTreeMap<usize, f64>,
-    /// C: what of P and of each raw tangential force is in each tangential force.
+    /// The first row of C: what of each measured force is in the normal one.
+    pub into_normal: [f64; 3],
+    /// The others, as if the measured normal force were P, which has `into_normal` in it: what of P and of each measured tangential
+    /// force is in each tangential force.
     pub cross_axis: [[f64; 3]; 2],
     /// μ, the friction at which a contact slips, if it is known.
     pub slips_at: Option<f64>,
@@ -185,8 +209,11 @@ impl Default for ShearCalibration {
             own_baselines: BTreeMap::new(),
             gain: None,
             own_gains: BTreeMap::new(),
+            raw_range: [f64::NEG_INFINITY, f64::INFINITY],
+            own_raw_ranges: BTreeMap::new(),
             noise: None,
             own_noises: BTreeMap::new(),
+            into_normal: ALONE_IN_NORMAL,
             cross_axis: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             slips_at: None,
         }
@@ -197,10 +224,10 @@ impl ShearCalibration {
     /// P for each raw unit of the tangential forces of the body's taxel `taxel`, whose normal force has a `gain` and is in a unit of
     /// which P has `unit_factor`.
     #[must_use]
-    pub fn gain_of(&self, taxel: usize, gain: f64, unit_factor: f64) -> f64 {
-        // A gain of its own is in the file's unit, as the normal one was before it came into N or Pa.
+    pub fn gains_of(&self, taxel: usize, gain: f64, unit_factor: f64) -> [f64; 2] {
+        // Gains of its own are in the file's unit, as the normal one was before it came into N or Pa.
         let own = self.own_gains.get(&taxel).copied().or(self.gain);
-        own.map_or(gain.abs(), |own| own * unit_factor)
+        own.map_or([gain.abs(); 2], |own| own.map(|gain| gain * unit_factor))
     }
 
     /// The standard deviation of each tangential raw value of the body's taxel `taxel`, raw units; `None` where it is not given.
@@ -209,7 +236,7 @@ impl ShearCalibration {
         self.own_noises.get(&taxel).copied().or(self.noise)
     }
 
-    /// Whether [`ShearCalibration::gain_of`] the body's taxel `taxel` is one: its own gain is of raw values if its `response` is a line.
+    /// Whether [`ShearCalibration::gains_of`] the body's taxel `taxel` are some: its own gain is of raw values if its `response` is a line.
     #[must_use]
     pub fn has_gain(&self, taxel: usize, response: Response) -> bool {
         response == Response::Linear || self.gain.is_some() || self.own_gains.contains_key(&taxel)
@@ -221,15 +248,30 @@ impl ShearCalibration {
         self.own_baselines.get(&taxel).copied().unwrap_or(self.baselines)
     }
 
+    /// The range of the raw tangential values of the body's taxel `taxel`.
+    #[must_use]
+    pub fn range_of(&self, taxel: usize) -> [f64; 2] {
+        self.own_raw_ranges.get(&taxel).copied().unwrap_or(self.raw_range)
+    }
+
     /// The forces along t and n × t, in the unit of P, of a taxel that feels `pressure` and has the raw values `tangential`, with
-    /// `rest` ([`ShearCalibration::rest_of`]) and `gain` ([`ShearCalibration::gain_of`]).
+    /// `rest` ([`ShearCalibration::rest_of`]) and `gains` ([`ShearCalibration::gains_of`]).
     #[must_use]
     #[inline]
-    pub fn forces(&self, rest: [f64; 2], gain: f64, pressure: f64, tangential: [f64; 2]) -> [f64; 2] {
-        let [u, v] = [0, 1].map(|axis| gain * (tangential[axis] - rest[axis]));
+    pub fn forces(&self, rest: [f64; 2], gains: [f64; 2], pressure: f64, tangential: [f64; 2]) -> [f64; 2] {
+        let [u, v] = [0, 1].map(|axis| gains[axis] * (tangential[axis] - rest[axis]));
         self.cross_axis.map(|[of_p, of_u, of_v]| of_p * pressure + of_u * u + of_v * v)
     }
+
+    /// Whether forces along the skin change what is felt along the normal.
+    #[must_use]
+    pub fn leaks_into_normal(&self) -> bool {
+        self.into_normal != ALONE_IN_NORMAL
+    }
 }
+
+/// The first row of a C by which the normal force is what is measured along the normal.
+const ALONE_IN_NORMAL: [f64; 3] = [1.0, 0.0, 0.0];
 
 #[cfg(test)]
 mod tests {

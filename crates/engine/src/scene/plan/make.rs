@@ -13,7 +13,7 @@ use super::super::senses::{ForTouches, Senses, letters_and_outputs};
 use super::super::stages::Stages;
 use super::super::{Coordinates, Scene, choose_fields};
 use super::{Plan, PlanField};
-use crate::body::{Body, KeptOfShape, Nearest};
+use crate::body::{Body, KeptOfShape, Modality, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Field, FieldSet, WORLD};
 use crate::percept::{Outputs, TouchOutputs};
@@ -30,6 +30,7 @@ impl Plan {
     /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         check(body, fields, scene, calibration)?;
+        let calibration = &*calibration.with_noise_of_leaks(body);
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs);
         let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, outputs)?;
@@ -155,6 +156,9 @@ fn check(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibratio
         return Err(Error::failed("the body has no fields: add some with `somatic author`").at(&body.name));
     }
     calibration.check_body(&body.name)?;
+    for (index, taxel) in body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality == Modality::Force3) {
+        calibration.check_leak(index, taxel.id)?;
+    }
     Letter::check(&scene.letters)?;
     let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);
     scene.knobs.check(scene.outputs, has_changes, scene.touches.is_some())?;

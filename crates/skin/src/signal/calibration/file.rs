@@ -7,11 +7,12 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::keys::{CurveKeys, Draft, Keys, only_for_fsr};
-use super::kinds;
 use super::layer::LayerKeys;
-use super::senses::{ProximityKeys, ShearKeys, TemperatureKeys};
+use super::senses::{ProximityKeys, TemperatureKeys};
+use super::shear_keys::ShearKeys;
 use super::thresholds::{ChangeKeys, ContactKeys};
 use super::{Calibration, Checks};
+use super::{kinds, shear_keys};
 use crate::body::Modality;
 use crate::error::{Error, Result, failed};
 use crate::keys::Text;
@@ -91,7 +92,7 @@ impl Calibration {
         named.sort_by_key(|(id, _)| id.span().start);
         let mut temperature = file.temperature.read((&curves, &names), text)?;
         let mut proximity = file.proximity.read((&curves, &names), text)?;
-        let mut shear = file.shear.read(text)?;
+        let (mut shear, matrix_at) = (file.shear.read(text)?, file.shear.matrix_at());
         let mut table_of = HashMap::new();
         for (id, keys) in named {
             let index = id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
@@ -126,6 +127,10 @@ impl Calibration {
             keys.shear(index, &mut shear, text)?;
             only_for_fsr(&keys, drafts[index].is_fsr(), text)?;
         }
+        let (temperature, proximity) = (temperature.above_resistors(), proximity.above_resistors());
+        if let Some(scale) = all.scale() {
+            shear_keys::scale(&mut shear, scale, text)?;
+        }
         only_for_fsr(&file.all, all.is_fsr() || drafts.iter().any(Draft::is_fsr), text)?;
         let taxels = drafts.into_iter().map(|draft| draft.finish(&curves, text)).collect::<Result<_>>()?;
         if missing.iter().all(Vec::is_empty) {
@@ -142,7 +147,11 @@ impl Calibration {
         let layer = file.layer.map(|keys| keys.read(text)).transpose()?;
         let File { body, checks, drift, .. } = file;
         let senses = Self { temperature, proximity, shear, ..Self::default() };
-        Ok(Self { body, taxels, missing, curves, contact, fields, change, checks, drift, layer, ..senses })
+        let made = Self { body, taxels, missing, curves, contact, fields, change, checks, drift, layer, ..senses };
+        for (index, &id) in ids.iter().enumerate().filter(|(index, _)| kind_of(*index) == Some(Modality::Force3)) {
+            made.check_leak(index, id).map_err(|e| text.put(matrix_at.clone(), e))?;
+        }
+        Ok(made)
     }
 }
 

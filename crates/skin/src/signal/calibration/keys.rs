@@ -5,7 +5,8 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::senses::{Curves, baselines_of, curve_called, curve_index, gain_of, noise_of};
+use super::senses::{Curves, curve_called, curve_index, range_of};
+use super::shear_keys::{Gains, OwnShear, scaled};
 use super::{Onset, Sensors, TaxelCalibration};
 use crate::error::{Error, Result};
 use crate::keys::{Text, whole};
@@ -43,7 +44,10 @@ pub(super) struct Keys {
     full_scale_newton: Option<Spanned<f64>>,
     #[serde(default, deserialize_with = "whole")]
     shear_baseline: Option<Spanned<[f64; 2]>>,
-    shear_gain: Option<Spanned<f64>>,
+    #[serde(default, deserialize_with = "whole")]
+    shear_gain: Option<Spanned<Gains>>,
+    #[serde(default, deserialize_with = "whole")]
+    shear_raw_range: Option<Spanned<[f64; 2]>>,
     shear_noise: Option<Spanned<f64>>,
 }
 
@@ -80,10 +84,11 @@ impl Keys {
     }
 
     /// The keys that only a taxel with three axes has, and where they are.
-    pub(super) fn of_shear(&self) -> [(&'static str, Option<Range<usize>>); 3] {
+    pub(super) fn of_shear(&self) -> [(&'static str, Option<Range<usize>>); 4] {
         [
             ("shear_baseline", self.shear_baseline.as_ref().map(Spanned::span)),
             ("shear_gain", self.shear_gain.as_ref().map(Spanned::span)),
+            ("shear_raw_range", self.shear_raw_range.as_ref().map(Spanned::span)),
             ("shear_noise", self.shear_noise.as_ref().map(Spanned::span)),
         ]
     }
@@ -110,13 +115,6 @@ impl Keys {
             own.raw_range = *range.get_ref();
         }
         own.falls = self.invert.unwrap_or(own.falls);
-        if let SenseResponse::Ntc { full_raw, .. } = own.response
-            && own.falls
-            && own.baseline == 0.0
-        {
-            // Above its resistor, a thermistor is at full scale less the raw value.
-            own.baseline = full_raw;
-        }
         own.mask = self.mask.unwrap_or(own.mask);
         if own != senses.all {
             senses.own.insert(taxel, own);
@@ -126,16 +124,13 @@ impl Keys {
 
     /// The same of its tangential forces.
     pub(super) fn shear(&self, taxel: usize, shear: &mut ShearCalibration, text: Text<'_>) -> Result<()> {
-        if let Some(baselines) = &self.shear_baseline {
-            shear.own_baselines.insert(taxel, baselines_of("shear_baseline", baselines, text)?);
-        }
-        if let Some(gain) = &self.shear_gain {
-            shear.own_gains.insert(taxel, gain_of("shear_gain", gain, text)?);
-        }
-        if let Some(noise) = &self.shear_noise {
-            shear.own_noises.insert(taxel, noise_of("shear_noise", noise, text)?);
-        }
-        Ok(())
+        let own = OwnShear {
+            baseline: self.shear_baseline.as_ref(),
+            gain: self.shear_gain.as_ref(),
+            raw_range: self.shear_raw_range.as_ref(),
+            noise: self.shear_noise.as_ref(),
+        };
+        own.read(taxel, shear, text)
     }
 
     /// Refuses keys that hold for all taxels alike under a single one.
@@ -267,11 +262,7 @@ impl Draft {
             taxel.gain_spread = Some(x);
         }
         if let Some(range) = &keys.raw_range {
-            let [low, high] = *range.get_ref();
-            if !(low < high && low.abs() <= MAX_MAGNITUDE && high.abs() <= MAX_MAGNITUDE) {
-                let what = format!("`raw_range` is [{low}, {high}]; give the lowest and the highest raw value");
-                return Err(text.wrong(range.span(), what));
-            }
+            let [low, high] = range_of("raw_range", range, text)?;
             taxel.raw_range = [low as f32, high as f32];
         }
         if let Some(mask) = keys.mask {
@@ -331,6 +322,11 @@ impl Draft {
         }
     }
 
+    /// What every gain is multiplied by, and where that is said.
+    pub(super) fn scale(&self) -> Option<(f64, usize)> {
+        self.scale
+    }
+
     /// The unit of what it measures.
     pub(super) fn unit(&self) -> UnitOfP {
         self.unit
@@ -343,12 +339,7 @@ impl Draft {
     /// The finished calibration, if its keys fit together.
     pub(super) fn finish(mut self, curves: &[Curve], text: Text<'_>) -> Result<TaxelCalibration> {
         if let Some((scale, at)) = self.scale {
-            self.taxel.gain *= scale;
-            if !GAIN_RANGE.contains(&self.taxel.gain.abs()) {
-                let gain = self.taxel.gain.abs();
-                let what = format!("`scale` makes a gain {gain:e}; gains must be between 1e-12 and 1e12");
-                return Err(text.wrong(at..at, what));
-            }
+            self.taxel.gain = scaled(self.taxel.gain, (scale, at), text)?;
         }
         let mut taxel = self.taxel;
         match self.kind {

@@ -70,6 +70,21 @@ mod tests {
         let above = above.unwrap().temperature;
         let [colder, warmer] = [400.0, 600.0].map(|raw| value(above.of_taxel(2).read(RawValue::new(raw))));
         assert!(colder < 25.0 && warmer > 25.0, "{colder} {warmer}");
+        // All of a kind at once, and one that is the other way.
+        let all = read(
+            "[temperature]\nntc = { ohm_at_25 = 10e3, b_k = 3950, series_ohm = 10e3, full_raw = 1023 }\ninvert = true\n\
+             [proximity]\ninvert = true\nbaseline = 100\n",
+        )
+        .unwrap();
+        assert_eq!(value(all.temperature.of_taxel(2).read(RawValue::new(400.0))), colder);
+        assert!((value(all.proximity.of_taxel(3).read(RawValue::new(10.0))) - 0.09).abs() < 1e-15);
+        let one_below = read(
+            "[temperature]\nntc = { ohm_at_25 = 10e3, b_k = 3950, series_ohm = 10e3, full_raw = 1023 }\ninvert = true\n\
+             [taxel.200]\ninvert = false\n",
+        );
+        let below = one_below.unwrap().temperature;
+        assert!((value(below.of_taxel(2).read(RawValue::new(623.0))) - colder).abs() < 1e-9);
+        assert_eq!(value(below.all.read(RawValue::new(400.0))), colder);
     }
 
     #[test]
@@ -103,7 +118,7 @@ mod tests {
     #[test]
     fn keys_of_shear_are_refused_for_what_has_one_axis() {
         for (id, kind) in [(0, "pressure"), (200, "temperature"), (301, "proximity")] {
-            for key in ["shear_gain = 3", "shear_baseline = [1, 1]", "shear_noise = 1"] {
+            for key in ["shear_gain = 3", "shear_baseline = [1, 1]", "shear_raw_range = [0, 1]", "shear_noise = 1"] {
                 let name = key.split(' ').next().unwrap();
                 assert_eq!(
                     read(&format!("[taxel.{id}]\n{key}")).unwrap_err(),

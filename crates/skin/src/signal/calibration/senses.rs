@@ -1,4 +1,4 @@
-//! The tables of senses beside pressure: `[temperature]`, `[proximity]` and `[shear]`.
+//! The tables of senses beside pressure: `[temperature]` and `[proximity]`.
 
 use std::ops::RangeInclusive;
 
@@ -9,7 +9,7 @@ use crate::error::{Result, nearest};
 use crate::keys::{Text, whole};
 use crate::signal::curve::Curve;
 use crate::signal::response::{GAIN_RANGE, MAX_MAGNITUDE};
-use crate::signal::sense::{Sense, SenseCalibration, SenseResponse, ShearCalibration, ZERO_CELSIUS_K};
+use crate::signal::sense::{Sense, SenseCalibration, SenseResponse, ZERO_CELSIUS_K};
 
 /// Windows of rates, s.
 const WINDOWS_S: RangeInclusive<f64> = 1e-3..=3600.0;
@@ -18,8 +18,6 @@ const WINDOWS_S: RangeInclusive<f64> = 1e-3..=3600.0;
 const B_K: RangeInclusive<f64> = 500.0..=20_000.0;
 /// Resistances of thermistors at 25 °C and beside them, Ω: some Ω to some MΩ. As their ratio alone counts, some write them in MΩ.
 const OHMS: RangeInclusive<f64> = 1e-6..=1e9;
-/// Of what one raw value of another axis is in a tangential force.
-const MOST_ACROSS: f64 = 1e6;
 
 /// Units of temperature: the name, °C of one of it, °C at 0 of it.
 const TEMPERATURES: [(&str, f64, f64); 3] =
@@ -34,6 +32,7 @@ pub(super) struct TemperatureKeys {
     unit: Option<Spanned<String>>,
     baseline: Option<Spanned<f64>>,
     gain: Option<Spanned<f64>>,
+    invert: Option<bool>,
     curve: Option<Spanned<String>>,
     ntc: Option<Spanned<NtcKeys>>,
     #[serde(default, deserialize_with = "whole")]
@@ -49,25 +48,13 @@ pub(super) struct ProximityKeys {
     unit: Option<Spanned<String>>,
     baseline: Option<Spanned<f64>>,
     gain: Option<Spanned<f64>>,
+    invert: Option<bool>,
     curve: Option<Spanned<String>>,
     #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
     missing: Option<Vec<f64>>,
     window_s: Option<Spanned<f64>>,
     range: Option<Spanned<f64>>,
-}
-
-/// `[shear]`.
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ShearKeys {
-    #[serde(default, deserialize_with = "whole")]
-    baseline: Option<Spanned<[f64; 2]>>,
-    gain: Option<Spanned<f64>>,
-    noise: Option<Spanned<f64>>,
-    #[serde(default, deserialize_with = "whole")]
-    cross_axis: Option<Spanned<[[f64; 3]; 2]>>,
-    slips_at: Option<Spanned<f64>>,
 }
 
 /// A thermistor to ground under a resistor.
@@ -109,6 +96,7 @@ struct Common<'a> {
     unit: Option<&'a Spanned<String>>,
     baseline: Option<&'a Spanned<f64>>,
     gain: Option<&'a Spanned<f64>>,
+    invert: Option<bool>,
     curve: Option<&'a Spanned<String>>,
     raw_range: Option<&'a Spanned<[f64; 2]>>,
     missing: &'a [f64],
@@ -142,21 +130,13 @@ pub(super) fn gain_of(key: &str, gain: &Spanned<f64>, text: Text<'_>) -> Result<
     Err(text.wrong(gain.span(), format!("`{key}` is {number}; it must be between 1e-12 and 1e12 in size")))
 }
 
-/// A standard deviation of raw values.
-pub(super) fn noise_of(key: &str, noise: &Spanned<f64>, text: Text<'_>) -> Result<f64> {
-    let number = *noise.get_ref();
-    if (0.0..=MAX_MAGNITUDE).contains(&number) {
-        return Ok(number);
+/// A range of raw values.
+pub(super) fn range_of(key: &str, range: &Spanned<[f64; 2]>, text: Text<'_>) -> Result<[f64; 2]> {
+    let [low, high] = *range.get_ref();
+    if low < high && low.abs() <= MAX_MAGNITUDE && high.abs() <= MAX_MAGNITUDE {
+        return Ok([low, high]);
     }
-    Err(text.wrong(noise.span(), format!("`{key}` is {number}; it must be 0 or more raw units")))
-}
-
-pub(super) fn baselines_of(key: &str, baselines: &Spanned<[f64; 2]>, text: Text<'_>) -> Result<[f64; 2]> {
-    let both = *baselines.get_ref();
-    if both.iter().all(|raw| raw.abs() <= MAX_MAGNITUDE) {
-        return Ok(both);
-    }
-    Err(text.wrong(baselines.span(), format!("`{key}` is {both:?}; it must be two finite numbers of raw units")))
+    Err(text.wrong(range.span(), format!("`{key}` is [{low}, {high}]; give the lowest and the highest raw value")))
 }
 
 impl Common<'_> {
@@ -182,16 +162,12 @@ impl Common<'_> {
         }
         sense.gain *= factor;
         sense.offset = offset;
+        sense.falls = self.invert.unwrap_or(false);
         if let Some(curve) = self.curve {
             sense.response = SenseResponse::Curve(curve_called(curve, curves, text)?);
         }
         if let Some(range) = self.raw_range {
-            let [low, high] = *range.get_ref();
-            if !(low < high && low.is_finite() && high.is_finite()) {
-                let what = format!("`raw_range` is [{low}, {high}]; give the lowest and the highest raw value");
-                return Err(text.wrong(range.span(), what));
-            }
-            sense.raw_range = [low, high];
+            sense.raw_range = range_of("raw_range", range, text)?;
         }
         sense.missing = self.missing.iter().map(|&raw| raw as f32).collect();
         Ok(sense)
@@ -217,6 +193,7 @@ impl TemperatureKeys {
             unit: self.unit.as_ref(),
             baseline: self.baseline.as_ref(),
             gain: self.gain.as_ref(),
+            invert: self.invert,
             curve: self.curve.as_ref(),
             raw_range: self.raw_range.as_ref(),
             missing: self.missing.as_deref().unwrap_or_default(),
@@ -241,6 +218,7 @@ impl ProximityKeys {
             unit: self.unit.as_ref(),
             baseline: self.baseline.as_ref(),
             gain: self.gain.as_ref(),
+            invert: self.invert,
             curve: self.curve.as_ref(),
             raw_range: self.raw_range.as_ref(),
             missing: self.missing.as_deref().unwrap_or_default(),
@@ -255,36 +233,6 @@ impl ProximityKeys {
             range_m = text.positive("range", range)? * factor;
         }
         Ok(SenseCalibration { all, window_s, range_m, written_gain: written(self.gain.as_ref()), ..usual })
-    }
-}
-
-impl ShearKeys {
-    pub(super) fn read(&self, text: Text<'_>) -> Result<ShearCalibration> {
-        let mut shear = ShearCalibration::default();
-        if let Some(baselines) = &self.baseline {
-            shear.baselines = baselines_of("baseline", baselines, text)?;
-        }
-        shear.noise = self.noise.as_ref().map(|noise| noise_of("noise", noise, text)).transpose()?;
-        shear.gain = self.gain.as_ref().map(|gain| gain_of("gain", gain, text)).transpose()?;
-        if let Some(matrix) = &self.cross_axis {
-            let rows = matrix.get_ref();
-            let why = match rows.iter().flatten().find(|share| share.is_nan() || share.abs() > MOST_ACROSS) {
-                Some(share) => format!("has {share}; its numbers are at most {MOST_ACROSS} in size"),
-                None if rows.iter().flatten().all(|share| *share == 0.0) => {
-                    "leaves no shear; its rows are all 0".into()
-                }
-                None => String::new(),
-            };
-            if !why.is_empty() {
-                let what = format!("`cross_axis` {why}: give two rows, shares of the normal force, of u and of v");
-                return Err(text.wrong(matrix.span(), what));
-            }
-            shear.cross_axis = *matrix.get_ref();
-        }
-        if let Some(slips_at) = &self.slips_at {
-            shear.slips_at = Some(text.positive("slips_at", slips_at)?);
-        }
-        Ok(shear)
     }
 }
 
@@ -329,15 +277,6 @@ mod tests {
     }
 
     #[test]
-    fn tangential_forces_have_baselines_gains_and_what_the_axes_share() {
-        let text = "[all]\nunit = \"N\"\n[shear]\nbaseline = [10, -10]\ngain = 0.01\ncross_axis = [[0.1, 1, 0], [0, 0, 1]]\nslips_at = 0.6\n\
-                    [taxel.7]\nshear_baseline = [1, 2]\nshear_gain = 0.02\n";
-        let shear = read(text).unwrap().shear;
-        assert_eq!((shear.baselines, shear.gain, shear.cross_axis[0]), ([10.0, -10.0], Some(0.01), [0.1, 1.0, 0.0]));
-        assert_eq!((shear.own_baselines[&1], shear.own_gains[&1], shear.slips_at), ([1.0, 2.0], 0.02, Some(0.6)));
-    }
-
-    #[test]
     fn what_makes_no_sense_is_said_with_its_line() {
         let why = |text: &str| read(text).unwrap_err();
         assert_eq!(why("[temperature]\nunit = \"hot\""), "line 2: there is no unit `hot` here; choose of °C, K, °F");
@@ -347,32 +286,14 @@ mod tests {
         assert!(why("[proximity]\ncurve = \"far\"").contains("add a table [curve.far]"));
         let both = "[temperature]\nunit = \"K\"\nntc = { ohm_at_25 = 1, b_k = 1000, series_ohm = 1, full_raw = 1 }";
         assert!(why(both).starts_with("line 3: `ntc` gives °C by itself"));
-        let rows = "give two rows, shares of the normal force, of u and of v";
-        for (wrong, why_not) in [
-            ("[[1, nan, 0], [0, 0, 1]]", "has NaN; its numbers are at most 1000000 in size"),
-            ("[[1e8, 1, 1], [0, 0, 1]]", "has 100000000; its numbers are at most 1000000 in size"),
-            ("[[0, 0, 0], [0, 0, 0]]", "leaves no shear; its rows are all 0"),
-        ] {
-            let is = why(&format!("[shear]\ncross_axis = {wrong}"));
-            assert_eq!(is, format!("line 2: `cross_axis` {why_not}: {rows}"));
-        }
-        assert!(why("[shear]\nnoise = -1").starts_with("line 2: `noise` is -1; it must be 0 or more raw units"));
-        assert!(why("[taxel.7]\nshear_noise = nan").starts_with("line 2: `shear_noise` is NaN"));
-        assert!(why("[shear]\nslips_at = 0").starts_with("line 2: `slips_at` is 0"));
         assert!(why("[temprature]\ngain = 1").contains("did you mean `temperature`"));
     }
 
     #[test]
     fn lists_of_another_length_are_refused() {
-        for text in [
-            "[shear]\nbaseline = [0, 0, 0]",
-            "[shear]\ncross_axis = [[0, 1, 0, 9], [0, 0, 1]]",
-            "[shear]\ncross_axis = [[0, 1, 0], [0, 0, 1], [0, 0, 0]]",
-            "[taxel.3]\nshear_baseline = [0, 0, 4]",
-            "[all]\nraw_range = [0, 10, 20]",
-            "[temperature]\nraw_range = [0]",
-            "[proximity]\nraw_range = [0, 1, 2]",
-        ] {
+        for text in
+            ["[all]\nraw_range = [0, 10, 20]", "[temperature]\nraw_range = [0]", "[proximity]\nraw_range = [0, 1, 2]"]
+        {
             let why = read(text).unwrap_err();
             assert!(why.starts_with("line 2: a list has ") && why.contains("here; give it "), "{text}: {why}");
         }
@@ -399,16 +320,5 @@ mod tests {
         );
         assert!(with("1e4", "3950", "0", "1023").starts_with("line 2: `series_ohm` is 0; a resistance"));
         assert!(with("1e4", "3950", "1e4", "nan").starts_with("line 2: `full_raw` is NaN; it must be over 0"));
-    }
-
-    #[test]
-    fn the_noise_of_tangential_values_is_their_own_where_it_is_given() {
-        let of = |text: &str| {
-            let shear = read(text).unwrap().shear;
-            [0, 1].map(|taxel| shear.noise_of(taxel))
-        };
-        assert_eq!(of("[all]\nnoise = 2"), [None, None]);
-        assert_eq!(of("[shear]\nnoise = 3\n[taxel.7]\nshear_noise = 0"), [Some(3.0), Some(0.0)]);
-        assert_eq!(of("[taxel.3]\nshear_noise = 1.5"), [Some(1.5), None]);
     }
 }

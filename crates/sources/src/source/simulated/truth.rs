@@ -23,7 +23,7 @@ pub struct Truth {
     pub normal_in_link: DVec3,
     /// The same point in the field's chart, m.
     pub uv: Option<[f64; 2]>,
-    /// Direction of a rod or an edge in the chart, or from the link's +x in the tangent plane, rad in [0, π).
+    /// The angle of `direction_in_link` in the chart, or from the link's +x in the tangent plane, rad in [0, π).
     pub angle: Option<f64>,
     /// Mean velocity since the frame before, m/s; absent in a touch's first frame.
     pub velocity_in_link: Option<DVec3>,
@@ -33,7 +33,7 @@ pub struct Truth {
     pub speed: Option<f64>,
     /// Force along the normal, N; of a touch of the whole body the integral of the pressure.
     pub force_newton: f64,
-    /// Unit vector along a rod, an edge, a strap or an ellipsoid, or from one of a pair to the other, in the tangent plane.
+    /// Unit vector along a rod, an edge, a strap or an ellipsoid, or from the first of a pair to the second, in the tangent plane.
     pub direction_in_link: Option<DVec3>,
     /// Unit vector along the footprint on the taxels: of a touch of the whole body, if it is longer than wide.
     pub principal_axis_in_link: Option<DVec3>,

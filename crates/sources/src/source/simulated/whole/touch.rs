@@ -58,7 +58,7 @@ pub(in crate::source::simulated) struct Contact {
     pub(in crate::source::simulated) normal: DVec3,
     pub(in crate::source::simulated) link: usize,
     pub(in crate::source::simulated) principal_axis: Option<DVec3>,
-    /// Of an indenter that has a direction.
+    /// Along an indenter that has a direction, or from the first of a pair to the second, in the tangent plane.
     pub(in crate::source::simulated) direction: Option<DVec3>,
     /// The place of the path under it, and the way that it faces there.
     pub(in crate::source::simulated) stands_at: DVec3,
@@ -188,15 +188,17 @@ impl BodyTouch {
         match self.tool {
             Tool::One(shape) => Some(vec![(shape, pose)]),
             Tool::Pair { shape, apart_m } => {
-                let beside = |along: DVec3| {
-                    let (way, left_m) = walk(&skin.surface, &pose.spot, along, apart_m / 2.0);
+                let beside = |side: f64| {
+                    let (way, left_m) = walk(&skin.surface, &pose.spot, pose.along * side, apart_m / 2.0);
                     // With a part of the way left, it has met the end of the skin.
-                    let (spot, _) = *way.last().filter(|_| left_m <= END_M)?;
+                    let (spot, ahead) = *way.last().filter(|_| left_m <= END_M)?;
                     let normal = skin.surface.smooth_normal(&spot);
-                    let along = (pose.along - normal * pose.along.dot(normal)).normalize_or(pose.along);
+                    // As the way runs there: around a limb, `pose.along` may point back.
+                    let along = ahead * side;
+                    let along = (along - normal * along.dot(normal)).normalize_or(along);
                     Some((shape, Pose { spot, normal, along }))
                 };
-                Some(vec![beside(-pose.along)?, beside(pose.along)?])
+                Some(vec![beside(-1.0)?, beside(1.0)?])
             }
         }
     }
@@ -235,7 +237,7 @@ impl BodyTouch {
                 normal,
                 link,
                 principal_axis,
-                direction: shape.is_long().then_some(flat),
+                direction: self.tool.is_long().then_some(flat),
                 stands_at: pose.spot.position,
                 along: flat,
                 radius_m,
