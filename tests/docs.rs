@@ -1,6 +1,8 @@
 //! Every command that the documentation shows is run, as written, in a folder with what a reader would have there.
 #![cfg(feature = "cli")]
 
+#[path = "docs/letters.rs"]
+mod letters;
 #[path = "docs/table.rs"]
 mod table;
 

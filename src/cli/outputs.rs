@@ -32,13 +32,28 @@ pub(super) fn outputs(arguments: &Arguments) -> Result<u8> {
         "Touches of the whole body: `touches` asks for the default ones, each of these names for one more.\n\n{}\n\
          Percepts of each field:\n\n{}\n\
          P is the calibrated value of a taxel, in the unit that the calibration names.\n",
-        table(&touches),
-        table(&fields)
+        tables(&touches),
+        tables(&fields)
     ))?;
     Ok(DONE)
 }
 
-fn table(rows: &[Quantity]) -> String {
+/// What stands over the quantities of a letter.
+const HEADINGS: [(Option<&str>, &str); 4] = [
+    (None, ""),
+    (Some("shear"), "\nOf letter `shear`, for taxels with three axes:\n\n"),
+    (Some("temperature"), "\nOf letter `temperature`, for taxels that measure it:\n\n"),
+    (Some("proximity"), "\nOf letter `proximity`, for taxels that measure distances:\n\n"),
+];
+
+/// A table for each letter that has any of `rows`.
+fn tables(rows: &[Quantity]) -> String {
+    let of = |letter: Option<&str>| rows.iter().filter(move |row| row.letter == letter).collect::<Vec<_>>();
+    let tables = HEADINGS.iter().map(|&(letter, heading)| (heading, of(letter))).filter(|(_, rows)| !rows.is_empty());
+    tables.map(|(heading, rows)| format!("{heading}{}", table(&rows))).collect()
+}
+
+fn table(rows: &[&Quantity]) -> String {
     let mut table = plain(["name", "unit", "numbers", "default", "what it is"], [2]);
     for row in rows {
         let numbers = if row.components == 0 { "list".to_owned() } else { row.components.to_string() };

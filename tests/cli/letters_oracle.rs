@@ -1,4 +1,5 @@
-//! Shear, temperature and proximity against a definition of their own in Python, on random bodies, calibrations and frames.
+//! Shear, temperature and proximity, and what touches have of them, against a definition of their own in Python, on random bodies,
+//! calibrations and frames.
 
 use serde_json::Value;
 
@@ -9,25 +10,27 @@ fn found(flags: &[&str]) -> Option<Value> {
     touches_oracle::found("letters/oracle.py", &[], flags)
 }
 
-fn assert_right(found: &Value, cells: u64) {
+fn assert_right(found: &Value, cells: u64, touches: u64) {
     assert_eq!(found["wrong"], 0, "{}", found["examples"]);
     assert_eq!(found["missed"], serde_json::json!([]), "changed, and not found to be wrong");
-    assert!(found["cells"].as_u64().unwrap() >= cells, "{}", found["cells"]);
+    for (name, least) in [("cells", cells), ("touches", touches)] {
+        assert!(found[name].as_u64().unwrap() >= least, "{name}: {}", found[name]);
+    }
     // Each quantity was there often.
     let present = found["present"].as_object().unwrap();
-    assert_eq!(present.len(), 24);
+    assert_eq!(present.len(), 33);
     assert!(present.values().all(|number| number.as_u64().unwrap() * 200 >= cells), "{present:?}");
 }
 
 #[test]
 fn letters_are_those_of_a_definition_of_its_own() {
     let Some(found) = found(&[]) else { return };
-    assert_right(&found, 10_000);
+    assert_right(&found, 10_000, 3000);
 }
 
 #[test]
 #[ignore = "takes minutes"]
 fn a_million_cells_are_those_of_a_definition_of_its_own() {
     let Some(found) = found(&["--long"]) else { return };
-    assert_right(&found, 1_000_000);
+    assert_right(&found, 1_000_000, 250_000);
 }

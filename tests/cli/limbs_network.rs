@@ -168,7 +168,12 @@ impl Limb {
     }
 
     fn send_values(&mut self, t_s: f64, value: impl Fn(usize) -> f64) {
-        let values: BTreeMap<String, f64> =
+        self.send_line(t_s, |index| json!(value(index)));
+    }
+
+    /// Sends a frame in which taxel `index` of the limb has this value, which is an array of a taxel with three axes.
+    pub fn send_line(&mut self, t_s: f64, value: impl Fn(usize) -> Value) {
+        let values: BTreeMap<String, Value> =
             self.taxels.iter().enumerate().map(|(index, id)| (id.to_string(), value(index))).collect();
         let line = json!({"t": t_s, "values": values});
         self.written.push(Instant::now());
@@ -207,29 +212,21 @@ pub fn undistributed(place: &Place, field: &str, rows: u64) -> BTreeMap<String, 
         let values: Vec<String> = (0..taxels.len()).map(|taxel| value(row, taxel).to_string()).collect();
         text += &format!("{},{}\n", row as f64 * PERIOD.as_secs_f64(), values.join(","));
     }
-    let path = place.path("undistributed.csv");
-    std::fs::write(&path, text).unwrap();
-    let source = format!("csv:{path}");
-    let arguments = [
-        "run",
-        "-q",
-        "--source",
-        &source,
-        "--fields",
-        field,
-        "--outputs",
-        OUTPUTS,
-        "--backend",
-        "cpu",
-        "--all-fields",
-        "--sink",
-        "-",
-    ];
-    let lines = super::frames(&super::done(&arguments));
+    let lines = run_undistributed(place, field, &text, &["--outputs", OUTPUTS]);
     let all: BTreeMap<String, u64> =
         lines.iter().zip(0..).map(|(line, row)| (line["fields"][0].to_string(), row)).collect();
     assert_eq!(all.len() as u64, rows, "every row has percepts of its own");
     all
+}
+
+/// What a run of `field` alone writes for the frames of the table `text`.
+pub fn run_undistributed(place: &Place, field: &str, text: &str, more: &[&str]) -> Vec<Value> {
+    let path = place.path("undistributed.csv");
+    std::fs::write(&path, text).unwrap();
+    let source = format!("csv:{path}");
+    let arguments =
+        ["run", "-q", "--source", &source, "--fields", field, "--backend", "cpu", "--all-fields", "--sink", "-"];
+    super::frames(&super::done(&[&arguments[..], more].concat()))
 }
 
 /// A head that hears limbs under `keys`, its arguments, and where it writes its summary.
@@ -291,13 +288,23 @@ pub fn wait_for(what: &str, mut until: impl FnMut() -> bool) {
 }
 
 /// Has all `limbs` send frames, from `row` on, until `until`; the row after the last.
-pub fn play(limbs: &mut [Limb], mut row: u64, mut until: impl FnMut(u64) -> bool) -> u64 {
+pub fn play(limbs: &mut [Limb], row: u64, until: impl FnMut(u64) -> bool) -> u64 {
+    play_by(limbs, row, Limb::send, until)
+}
+
+/// The same, with frames that `send` sends.
+pub fn play_by(
+    limbs: &mut [Limb],
+    mut row: u64,
+    send: impl Fn(&mut Limb, u64),
+    mut until: impl FnMut(u64) -> bool,
+) -> u64 {
     let begin = Instant::now();
     let mut due = begin;
     while !until(row) {
         thread::sleep(due.saturating_duration_since(Instant::now()));
         due += PERIOD;
-        limbs.iter_mut().for_each(|limb| limb.send(row));
+        limbs.iter_mut().for_each(|limb| send(limb, row));
         row += 1;
         assert!(begin.elapsed() < Duration::from_secs(40), "it goes on and on");
     }

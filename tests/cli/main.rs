@@ -29,6 +29,8 @@ mod letters_asked;
 mod letters_oracle;
 mod limbs;
 #[cfg(all(unix, feature = "zenoh"))]
+mod limbs_axes;
+#[cfg(all(unix, feature = "zenoh"))]
 mod limbs_faults;
 #[cfg(all(unix, feature = "zenoh"))]
 mod limbs_merged;

@@ -4,17 +4,18 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use glam::DVec3;
-use serde_json::Value;
+use glam::{DAffine3, DQuat, DVec3, EulerRot};
+use serde_json::{Value, json};
 use somatic::Body;
 use somatic::author::{FindingKind, lint};
-use somatic::body::{FieldSpec, MemberSpec};
+use somatic::body::{FieldSpec, MemberSpec, Taxel};
 use somatic::field::FieldSet;
 use somatic::internal::author::refresh;
 use somatic::internal::body::{EdgeRow, Glb, StoredEdges};
 use somatic::internal::field::TaxelGraph;
 use tempfile::TempDir;
 
+use crate::draft::Draft;
 use crate::lint::{Plate, kinds};
 use somatic_testing::skip;
 
@@ -79,6 +80,10 @@ fn assert_same_taxels(before: &Body, after: &Body, except: &[u32]) {
         let turned = old.normal_in_link.cross(new.normal_in_link).length();
         assert!(moved < NEAR_M && turned < NEAR_RAD, "taxel {}: {moved} m, {turned} rad", old.id);
         assert!((old.area - new.area).abs() <= 1e-6 * old.area, "taxel {}", old.id);
+        let tangents = [old.tangent_in_link, new.tangent_in_link];
+        let turned = tangents[0].zip(tangents[1]).map(|(old, new)| old.distance(new));
+        let is_same = turned.map_or(tangents == [None; 2], |by| by < NEAR_RAD);
+        assert!(is_same, "taxel {}: tangents {tangents:?}", old.id);
     }
 }
 
@@ -126,6 +131,83 @@ fn a_rigid_body_comes_back_with_the_same_percepts() {
         let touch = bundled("touch.csv");
         let (before, after) = (percepts(&source, &touch), percepts(&target, &touch));
         assert!(before == after, "the hand's percepts are not the same to the byte");
+    }
+}
+
+#[test]
+fn a_body_with_every_kind_of_taxel_comes_back_with_the_same_percepts() {
+    for python in blenders() {
+        let source = bundled("sensing-hand.glb");
+        let (_folder, target) = through(&python, &source, &[]);
+        let before = Body::load(&source).unwrap();
+        assert_eq!(before.taxels.iter().filter(|taxel| taxel.tangent_in_link.is_some()).count(), 20);
+        assert_same(&before, &Body::load(&target).unwrap());
+        let meeting = bundled("meeting.csv");
+        let (before, after) = (percepts(&source, &meeting), percepts(&target, &meeting));
+        assert!(before.as_ref().is_none_or(|text| text.contains("\"shear\":[") && text.contains("\"warmest\":")));
+        assert!(before == after, "the hand's percepts are not the same to the byte");
+    }
+}
+
+/// The body of the taxels of `before`, each link's below a node that is moved by `scale` and `turn`.
+fn below_nodes(before: &Body, scale: DVec3, turn: DQuat) -> Body {
+    let mut draft = Draft::default();
+    for (index, link) in before.links.iter().enumerate() {
+        let own: Vec<&Taxel> = before.taxels.iter().filter(|taxel| taxel.link == index).collect();
+        let mut link = json!({"name": link.name});
+        if !own.is_empty() {
+            let points: Vec<[f32; 3]> = own.iter().map(|taxel| taxel.position_in_link.as_vec3().to_array()).collect();
+            let mesh = draft.taxels(&points, &own.iter().map(|taxel| taxel.id as f32).collect::<Vec<_>>());
+            let column =
+                |value: &dyn Fn(&Taxel) -> f64| own.iter().map(|taxel| value(taxel) as f32).collect::<Vec<_>>();
+            let mut columns = vec![("_MODALITY".to_owned(), column(&|taxel| taxel.modality.code().into()))];
+            for (axis, name) in ["X", "Y", "Z"].into_iter().enumerate() {
+                columns.push((format!("_N{name}"), column(&|taxel| taxel.normal_in_link[axis])));
+                columns.push((format!("_T{name}"), column(&|taxel| taxel.tangent_in_link.map_or(0.0, |t| t[axis]))));
+            }
+            for (name, column) in columns {
+                let column = draft.scalars(&column);
+                draft.json["meshes"][mesh]["primitives"][0]["attributes"][name] = column.into();
+            }
+            let turn = turn.as_quat().to_array();
+            link["children"] = json!([draft.node(json!({"mesh": mesh, "rotation": turn, "scale": scale.to_array()}))]);
+        }
+        draft.node(link);
+    }
+    draft.load().unwrap()
+}
+
+#[test]
+fn tangents_come_back_from_what_is_written_and_turn_with_the_nodes_of_their_taxels() {
+    let before = Body::load(bundled("sensing-hand.glb")).unwrap();
+    let tangents = |body: &Body| body.taxels.iter().filter(|taxel| taxel.tangent_in_link.is_some()).count();
+    let mut glb = Glb::new();
+    for (index, link) in before.links.iter().enumerate() {
+        let own: Vec<Taxel> = before.taxels.iter().filter(|taxel| taxel.link == index).cloned().collect();
+        let link = glb.node(&link.name, None, DVec3::ZERO);
+        if !own.is_empty() {
+            glb.taxels("taxels", Some(link), &own, None);
+        }
+    }
+    let written = Body::from_bytes("hand", &glb.to_bytes().unwrap()).unwrap();
+    assert_same_taxels(&before, &written, &[]);
+    assert_eq!((tangents(&before), tangents(&written)), (20, 20));
+    // A turn, a mirror image and a stretch, as of objects that an editor has moved.
+    let turn = DQuat::from_euler(EulerRot::XYZ, 0.4, -1.1, 2.3);
+    for scale in [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(2.0, 0.5, 1.25)] {
+        let moved = DAffine3::from_scale_rotation_translation(scale, turn, DVec3::ZERO);
+        let after = below_nodes(&before, scale, turn);
+        assert_eq!((after.taxels.len(), tangents(&after)), (before.taxels.len(), 20));
+        for (old, new) in before.taxels.iter().zip(&after.taxels) {
+            assert_eq!((old.id, old.modality), (new.id, new.modality));
+            let right = old.tangent_in_link.map(|tangent| moved.transform_vector3(tangent).normalize());
+            let Some((right, found)) = right.zip(new.tangent_in_link) else {
+                assert_eq!(right, new.tangent_in_link, "taxel {}", old.id);
+                continue;
+            };
+            assert!(right.distance(found) < 1e-6, "taxel {}: {right} and {found}", old.id);
+            assert!(found.dot(new.normal_in_link).abs() < 1e-6 && (found.length() - 1.0).abs() < 1e-12);
+        }
     }
 }
 

@@ -315,6 +315,10 @@ class Recording:
         of = {"force3": "shear", "temperature": "temperature", "proximity": "proximity"}
         return [letter for kind, letter in of.items() if kind in self.kinds()]
 
+    def has_touches(self):
+        """Whether some field has taxels that something can press."""
+        return bool(self.kinds() & {"pressure", "force3"})
+
     def is_alone(self, letter):
         return len(self.letters()) == 1 and not self.kinds() & {"pressure", "force3"}
 

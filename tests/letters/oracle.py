@@ -3,9 +3,9 @@
     oracle.py SOMATIC FOLDER [--long] [--seed N]
 
 Makes random bodies, calibrations and frames in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter in a
-frame. Prints a JSON object: `cells`, by letter `by_letter`, `present` (by quantity, how often there was one), `wrong` (cells with
-something wrong), `examples` of these, `largest` (by quantity the largest difference over what rounding may be), and `missed`: what was
-changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
+frame; and what touches feel (`of_touches.py`). Prints a JSON object: `cells`, by letter `by_letter`, `touches` (compared), `present` (by
+quantity, how often there was one), `wrong` (cells and touches with something wrong), `examples` of these, `largest` (by quantity the
+largest difference over what rounding may be), and `missed`: what was changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
 
 The definition is that of the documentation, in numpy, over arrays of frames; it shares nothing with the program but files.
 """
@@ -20,7 +20,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+from calibrated import PRESSURES, SAME, UNITS, Value, arc, read, sensed
 from made import Recording, recordings
+from of_touches import TOUCHES, TouchesOf
 
 LETTERS = {
     "shear": ["shear", "shear_direction", "shear_vector", "force_vector", "torsion", "friction", "friction_sigma", "slip_ratio"],
@@ -32,20 +34,10 @@ LETTERS = {
         "nearest", "nearest_taxel", "nearest_position", "nearest_normal", "approach_speed", "covered", "proximity_centroid",
     ],
 }
-# Rounding of double precision: hundreds of units, as a share of the terms that are summed.
-SAME = 1e-13
 HUGE = 2.0**60
 LEAST_M = 1e-4
 LONGEST_GAP_S, SHORTEST_STEP_S = 10.0, 1e-9
 MOST_EXAMPLES = 20
-
-
-class Value:
-    """What is right, and the size of the terms that it is made of: it is right within SAME of that."""
-
-    def __init__(self, value, size=None):
-        self.value = np.asarray(value, float)
-        self.size = float(np.abs(self.value).max() if size is None else size)
 
 
 class Slope:
@@ -88,59 +80,6 @@ class Slope:
         return Value((away * (values - values.mean())).sum() / (away**2).sum(), size / (t - times[0]))
 
 
-def interpolated(curve, x):
-    raw, p = np.array(curve["raw"], float), np.array(curve["p"], float)
-    return np.interp(x, raw, p)
-
-
-UNITS = {
-    "temperature": {"°C": (1.0, 0.0), "K": (1.0, -273.15), "°F": (5 / 9, -160 / 9)},
-    "proximity": {"mm": (1e-3, 0.0), "cm": (1e-2, 0.0), "m": (1.0, 0.0), "in": (0.0254, 0.0)},
-}
-PRESSURES = {"N": ("N", 1.0), "mN": ("N", 1e-3), "kPa": ("Pa", 1e3), "Pa": ("Pa", 1.0), None: (None, 1.0)}
-
-
-def read(recording, taxels, axis=""):
-    """Raw values by frame and taxel, and which are missing: codes of [all] are so on every channel."""
-    raw, missing = recording.frames.of(taxels, axis)
-    codes = recording.calibration.get("all", {}).get("missing", [])
-    return raw, missing | np.isin(raw, np.array(codes, np.float32).astype(float))
-
-
-def sensed(recording, letter, taxels):
-    """By frame and taxel: the value, whether it is in the sensor's range, which are missing, which are faulty."""
-    file, body = recording.calibration, recording.body
-    raw, missing = read(recording, taxels)
-    keys = file.get(letter, {})
-    factor, offset = UNITS[letter][keys.get("unit", "°C" if letter == "temperature" else "mm")]
-    every = {"baseline": 0.0, "gain": 1.0, "raw_range": [-np.inf, np.inf]} | keys
-    values, inside, faulty = np.full(raw.shape, np.nan), np.ones(raw.shape, bool), ~np.isfinite(raw)
-    codes = np.isin(raw, np.array(keys.get("missing", []), np.float32).astype(float))
-    for column, taxel in enumerate(taxels):
-        own = every | file.get("taxel", {}).get(str(body.ids[taxel]), {})
-        # What a masked taxel reads is faulty, whatever it is.
-        codes[:, column] &= not own.get("mask")
-        if "ntc" in own and own.get("invert") and own["baseline"] == 0:
-            # Above its resistor.
-            own["baseline"] = own["ntc"]["full_raw"]
-        above = (own["baseline"] - raw[:, column]) if own.get("invert") else (raw[:, column] - own["baseline"])
-        if "ntc" in own and "curve" not in own:
-            ntc = own["ntc"]
-            with np.errstate(all="ignore"):
-                ohm = ntc["series_ohm"] * above / (ntc["full_raw"] - above)
-                response = 1 / (1 / 298.15 + np.log(ohm / ntc["ohm_at_25"]) / ntc["b_k"]) - 273.15
-            faulty[:, column] |= ~((above > 0) & (above < ntc["full_raw"]))
-        else:
-            response = interpolated(file["curve"][own["curve"]], above) if "curve" in own else above
-        values[:, column] = own["gain"] * factor * response + offset
-        inside[:, column] = (raw[:, column] >= own["raw_range"][0]) & (raw[:, column] <= own["raw_range"][1])
-        if own.get("mask"):
-            faulty[:, column] = True
-    missing = missing | codes
-    faulty &= ~missing
-    return values, inside, missing, faulty
-
-
 class Field:
     def __init__(self, recording, field, kinds):
         body = recording.body
@@ -153,12 +92,6 @@ class Field:
             origin, u, v, n = self.chart
             self.places = np.stack([(at - origin) @ u, (at - origin) @ v], axis=1)
             self.along = [np.array([[turned @ u, turned @ v] for turned in map(arc, normals, [n] * len(normals), way)]) for way in self.tangents]
-
-
-def arc(a, b, x):
-    """x, turned as the least turn from a to b does."""
-    axis, cosine = np.cross(a, b), a @ b
-    return x + np.cross(axis, x) + np.cross(axis, np.cross(axis, x)) / (1 + cosine)
 
 
 def temperatures(recording, field, frames):
@@ -377,7 +310,7 @@ MAKERS = {"shear": ("force3", shears), "temperature": ("temperature", temperatur
 class Comparison:
     def __init__(self):
         self.cells, self.wrong, self.examples = Counter(), 0, []
-        self.present, self.largest = Counter(), {}
+        self.present, self.largest, self.touches = Counter(), {}, 0
 
     def off(self, letter, told, found, flags, contact):
         """What is wrong with a cell."""
@@ -410,16 +343,26 @@ class Comparison:
             wrong = {"cell": "absent"}
         else:
             wrong = self.off(letter, told, found, flags, contact)
+        self.note(wrong, where | {"letter": letter})
+        return wrong
+
+    def take_touch(self, right, number, touch, where):
+        self.touches += 1
+        self.present.update(f"touches.{name}" for name in TOUCHES if name in touch)
+        wrong = right.wrong(number, touch, self.largest)
+        self.note(wrong, where | {"touch": touch["id"]})
+        return wrong
+
+    def note(self, wrong, where):
         if wrong:
             self.wrong += 1
             if len(self.examples) < MOST_EXAMPLES:
-                self.examples.append(where | {"letter": letter} | wrong)
-        return wrong
+                self.examples.append(where | wrong)
 
 
-def changed(told, rng):
-    """`told` with one number that is there changed by a millionth, or by one if it is an id or a count."""
-    names = [name for name in told if name in {name for names in LETTERS.values() for name in names}]
+def changed(told, rng, among=frozenset(name for names in LETTERS.values() for name in names)):
+    """`told` with one number of `among` that is there changed by a millionth, or by one if it is an id or a count."""
+    names = [name for name in told if name in among]
     if not names:
         return None, told | {"contact": not told["contact"]}
     name = str(rng.choice(sorted(names)))
@@ -431,8 +374,8 @@ def changed(told, rng):
     return name, told | {name: value.tolist()}
 
 
-def compare(recording, lines, comparison, missed, rng):
-    """Compares the lines that the program wrote for `recording`."""
+def compare(recording, lines, of_touches, comparison, missed, rng):
+    """Compares the lines that the program wrote for `recording`, with its touches by `of_touches` if there are any."""
     frames = recording.frames
     right = {}
     for field in recording.body.fields:
@@ -441,7 +384,8 @@ def compare(recording, lines, comparison, missed, rng):
             if of.members:
                 right[field.name, letter] = maker(recording, of, frames)
     for number, line in enumerate(lines):
-        told = {(cell["field"], cell.get("letter")): cell for cell in json.loads(line)["fields"]}
+        line = json.loads(line)
+        told = {(cell["field"], cell.get("letter")): cell for cell in line["fields"]}
         for (field, letter), cells in right.items():
             found, flags, contact = next(cells)
             own = told.get((field, letter)) or (told.get((field, None)) if recording.is_alone(letter) else None)
@@ -452,6 +396,13 @@ def compare(recording, lines, comparison, missed, rng):
                 if not comparison.off(letter, other, found, flags, contact):
                     missed.append([recording.name, number, field, letter, name])
                 comparison.largest = before
+        for touch in line.get("touches", []):
+            wrong = comparison.take_touch(of_touches, number, touch, {"recording": recording.name, "frame": number})
+            # A millionth is less than P strays in single precision.
+            if recording.backend == "reference" and not wrong and rng.random() < 0.05:
+                name, other = changed(touch, rng, TOUCHES)
+                if not of_touches.wrong(number, other, {}):
+                    missed.append([recording.name, number, touch["id"], name])
     if number + 1 != len(frames.t):
         raise SystemExit(f"{recording.name}: {number + 1} lines for {len(frames.t)} frames")
 
@@ -467,20 +418,24 @@ def main():
     for recording in recordings(arguments.long, arguments.seed):
         assert isinstance(recording, Recording)
         paths = recording.write(arguments.folder)
-        outputs = ",".join(name for letter in recording.letters() for name in LETTERS[letter])
+        outputs = [name for letter in recording.letters() for name in LETTERS[letter]]
+        outputs += ["touches", "touches.taxels"] if recording.has_touches() else []
         command = [arguments.somatic, "run", "--body", paths["glb"], "--source", paths["csv"], "--calibration", paths["toml"]]
-        command += ["--backend", recording.backend, "--outputs", outputs, "--all-fields", "--sink", f"ndjson:{paths['ndjson']}"]
+        command += ["--backend", recording.backend, "--outputs", ",".join(outputs), "--all-fields", "--sink", f"ndjson:{paths['ndjson']}"]
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
         if done.returncode not in (0, 3):
             raise SystemExit(f"{recording.name}: {done.stderr}")
-        before = comparison.cells.total()
+        before = (comparison.cells.total(), comparison.touches)
+        listed = subprocess.run([arguments.somatic, "inspect", paths["glb"], "--json"], capture_output=True, text=True, check=True)
+        of_touches = TouchesOf(recording, json.loads(listed.stdout)) if recording.has_touches() else None
         with open(paths["ndjson"]) as lines:
-            compare(recording, lines, comparison, missed, rng)
-        print(f"{recording.name}: {comparison.cells.total() - before} cells, {comparison.wrong} wrong", file=sys.stderr)
+            compare(recording, lines, of_touches, comparison, missed, rng)
+        cells, touches = comparison.cells.total() - before[0], comparison.touches - before[1]
+        print(f"{recording.name}: {cells} cells, {touches} touches, {comparison.wrong} wrong", file=sys.stderr)
         for path in paths.values():
             path.unlink()
     json.dump({
-        "cells": comparison.cells.total(), "by_letter": comparison.cells, "present": comparison.present, "wrong": comparison.wrong,
+        "cells": comparison.cells.total(), "by_letter": comparison.cells, "touches": comparison.touches, "present": comparison.present, "wrong": comparison.wrong,
         "examples": comparison.examples, "largest": comparison.largest, "missed": missed,
     }, sys.stdout)
 

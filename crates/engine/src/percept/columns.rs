@@ -302,7 +302,7 @@ columns! {
     CENTROID_SIGMA 31 centroid_sigma: [f64; 2], Metre, Vector, sigma, parts [] host [CentroidSigma];
     #[doc = "The standard deviation of the principal axis by the sensors' noise, rad."]
     PRINCIPAL_AXIS_SIGMA 32 principal_axis_sigma: f64, Radian, Number, sigma, parts [] host [PrincipalAxisSigma];
-    #[doc = "s = Σ wᵢsᵢ over the pressed taxels, along u and v of the field's chart; of letter `shear`, as the outputs down to slip_ratio."]
+    #[doc = "s = Σ wᵢsᵢ over the pressed taxels, along u and v of the field's chart."]
     SHEAR 39 shear: [f64; 2], P, Vector, shear, parts [] host [Shear];
     #[doc = "Its direction, rad in (−π, π]."]
     SHEAR_DIRECTION 40 shear_direction: f64, Radian, Direction, shear, parts [] host [ShearDirection];
@@ -312,13 +312,13 @@ columns! {
     FORCE_VECTOR 42 force_vector: [f64; 3], Newton, Vector, shear, parts [] host [ForceVector];
     #[doc = "Σ wᵢ(xᵢ − c) × sᵢ · n about the centroid c: how the touch twists, counter-clockwise seen from outside."]
     TORSION 43 torsion: f64, PMetre, Number, shear, parts [] host [Torsion];
-    #[doc = "‖s‖ / Σ wᵢPᵢ."]
+    #[doc = "‖s‖ / Σ wᵢPᵢ over the taxels whose sᵢ is known."]
     FRICTION 44 friction: f64, One, Number, shear, parts [] host [Friction];
     #[doc = "The standard deviation of the friction by the sensors' noise; only on request."]
     FRICTION_SIGMA 45 friction_sigma: f64, One, Number, shear, parts [] host [FrictionSigma];
     #[doc = "Friction over that at which it slips, if the calibration has slips_at: a slip begins at 0.95."]
     SLIP_RATIO 62 slip_ratio: f64, One, Number, shear, parts [] host [SlipRatio];
-    #[doc = "Weighted mean of the temperatures, °C; of letter `temperature`, as the outputs down to temperature_rate."]
+    #[doc = "Weighted mean of the temperatures, °C."]
     TEMPERATURE 46 temperature: f64, Celsius, Number, temperature, parts [] host [Temperature];
     #[doc = "The highest temperature, °C."]
     WARMEST 47 warmest: f64, Celsius, Number, temperature, parts [] host [Warmest];
@@ -336,7 +336,7 @@ columns! {
     TEMPERATURE_GRADIENT 53 temperature_gradient: [f64; 2], KelvinPerMetre, Vector, temperature, parts [] host [TemperatureGradient];
     #[doc = "How fast the mean rises, by a line of least squares over window_s of the calibration, K/s."]
     TEMPERATURE_RATE 54 temperature_rate: f64, KelvinPerSecond, Number, temperature, parts [] host [TemperatureRate];
-    #[doc = "The least distance, m; of letter `proximity`, as the outputs down to proximity_centroid."]
+    #[doc = "The least distance, m."]
     NEAREST 55 nearest: f64, Metre, Number, proximity, parts [] host [Nearest];
     #[doc = "The id of the taxel that has it."]
     NEAREST_TAXEL 56 nearest_taxel: u32, One, Number, proximity, parts [] host [NearestTaxel];

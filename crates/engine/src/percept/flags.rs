@@ -23,17 +23,18 @@ bitflags! {
         /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion. Of letter shear:
         /// nothing pulls along the skin, and there is no direction of shear.
         const STILL = 1 << 5;
-        /// A pressed taxel is above its P_max; its value is kept.
+        /// A pressed taxel is above its P_max; its value is kept. Of letter proximity: something is nearer than 0.1 mm.
         const SATURATED = 1 << 6;
         /// A taxel's value was masked or altered: not finite, unbelievable, or distrusted by the calibration's checks.
         const FAULTY_INPUT = 1 << 7;
-        /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept.
+        /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept. Of letter proximity: nothing
+        /// is in range.
         const OUT_OF_RANGE = 1 << 8;
         /// A taxel's value is missing and left out of every sum.
         const INCOMPLETE = 1 << 9;
         /// The field has no chart: what needs (u, v) is absent.
         const NO_CHART = 1 << 10;
-        /// There is no previous frame to measure motion from.
+        /// There is no previous frame to measure motion from, or less than half a window to measure a rate over.
         const NO_PREVIOUS = 1 << 11;
         /// The time step is zero, negative, or longer than the scene allows.
         const BAD_DT = 1 << 12;

@@ -256,7 +256,7 @@ impl Senses {
         let found = body_taxels.iter().zip(calibrations).find(|&(&taxel, calibration)| lacks_gain(taxel, calibration));
         if let Some((&taxel, _)) = found {
             return Err(Error::usage(format!(
-                "taxel {} has a curve or is an FSR, which is of its normal force: give `gain` in [shear]: P for a raw unit along the skin",
+                "taxel {} has a curve or is an FSR, and the curve covers only the normal force: give `gain` in [shear], P for a raw unit along the skin",
                 body.taxels[taxel].id
             )));
         }

@@ -192,7 +192,7 @@ pub struct Taxel {
     /// What it measures.
     pub modality: Modality,
     /// Of a taxel of [`Modality::Force3`], the unit tangent along which its second value is; the third is along n × t. `None` is
-    /// the link's x as far as it is tangential.
+    /// the link's x as far as it is tangential, or its z where x is within 10° of the normal.
     pub tangent_in_link: Option<DVec3>,
 }
 

@@ -1,0 +1,73 @@
+"""What raw values mean by a calibration, for `oracle.py`: readings, and the parts of what taxels of pressure and of three axes feel."""
+
+import numpy as np
+
+# Rounding of double precision: hundreds of units, as a share of the terms that are summed.
+SAME = 1e-13
+
+
+class Value:
+    """What is right, and the size of the terms that it is made of: it is right within SAME of that."""
+
+    def __init__(self, value, size=None):
+        self.value = np.asarray(value, float)
+        self.size = float(np.abs(self.value).max() if size is None else size)
+
+
+def interpolated(curve, x):
+    raw, p = np.array(curve["raw"], float), np.array(curve["p"], float)
+    return np.interp(x, raw, p)
+
+
+UNITS = {
+    "temperature": {"°C": (1.0, 0.0), "K": (1.0, -273.15), "°F": (5 / 9, -160 / 9)},
+    "proximity": {"mm": (1e-3, 0.0), "cm": (1e-2, 0.0), "m": (1.0, 0.0), "in": (0.0254, 0.0)},
+}
+PRESSURES = {"N": ("N", 1.0), "mN": ("N", 1e-3), "kPa": ("Pa", 1e3), "Pa": ("Pa", 1.0), None: (None, 1.0)}
+
+
+def read(recording, taxels, axis=""):
+    """Raw values by frame and taxel, and which are missing: codes of [all] are so on every channel."""
+    raw, missing = recording.frames.of(taxels, axis)
+    codes = recording.calibration.get("all", {}).get("missing", [])
+    return raw, missing | np.isin(raw, np.array(codes, np.float32).astype(float))
+
+
+def sensed(recording, letter, taxels):
+    """By frame and taxel: the value, whether it is in the sensor's range, which are missing, which are faulty."""
+    file, body = recording.calibration, recording.body
+    raw, missing = read(recording, taxels)
+    keys = file.get(letter, {})
+    factor, offset = UNITS[letter][keys.get("unit", "°C" if letter == "temperature" else "mm")]
+    every = {"baseline": 0.0, "gain": 1.0, "raw_range": [-np.inf, np.inf]} | keys
+    values, inside, faulty = np.full(raw.shape, np.nan), np.ones(raw.shape, bool), ~np.isfinite(raw)
+    codes = np.isin(raw, np.array(keys.get("missing", []), np.float32).astype(float))
+    for column, taxel in enumerate(taxels):
+        own = every | file.get("taxel", {}).get(str(body.ids[taxel]), {})
+        # What a masked taxel reads is faulty, whatever it is.
+        codes[:, column] &= not own.get("mask")
+        if "ntc" in own and own.get("invert") and own["baseline"] == 0:
+            # Above its resistor.
+            own["baseline"] = own["ntc"]["full_raw"]
+        above = (own["baseline"] - raw[:, column]) if own.get("invert") else (raw[:, column] - own["baseline"])
+        if "ntc" in own and "curve" not in own:
+            ntc = own["ntc"]
+            with np.errstate(all="ignore"):
+                ohm = ntc["series_ohm"] * above / (ntc["full_raw"] - above)
+                response = 1 / (1 / 298.15 + np.log(ohm / ntc["ohm_at_25"]) / ntc["b_k"]) - 273.15
+            faulty[:, column] |= ~((above > 0) & (above < ntc["full_raw"]))
+        else:
+            response = interpolated(file["curve"][own["curve"]], above) if "curve" in own else above
+        values[:, column] = own["gain"] * factor * response + offset
+        inside[:, column] = (raw[:, column] >= own["raw_range"][0]) & (raw[:, column] <= own["raw_range"][1])
+        if own.get("mask"):
+            faulty[:, column] = True
+    missing = missing | codes
+    faulty &= ~missing
+    return values, inside, missing, faulty
+
+
+def arc(a, b, x):
+    """x, turned as the least turn from a to b does."""
+    axis, cosine = np.cross(a, b), a @ b
+    return x + np.cross(axis, x) + np.cross(axis, np.cross(axis, x)) / (1 + cosine)
