@@ -27,6 +27,8 @@ struct MappedTopic {
     reading: MessageReading,
     has_come: bool,
     damaged: u64,
+    /// Whether no message came, or the network is gone.
+    has_failed: bool,
     read_at: Option<Instant>,
 }
 
@@ -55,7 +57,17 @@ impl MappedTopic {
         let plan = plan(&kind, map)?;
         let reader = node.bytes_reader(topic, &kind, Delivery::BestEffort { depth: DEPTH })?;
         let reading = MessageReading::new(map, plan);
-        Ok(Self { name: name.to_owned(), kind, node, reader, reading, has_come: false, damaged: 0, read_at: None })
+        Ok(Self {
+            name: name.to_owned(),
+            kind,
+            node,
+            reader,
+            reading,
+            has_come: false,
+            damaged: 0,
+            has_failed: false,
+            read_at: None,
+        })
     }
 
     /// The bytes of the next message.
@@ -91,7 +103,9 @@ fn plan(kind: &str, map: &ArrayMap) -> Result<Plan> {
 
 impl Messages for MappedTopic {
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came> {
+        self.has_failed = true;
         let message = self.wait().map_err(|e| e.at(&self.name))?;
+        self.has_failed = false;
         self.read_at = Some(Instant::now());
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let came = FrameTime::from_ns(i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
@@ -102,6 +116,10 @@ impl Messages for MappedTopic {
                 Ok(Came::Damaged)
             }
         }
+    }
+
+    fn has_failed(&self) -> bool {
+        self.has_failed
     }
 
     fn named(&self) -> &[(String, usize)] {

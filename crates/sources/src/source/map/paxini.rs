@@ -379,6 +379,11 @@ impl Messages for PaxiniBoard {
         }
     }
 
+    /// Each of its errors is of the board: damaged frames are counted.
+    fn has_failed(&self) -> bool {
+        true
+    }
+
     fn named(&self) -> &[(String, usize)] {
         &self.sensors
     }
@@ -582,7 +587,8 @@ mod tests {
 
     fn opened(board: &Board) -> Result<MappedSource> {
         let map = ArrayMap::named("paxini").unwrap();
-        MappedSource::new(Box::new(on_line(board, &map)?), &map, false)
+        // What is wrong with a board is no message that could be skipped.
+        MappedSource::new(Box::new(on_line(board, &map)?), &map, true)
     }
 
     /// The next frame that is as wanted, of at most 2,000 and within a minute.
