@@ -217,9 +217,8 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     }
     let text = findings.calibration(&name_of(&body));
     // What is written must be what `run` takes; if it were not, nothing is written.
-    let ids = body.taxels.iter().map(|taxel| taxel.id);
-    let known: Vec<u32> = ids.filter(|id| findings.sensors.iter().any(|found| found.id == *id)).collect();
-    Calibration::parse(&text, &known).map_err(|e| e.at("the calibration that follows from this survey"))?;
+    let taxels: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+    Calibration::parse_for(&text, &taxels).map_err(|e| e.at("the calibration that follows from this survey"))?;
     to.write(text.as_bytes())?;
     if let Some(plot) = plot {
         plot.draw(|| findings.svg(), || findings.png())?;

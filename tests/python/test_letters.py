@@ -314,6 +314,29 @@ def test_touches_have_their_shear() -> None:
     assert np.array_equal(p.touches.to_pandas()[["shear_x", "shear_y", "shear_z"]], shear)
 
 
+def test_letters_are_measured_beside_pressures() -> None:
+    body = skin()
+    told = st.bench(body, backend="cpu", seconds=0.05)
+    assert "letters" not in told
+    # Each taxel is of a letter, and one with three axes of two.
+    kind = dict(zip(body.taxels["id"].tolist(), body.taxels["modality"].tolist(), strict=True))
+    members = [kind[id] for field in body.fields.values() for id in field.taxels.tolist()]
+    assert told["rate"] * told["us_median"] / 1e6 == pytest.approx(len(members) + members.count("force3"))
+    for letters, of in [("shear", 1), (["sustained", "shear"], 2), (["sustained", "change", "shear"], 3)]:
+        told = st.bench(body, {"max_gap_s": 2}, st.Calibration(CALIBRATION, body), "cpu", letters=letters, frames=4, seconds=0.05)  # type: ignore[arg-type]
+        assert told["letters"] == ([letters] if isinstance(letters, str) else letters)
+        assert told["rate"] * told["us_median"] / 4e6 == pytest.approx(of * members.count("force3")) and told["us_median_pressure"] > 0
+    told = st.bench(pad(), st.Scene(letters=["sustained"]), backend="cpu", letters="sustained", seconds=0.2)
+    assert 0.2 < told["us_median"] / told["us_median_pressure"] < 5
+    for body, letters, why in [
+        ("hand", "shear", "letter `shear` has no taxels"),
+        (pad(), "sheer", "did you mean `shear`"),
+        (pad(), [], "letters should have one letter or more"),
+    ]:
+        with pytest.raises(st.UsageError, match=why):
+            st.bench(body, letters=letters)  # type: ignore[arg-type]
+
+
 def test_hdf5_of_three_axes(tmp_path: pathlib.Path) -> None:
     h5py = pytest.importorskip("h5py")
     body, values = pad(), forces(10)
