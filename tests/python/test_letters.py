@@ -127,6 +127,30 @@ def test_values_of_three_axes_are_those_of_their_channels() -> None:
     assert pickle.loads(pickle.dumps(calibrated(body))).channels == body.channels
 
 
+def test_columns_of_a_table_are_by_their_names() -> None:
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    body, values = pad(), in_channels(forces(6))
+    t = 0.01 * np.arange(6)
+    wanted = calibrated(body).process(t, values)
+    # As files have them: the three of a taxel side by side.
+    names = [f"{id}{axis}" for id in range(COUNT) for axis in ("", ".u", ".v")]
+    order = [body.channels.index(name) for name in names]
+    table = pandas.DataFrame(values[:, order], columns=names)
+    for given in (table, polars.DataFrame({name: values[:, at] for name, at in zip(names, order, strict=True)}), pandas.DataFrame(values)):
+        assert same(calibrated(body).process(t, given), wanted)
+    assert same(calibrated(body).step(0.0, table.iloc[0]), calibrated(body).step(0.0, values[0]))
+    missing = np.zeros_like(values, dtype=bool)
+    missing[:, 4] = True
+    assert same(calibrated(body).process(t, table, missing[:, order]), calibrated(body).process(t, values, missing))
+    other = table.rename(columns={"3.v": "99.v"})
+    with pytest.raises(KeyError, match="values have a column of channel `99.v`; the engine's are 0, 1"):
+        calibrated(body).process(t, other)
+    with pytest.raises(KeyError, match="channel `3.u` is there twice"):
+        calibrated(body).process(t, table.rename(columns={"3.v": "3.u"}))
+    # Names of something else say nothing.
+    assert same(calibrated(body).process(t, pandas.DataFrame(values, columns=[f"pad {name}" for name in range(75)])), wanted)
+
+
 def test_a_mask_is_of_values_or_of_taxels() -> None:
     body, values = pad(), forces(6)
     t = 0.01 * np.arange(6)
@@ -312,6 +336,27 @@ def test_touches_have_their_shear() -> None:
     assert np.linalg.norm(p.touches["shear_in_chart"][0]) == pytest.approx(length, rel=1e-5)
     assert p.touches["slip_ratio"][0] == 2 * p.touches["friction"][0]
     assert np.array_equal(p.touches.to_pandas()[["shear_x", "shear_y", "shear_z"]], shear)
+
+
+def test_notebooks_show_what_each_letter_tells() -> None:
+    read = st.read("sensing-hand")
+    p = read.engine(backend="cpu").process(read.t, read.values)
+    shown = p._repr_html_()
+    for head in ("largest force [N]", "largest shear [N]", "warmest [°C]", "nearest [m]"):
+        assert f"<th>{head}</th>" in shown, shown
+    shear = np.linalg.norm(p.select("hand", letters="shear")["shear_vector"][:, 0], axis=1)
+    row = next(row for row in shown.split("<tr>") if "hand · shear" in row)
+    assert f"<td>{np.nanmax(shear):.4g}</td>" in row and row.count("<td></td>") == 3
+    alone = p.select(letters="proximity")._repr_html_()
+    assert "nearest [m]" in alone and "force" not in alone
+
+
+def test_a_bundled_body_is_simulated_with_its_senses() -> None:
+    touch = 'on = "hand/midhand/index"\nindenter = "ball"\nradius_m = 0.01\npath = [[0, 0]]\ntimes_s = [0]\nforce_newton = [[0, 2], [1, 2]]\nfriction = 0.5'
+    made = st.simulate(f'body = "sensing-hand"\nrate_hz = 20\nduration_s = 1\n[sensor]\nkind = "ideal"\n[[touch]]\n{touch}\n')
+    assert len(made.recording.channels) == 93 and made.recording.body.name == "sensing-hand"
+    p = made.recording.engine(backend="cpu").process(made.recording.t, made.recording.values)
+    assert set(p.letters) >= {"sustained", "shear"} and np.isfinite(p.select(letters="shear")["friction"]).any()
 
 
 def test_letters_are_measured_beside_pressures() -> None:
