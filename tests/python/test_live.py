@@ -12,7 +12,8 @@ import subprocess
 import threading
 import time
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -184,7 +185,7 @@ class Paxini:
         self.end, self.line = os.openpty()
         tty.setraw(self.line)
         self.name = f"paxini:{os.ttyname(self.line)}"
-        self.over, self.is_silent = threading.Event(), threading.Event()
+        self.over, self.is_silent, self.is_pressed = threading.Event(), threading.Event(), threading.Event()
         self.thread = threading.Thread(target=self.play, daemon=True)
         self.thread.start()
 
@@ -211,8 +212,9 @@ class Paxini:
                 sends = is_write and asked[4] == 0x17 and asked[8] == 1
                 os.write(self.end, self.summed(0xAA, 0x55, 0, asked[3], asked[4], 0, len(data), 0, *data))
             if sends and not self.is_silent.is_set():
+                harder = 100 if self.is_pressed.is_set() else 0
                 with contextlib.suppress(BlockingIOError):
-                    os.write(self.end, self.summed(0xAA, 0x56, 0, 13, 0, 0, *[0] * 6, 10, 246, 50, 20, 0, 30))
+                    os.write(self.end, self.summed(0xAA, 0x56, 0, 13, 0, 0, *[0] * 6, 10, 246, 50 + harder, 20, 0, 30 + harder))
 
     def close(self) -> None:
         self.over.set()
@@ -271,8 +273,40 @@ def test_ctrl_c_is_heard_while_a_device_does_not_answer() -> None:
             st.live(source=name, map="inspire", skip_bad=True)
 
 
+def when_free(call: Callable[[], Any]) -> Any:
+    """What `call` gives once the port is not taken any more, which takes a moment."""
+    until = time.monotonic() + 10
+    while True:
+        try:
+            return call()
+        except st.InputError as error:
+            if "does another program use it" not in str(error) or time.monotonic() > until:
+                raise
+        time.sleep(0.05)
+
+
 @pytest.mark.once
+@pytest.mark.filterwarnings("ignore")
+def test_a_port_is_free_when_its_loop_has_ended_also_where_nothing_comes(paxini: Paxini) -> None:
+    live = st.live(source=paxini.name, backend="cpu")
+    next(live)
+    paxini.is_silent.set()
+    time.sleep(1.5)
+    live.stop()
+    with pytest.raises(st.InputError, match="no answer at 921600 baud"):
+        when_free(lambda: st.live(source=paxini.name, backend="cpu"))
+
+
+@pytest.mark.once
+@pytest.mark.filterwarnings("ignore")
 def test_a_board_of_three_axes_is_calibrated(paxini: Paxini) -> None:
-    body = st.live(source=paxini.name, backend="cpu").body
-    with pytest.raises(st.SomaticError, match="pressed"):
-        st.calibrate(body, paxini.name, rest=0.5, press=0.5, say=lambda _: None)
+    with st.live(source=paxini.name, backend="cpu") as live:
+        body = live.body
+
+    def press(told: str) -> None:
+        if told.startswith("now press"):
+            paxini.is_pressed.set()
+
+    found = when_free(lambda: st.calibrate(body, paxini.name, rest=0.5, press=0.5, say=press))
+    assert found["travel"].tolist() == pytest.approx([10, 10]) and "shear_baseline = [1, -1]" in found.calibration.text
+    st.Engine(body, None, found.calibration, "cpu").step(0, [[5, 1, -1], [3, 2, 0]])

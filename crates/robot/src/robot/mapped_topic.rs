@@ -1,5 +1,7 @@
 //! Arrays within live messages of a topic of ROS 2, of any type that a map defines.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::defined::{MessageReading, Plan, is_usual, not_defined};
@@ -29,6 +31,7 @@ struct MappedTopic {
     damaged: u64,
     /// Whether no message came, or the network is gone.
     has_failed: bool,
+    stopped: Arc<AtomicBool>,
     read_at: Option<Instant>,
 }
 
@@ -66,17 +69,18 @@ impl MappedTopic {
             has_come: false,
             damaged: 0,
             has_failed: false,
+            stopped: Arc::default(),
             read_at: None,
         })
     }
 
-    /// The bytes of the next message.
-    fn wait(&mut self) -> Result<Vec<u8>> {
+    /// The bytes of the next message; `None` where nobody waits for one any more.
+    fn wait(&mut self) -> Result<Option<Vec<u8>>> {
         let since = Instant::now();
-        loop {
+        while !self.stopped.load(Ordering::Relaxed) {
             if let Some(message) = self.reader.next(WAIT)? {
                 self.has_come = true;
-                return Ok(message.0);
+                return Ok(Some(message.0));
             }
             if !self.has_come && since.elapsed() >= FIRST_WITHIN {
                 return Err(failed!(
@@ -87,6 +91,7 @@ impl MappedTopic {
                 ));
             }
         }
+        Ok(None)
     }
 }
 
@@ -106,6 +111,7 @@ impl Messages for MappedTopic {
         self.has_failed = true;
         let message = self.wait().map_err(|e| e.at(&self.name))?;
         self.has_failed = false;
+        let Some(message) = message else { return Ok(Came::End) };
         self.read_at = Some(Instant::now());
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let came = FrameTime::from_ns(i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
@@ -116,6 +122,10 @@ impl Messages for MappedTopic {
                 Ok(Came::Damaged)
             }
         }
+    }
+
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        self.stopped = Arc::clone(stopped);
     }
 
     fn has_failed(&self) -> bool {

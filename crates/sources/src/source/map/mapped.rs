@@ -1,5 +1,7 @@
 //! Frames from arrays within messages, wherever these come from.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::super::Source;
@@ -33,6 +35,9 @@ pub trait Messages {
     fn has_failed(&self) -> bool {
         false
     }
+
+    /// As [`Source::stop_by`]: then there is no other message.
+    fn stop_by(&mut self, _stopped: &Arc<AtomicBool>) {}
 
     /// The names of the last message's sensors, with how many values each has, or taxels with three axes; none where they have no names.
     fn named(&self) -> &[(String, usize)] {
@@ -234,6 +239,10 @@ impl Source for MappedSource {
         self.turned.iter().for_each(|&index| turn(&mut frame.values[index]));
         frame.set_time(time);
         Ok(true)
+    }
+
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        self.messages.stop_by(stopped);
     }
 
     fn progress(&self) -> Option<f64> {
