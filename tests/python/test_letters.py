@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import pathlib
 import pickle
 import subprocess
@@ -380,6 +381,22 @@ def test_letters_are_measured_beside_pressures() -> None:
     ]:
         with pytest.raises(st.UsageError, match=why):
             st.bench(body, letters=letters)  # type: ignore[arg-type]
+
+
+def test_messages_with_three_axes_are_read_for_a_body(tmp_path: pathlib.Path) -> None:
+    body, values = pad(), forces(5)
+    lines = [json.dumps({"t": 0.1 * at, "force": frame.astype(float).ravel().tolist()}) for at, frame in enumerate(values)]
+    (tmp_path / "frames.ndjson").write_text("\n".join(lines) + "\n")
+    (tmp_path / "map.toml").write_text('values = "force"\naxes = "nuv"\n')
+    keys: dict[str, Any] = {"map": str(tmp_path / "map.toml"), "body": body}
+    wanted = calibrated(body).process(0.1 * np.arange(5), values)
+    for skip_bad in (False, True):
+        read = st.read(tmp_path / "frames.ndjson", skip_bad=skip_bad, **keys)
+        assert same(read.engine(None, st.Calibration(CALIBRATION, body), "cpu").process(read.t, read.values), wanted)
+    with st.open(tmp_path / "frames.ndjson", seconds=0.25, **keys) as parts:
+        assert sum(len(part) for part in parts) == 5
+    with pytest.raises(st.SomaticError, match="a message has 25 taxels with three axes, and the body 0"):
+        st.read(tmp_path / "frames.ndjson", map=keys["map"], body=st.Body.grid(5, 5, PITCH))
 
 
 def test_hdf5_of_three_axes(tmp_path: pathlib.Path) -> None:
