@@ -73,6 +73,14 @@ impl Findings {
         median(&mut ids.filter_map(|id| self.shear_noise(id)).collect::<Vec<f64>>())
     }
 
+    /// Where gains of tangential values are from that no known force has told, in words.
+    pub(super) fn assumed_gains(&self) -> Option<String> {
+        let are_assumed = !self.curves.is_empty() && !self.with_axes.is_empty();
+        are_assumed.then(|| {
+            "no known force pulled along the skin: tangential values have the average gain of their curves, in [shear]".to_owned()
+        })
+    }
+
     /// Which axes have no baseline, in words.
     pub(super) fn unknown_axes(&self) -> Option<String> {
         let unknown: Vec<u32> =
@@ -245,7 +253,9 @@ mod tests {
                 let engine = Engine::new(&body, options);
                 assert!(engine.is_ok(), "{:?}\n{text}", engine.err());
                 let is_curved = text.contains("[curve.");
+                let is_told = found.remarks().join("\n").contains("no known force pulled along the skin");
                 curves += usize::from(is_curved);
+                assert_eq!(is_told, text.contains("[shear]\n#"));
                 assert_eq!(
                     text.contains("shear_gain") || text.contains("[shear]\n#"),
                     is_curved && kinds.iter().any(|(_, kind)| *kind == Force3)
