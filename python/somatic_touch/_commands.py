@@ -6,16 +6,20 @@ import csv
 import json
 import os
 import time
+import tomllib
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, TypedDict, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _native
 from ._columns import Table
+from ._errors import UsageError
 
 _Path: TypeAlias = str | os.PathLike[str]
 _Backend: TypeAlias = Literal["auto", "reference", "cpu", "gpu"]
+_Letter: TypeAlias = Literal["sustained", "change", "shear", "temperature", "proximity"]
 _Asked: TypeAlias = _native.Scene | dict[str, Any] | str | None
 
 
@@ -178,37 +182,99 @@ def bench(
     calibration: _native.Calibration | None = None,
     backend: _Backend | None = None,
     *,
+    letters: _Letter | Sequence[_Letter] | None = None,
     frames: int = 1,
     seconds: float = 1.0,
 ) -> dict[str, Any]:
     """How long a call takes on this machine, from frames in memory to percepts in memory, with every taxel pressed.
 
     `frames` is how many a call has: 1 as on a robot, more as in a recording. Gives `backend`, `calls`, `us_median` and `us_p99` of a call, and
-    `rate`, memberships (a sensor in a field in a frame) per second. `somatic bench` measures made-up skins; this measures yours, from Python.
+    `rate`, memberships (a sensor in a field in a frame, of one letter) per second. `somatic bench` measures made-up skins; this measures yours, from
+    Python. With `letters` these are measured, and the same body from pressures alone in turns with them, which takes `us_median_pressure`.
 
     >>> import somatic_touch as st
     >>> told = st.bench("hand", {"outputs": ["total"]}, backend="cpu", seconds=0.05)
     >>> told["backend"], told["calls"] > 2, told["us_median"] <= told["us_p99"]
     ('cpu', True, True)
+    >>> told = st.bench("sensing-hand", backend="cpu", letters=["sustained", "shear"], seconds=0.05)
+    >>> told["letters"], told["us_median_pressure"] > 0
+    (['sustained', 'shear'], True)
     """
     body = _of(body)
-    engine = _native.Engine(body, scene, calibration, backend, batch=frames)
-    fields = body.fields
-    members = sum(len(fields[name]) for name in engine.fields if name in fields)
-    values = np.random.default_rng(1).uniform(1, 1000, (frames, len(engine.channels))).astype(np.float32)
-    times = np.arange(frames) * 0.01
-    took: list[float] = []
+    if letters is None:
+        skins = [_Skin(body, _native.Engine(body, scene, calibration, backend, batch=frames), frames)]
+    else:
+        letters = [letters] if isinstance(letters, str) else list(letters)
+        if not letters:
+            raise UsageError("letters should have one letter or more, such as 'shear'")
+        asked = tomllib.loads((scene if isinstance(scene, _native.Scene) else _native.Scene(scene)).text)
+        # Of a taxel with three axes the first one is its pressure: what nobody reads is not in the frames.
+        pressed = [name for name, kind in _kinds(body) if "." not in name and kind in _READS["sustained"]]
+        both: list[tuple[Sequence[str], list[str] | None]] = [(letters, None), (["sustained"], pressed)]
+        skins = []
+        for of, taxels in both:
+            scene = _native.Scene({**asked, "letters": list(of)})
+            skins.append(_Skin(body, _native.Engine(body, scene, calibration, backend, taxels=taxels, batch=frames), frames))
     start = time.perf_counter()
-    while len(took) < 4 or time.perf_counter() - start < seconds:
-        times += frames * 0.01
-        began = time.perf_counter()
-        engine.process(times, values)
-        took.append(time.perf_counter() - began)
-    # The first one fetches memory.
-    us = 1e6 * np.array(took[1:])
+    while len(skins[0].took) < 4 or time.perf_counter() - start < seconds:
+        for skin in skins:
+            skin.call()
+    us = skins[0].us()
     median = float(np.median(us))
-    rate = 1e6 * members * frames / median
-    return {"backend": engine.backend, "calls": len(us), "us_median": median, "us_p99": float(np.quantile(us, 0.99)), "rate": rate}
+    told: dict[str, Any] = {
+        "backend": skins[0].engine.backend,
+        "calls": len(us),
+        "us_median": median,
+        "us_p99": float(np.quantile(us, 0.99)),
+        "rate": 1e6 * skins[0].members() * frames / median,
+    }
+    if letters is not None:
+        told |= {"letters": letters, "us_median_pressure": float(np.median(skins[1].us()))}
+    return told
+
+
+_READS = {
+    "sustained": {"pressure", "force3"},
+    "change": {"pressure", "force3"},
+    "shear": {"force3"},
+    "temperature": {"temperature"},
+    "proximity": {"proximity"},
+}
+"""By letter, the kinds of taxel that it is of."""
+
+
+def _kinds(body: _native.Body) -> list[tuple[str, str]]:
+    """The names of a body's channels, and what their taxels measure."""
+    taxels = body.taxels
+    kind = dict(zip(taxels["id"].tolist(), taxels["modality"].tolist(), strict=True))
+    return [(name, kind[int(name.split(".")[0])]) for name in body.channels]
+
+
+class _Skin:
+    """A body whose calls are measured."""
+
+    def __init__(self, body: _native.Body, engine: _native.Engine, frames: int) -> None:
+        self.body, self.engine = body, engine
+        self.values = np.random.default_rng(1).uniform(1, 1000, (frames, len(engine.channels))).astype(np.float32)
+        self.times = np.arange(frames) * 0.01
+        self.took: list[float] = []
+
+    def call(self) -> None:
+        self.times += len(self.times) * 0.01
+        began = time.perf_counter()
+        self.engine.process(self.times, self.values)
+        self.took.append(time.perf_counter() - began)
+
+    def us(self) -> npt.NDArray[np.float64]:
+        # The first one fetches memory.
+        return 1e6 * np.array(self.took[1:])
+
+    def members(self) -> int:
+        """How many taxels the fields have, each by its letter."""
+        fields, kind = self.body.fields, dict(_kinds(self.body))
+        # A field of several letters is called by each, too.
+        of = [(name if name in fields else name.rpartition(" · ")[0], letter) for name, letter in zip(self.engine.fields, self.engine.letters, strict=True)]
+        return sum(kind[str(id)] in _READS[letter] for name, letter in of for id in fields[name].taxels)
 
 
 def plot(

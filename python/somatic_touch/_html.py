@@ -13,6 +13,9 @@ import numpy.typing as npt
 from . import _native
 
 _MOST_ROWS = 10
+_PRESSED = ("force", "total", "peak")
+_MOST = {"sustained": _PRESSED, "change": _PRESSED, "shear": ("shear_vector", "shear"), "temperature": ("warmest", "temperature"), "proximity": ("nearest",)}
+"""By letter what its fields are told by, the first that was asked for."""
 
 
 def _number(value: float) -> str:
@@ -32,21 +35,23 @@ def _table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[object]],
 
 
 def percepts(p: _native.Percepts) -> str:
-    """The fields that are touched, for how long, and how hard."""
-    output = next((name for name in ("force", "total", "peak") if name in p), None)
+    """The fields that are touched, for how long, and how hard, warm or near."""
+    most_of = {letter: next((name for name in names if name in p), None) for letter, names in _MOST.items()}
     frames = p.contact.sum(axis=0)
     order = np.flatnonzero(frames)
-    heads = ["field", "frames in contact"]
-    if output is not None:
-        unit = p.unit(output)
-        heads.append(f"largest {output}" + ("" if unit == "1" else f" [{unit}]"))
+    letters = p.letters
+    columns = list(dict.fromkeys(name for letter, name in most_of.items() if name is not None and letter in letters))
+    # What is nearest and warmest is called so.
+    heads = [name if name in ("nearest", "warmest") else f"largest {name.removesuffix('_vector')}" for name in columns]
+    heads = [head if p.unit(name) == "1" else f"{head} [{p.unit(name)}]" for head, name in zip(heads, columns, strict=True)]
+    heads = ["field", "frames in contact", *heads]
     rows: list[Sequence[object]] = []
     for index in order[:_MOST_ROWS]:
-        row: list[object] = [p.fields[index], int(frames[index])]
-        if output is not None:
-            values = p[output][:, index][p.present(output)[:, index]]
-            row.append(_number(float(values.max())) if values.size else "")
-        rows.append(row)
+        own = most_of[letters[index]]
+        values = p[own][:, index][p.present(own)[:, index]] if own is not None else np.empty(0)
+        values = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
+        most = _number(float(values.min() if own == "nearest" else values.max())) if values.size else ""
+        rows.append([p.fields[index], int(frames[index]), *(most if name == own else "" for name in columns)])
     return _table(repr(p), heads, rows or [["none is touched", *[""] * (len(heads) - 1)]], max(0, len(order) - _MOST_ROWS))
 
 

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use pyo3::types::PyString;
 use serde_json::json;
 use somatic::internal::gains::GainsSurvey;
 use somatic::internal::run::{Arrival, Feed, ReadMode};
@@ -23,6 +22,7 @@ use crate::body::PyBody;
 use crate::calibration::PyCalibration;
 use crate::error::{OrRaise, interrupted, usage, warn};
 use crate::given::{Given, OpenSource};
+use crate::opening::text_of;
 use crate::progress::Progress;
 use crate::scene::PyScene;
 use crate::threads::free;
@@ -262,7 +262,7 @@ fn gather(
 
 /// What an export's values are in, as it says itself.
 fn unit_of(source: &Bound<'_, PyAny>, options: &VendorOptions) -> somatic::Result<UnitOfP> {
-    let text = source.cast::<PyString>().map_or_else(|_| String::new(), ToString::to_string);
+    let text = text_of(source).unwrap_or_default();
     let spec = text.parse::<SourceSpec>().map(|spec| spec.with_content(options));
     match spec {
         Ok(SourceSpec::Vendor(path)) => Ok(VendorSource::open(path, options)?.layout().unit),
@@ -289,7 +289,7 @@ pub(crate) fn calibrate(
     }
     let known = asked.known().or_raise(py)?;
     let options = asked.options().or_raise(py)?;
-    let ids = body.ids();
+    let ids = body.channels();
     let opened = OpenSource::new(py, source, &ids, &asked.lines(), &options)?;
     let channels = in_body(&body.inner, &*opened.source).or_raise(py)?;
     let survey = Survey::new(&channels).on(&body.inner).or_raise(py)?;
@@ -337,7 +337,7 @@ pub(crate) fn gains(
     map: Option<&str>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, String)> {
-    let ids = body.ids();
+    let ids = body.channels();
     let map = map.map(ArrayMap::named).transpose().map_err(|e| e.at("map")).or_raise(py)?;
     let options = VendorOptions { rate_hz, map, ..VendorOptions::default() };
     let OpenSource { mut source, is_live, .. } = OpenSource::new(py, source, &ids, &LineKeys::default(), &options)?;

@@ -61,10 +61,6 @@ impl PyBody {
         Channel::all_of(&self.inner)
     }
 
-    pub(crate) fn ids(&self) -> Vec<u32> {
-        self.inner.taxels.iter().map(|taxel| taxel.id).collect()
-    }
-
     pub(crate) fn bundled_or_file(name: &str) -> somatic::Result<Self> {
         match bundled::body(name) {
             Some(bytes) if !std::path::Path::new(name).is_file() => Self::of_bytes(name, bytes.to_vec()),

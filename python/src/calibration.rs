@@ -31,6 +31,15 @@ pub(crate) struct PyCalibration {
     of: (String, Vec<(u32, u32)>),
 }
 
+/// The taxels of a calibration that was pickled.
+#[derive(FromPyObject)]
+enum PickledTaxels {
+    /// Ids, and the numbers of what they measure.
+    WithKinds(Vec<(u32, u32)>),
+    /// Ids alone, as pickles had them while every taxel that was read was one of pressure.
+    Ids(Vec<u32>),
+}
+
 impl PyCalibration {
     pub(crate) fn of_text(text: &str, body: &PyBody) -> somatic::Result<Self> {
         let taxels = body.inner.taxels.iter().map(|taxel| (taxel.id, taxel.modality.code()));
@@ -138,7 +147,13 @@ impl PyCalibration {
 
     #[staticmethod]
     #[pyo3(name = "_of_parts")]
-    fn unpickled(py: Python<'_>, text: &str, body: String, taxels: Vec<(u32, u32)>) -> PyResult<Self> {
-        Self::of_parts(text, body, taxels).or_raise(py)
+    fn unpickled(py: Python<'_>, text: String, body: String, taxels: PickledTaxels) -> PyResult<Self> {
+        let taxels = match taxels {
+            PickledTaxels::WithKinds(taxels) => taxels,
+            PickledTaxels::Ids(ids) => ids.into_iter().map(|id| (id, Modality::Pressure.code())).collect(),
+        };
+        // As of those in recordings, nobody can change its text.
+        let (text, _) = Calibration::with_names_of_now(text);
+        Self::of_parts(&text, body, taxels).map_err(|e| e.at("a pickled calibration")).or_raise(py)
     }
 }

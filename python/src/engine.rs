@@ -146,7 +146,7 @@ impl PyEngine {
     /// metres, where links move. However a recording is cut into calls, its percepts are the same bits.
     ///
     /// `t` may have dates too: NumPy's, pandas', or a list of `datetime`; they become seconds since 1970, and those without a time zone are
-    /// in UTC. `values` may be a list of dicts, by taxel its value: what a dict does not have is missing. `joints` are positions of the body's
+    /// in UTC. `values` may be a table whose columns are named as `channels`, in any order, or a list of dicts, by taxel its value: what a dict does not have is missing. `joints` are positions of the body's
     /// joints by name, in rad or m, [] or [frames], which say where links are, as `Body.forward` does; poses of links come before them.
     ///
     /// If all taxels have three axes, `values` may be [frames, taxels, 3]: the forces along the normal, t and n × t, and a `mask` of the same

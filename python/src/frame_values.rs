@@ -66,6 +66,7 @@ pub(crate) fn values<'py>(
         let dtype = array.getattr("dtype")?.str()?;
         return Err(usage(py, format!("{}; this is of type {dtype}, which is not a number", expected())));
     }
+    let order = if three.is_none() { order_of(any, frames.is_some(), channels)? } else { None };
     let mut values = converted(&array, &kind)?;
     if let Some(mask) = mask {
         let missing = missing(mask, &leading, &got)?;
@@ -77,10 +78,49 @@ pub(crate) fn values<'py>(
             }
         }
     }
-    Ok(Values::Owned(match three {
-        Some(three) => side_by_side(&values, three),
-        None => values,
+    Ok(Values::Owned(match (three, order) {
+        (Some(three), _) => side_by_side(&values, three),
+        (None, Some(order)) => in_order(&values, &order),
+        (None, None) => values,
     }))
+}
+
+/// Which channel each column of a table such as pandas' is of, or each entry of a `Series`: None where they are in order, or have no names of
+/// channels.
+///
+/// # Errors
+/// They are named as channels, and others than the engine's.
+fn order_of(any: &Bound<'_, PyAny>, is_table: bool, channels: &Channels) -> PyResult<Option<Vec<usize>>> {
+    let names = any.getattr(if is_table { "columns" } else { "index" }).and_then(|names| names.try_iter());
+    let Ok(names) = names else { return Ok(None) };
+    let names = names.map(|name| name.ok()?.extract::<String>().ok());
+    let Some(names) = names.collect::<Option<Vec<String>>>() else { return Ok(None) };
+    let Some(numbers) = names.iter().map(|name| Channel::named(name)).collect::<Option<Vec<Channel>>>() else {
+        return Ok(None);
+    };
+    let index = channels.index();
+    let mut is_there = vec![false; channels.width()];
+    let mut order = Vec::with_capacity(numbers.len());
+    for (name, channel) in names.iter().zip(numbers) {
+        match index.get(&channel.0).copied() {
+            Some(place) if !std::mem::replace(&mut is_there[place], true) => order.push(place),
+            Some(_) => return Err(unknown_name(any.py(), format!("values: channel `{name}` is there twice"))),
+            None => {
+                let what = format!("values have a column of channel `{name}`; {}", channels.near(name));
+                return Err(unknown_name(any.py(), what));
+            }
+        }
+    }
+    Ok(order.iter().enumerate().any(|(at, place)| at != *place).then_some(order))
+}
+
+/// Rows of `values` by `order`, the place of each.
+fn in_order(values: &[RawValue], order: &[usize]) -> Vec<RawValue> {
+    let mut made = vec![RawValue::MISSING; values.len()];
+    for (to, from) in made.chunks_exact_mut(order.len()).zip(values.chunks_exact(order.len())) {
+        order.iter().zip(from).for_each(|(&place, &value)| to[place] = value);
+    }
+    made
 }
 
 /// The numbers of `array`, whose kind is `kind`, as raw values.

@@ -15,7 +15,7 @@ use crate::error::{OrRaise, usage, warn};
 use crate::opening::{Keys, Opening, body_of, text_of};
 use crate::recording::{Frames, PyRecording};
 use crate::simulation;
-use crate::threads::free;
+use crate::threads::{free, waiting};
 
 /// Frames in memory, as a source.
 pub(crate) struct InMemory {
@@ -123,7 +123,7 @@ pub(crate) struct OpenSource {
 }
 
 impl OpenSource {
-    /// Opens `source`, a recording, or one or several names, for a body whose taxels have `ids`; what is found out of lines of text is a
+    /// Opens `source`, a recording, or one or several names, for a body with the channels `ids`; what is found out of lines of text is a
     /// warning.
     pub(crate) fn new(
         py: Python<'_>,
@@ -140,33 +140,39 @@ impl OpenSource {
             Ok(name) => vec![name],
             Err(_) => source.try_iter()?.map(|name| text_of(&name?)).collect::<PyResult<_>>()?,
         };
-        let mut notices = Vec::new();
-        let opened = free(py, || {
-            let specs = names.iter().map(|name| name.parse()).collect::<Result<Vec<SourceSpec>>>()?;
-            let lines = keys.lines(&specs)?;
-            if !lines.is_empty() {
-                let source = keys.open(&lines, ids, None)?;
-                let lines = Some(source.lines());
-                return Ok(Self { source: Box::new(source), lines, is_live: true });
-            }
-            let Some(spec) = specs.into_iter().next() else { return Err(Error::usage("give a source")) };
-            if let SourceSpec::Text(place) = &spec {
-                spec.check_options(options)?;
-                let source =
-                    TextSource::open(place, options, &mut |what| notices.push(what.to_owned()))?.for_body(ids)?;
-                return Ok(Self { source: Box::new(source), lines: None, is_live: true });
-            }
-            let is_live = !spec.is_recording();
-            let spec = spec.with_content(options);
-            if options.map.is_some() {
-                let mut mapped = open_mapped(&spec, options)?;
-                notices.extend(mapped.take_notices());
-                return Ok(Self { source: Box::new(mapped.for_body(ids)?), lines: None, is_live });
-            }
-            Ok(Self { source: spec.open(ids, options)?, lines: None, is_live })
-        });
-        let opened = opened.or_raise(py)?;
+        let (ids, keys, options) = (ids.to_vec(), keys.clone(), options.clone());
+        // A board may not answer, or a device have no value yet.
+        let opened = waiting(py, move || Self::named(&names, &ids, &keys, &options));
+        let (opened, notices) = opened?.or_raise(py)?;
         warn(py, notices)?;
         Ok(opened)
+    }
+
+    /// The same of `names`; with what is to be said of it.
+    fn named(names: &[String], ids: &[u32], keys: &LineKeys, options: &VendorOptions) -> Result<(Self, Vec<String>)> {
+        let mut notices = Vec::new();
+        let specs = names.iter().map(|name| name.parse()).collect::<Result<Vec<SourceSpec>>>()?;
+        let ports = keys.lines(&specs)?;
+        if !ports.is_empty() {
+            let source = keys.open(&ports, ids, None)?;
+            let lines = Some(source.lines());
+            return Ok((Self { source: Box::new(source), lines, is_live: true }, notices));
+        }
+        let Some(spec) = specs.into_iter().next() else { return Err(Error::usage("give a source")) };
+        let is_live = !spec.is_recording();
+        let source: Box<dyn Source + Send> = match (&spec, &options.map) {
+            (SourceSpec::Text(place), _) => {
+                spec.check_options(options)?;
+                let mut say = |what: &str| notices.push(what.to_owned());
+                Box::new(TextSource::open(place, options, &mut say)?.for_body(ids)?)
+            }
+            (_, Some(_)) => {
+                let mut mapped = open_mapped(&spec.with_content(options), options)?;
+                notices.extend(mapped.take_notices());
+                Box::new(mapped.for_body(ids)?)
+            }
+            (_, None) => spec.with_content(options).open(ids, options)?,
+        };
+        Ok((Self { source, lines: None, is_live }, notices))
     }
 }

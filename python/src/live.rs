@@ -26,7 +26,7 @@ use crate::percepts::PyPercepts;
 use crate::scene::{PyScene, check_keys, table_of};
 use crate::session::Run;
 use crate::stream::in_python;
-use crate::threads::free;
+use crate::threads::{free, waiting};
 
 /// How long is waited for frames until Ctrl-C and `stop` are heard.
 const WAIT: Duration = Duration::from_millis(40);
@@ -280,7 +280,8 @@ pub(crate) fn open_live(
     let notices = Arc::new(Mutex::new(Vec::new()));
     let to = Arc::clone(&notices);
     let tell = Tell::new(move |line: &str| PyLive::lock(&to).push(line.to_owned()));
-    let opened = free(py, || {
+    // A board may not answer, or a topic have no message yet.
+    let opened = waiting(py, move || {
         scene.check()?;
         if !scene.sinks.is_empty() {
             return Err(Error::usage("`sink` is for the command; write percepts as they come, with `write`"));
@@ -290,7 +291,7 @@ pub(crate) fn open_live(
                 "a tolerance or a budget is met by measuring: give the options that `tradeoff` picks",
             ));
         }
-        let setup = Setup::new(scene.clone(), tell.clone());
+        let setup = Setup::new(scene, tell);
         let input = Input::named(&setup)?;
         let pace = Pace::for_input(&setup, &input, false);
         let options = |body: &somatic::Body| {
@@ -302,7 +303,7 @@ pub(crate) fn open_live(
         let files = attachments(&setup, &opened.body, None).unwrap_or_default();
         Ok((opened, files, input.name))
     });
-    let (opened, files, name) = opened.or_raise(py)?;
+    let (opened, files, name) = opened?.or_raise(py)?;
     warn(py, std::mem::take(&mut *PyLive::lock(&notices)))?;
     let Opened { body, engine, source, lines, pace, .. } = opened;
     let bytes = files.iter().find(|(_, kind, _)| kind == BODY).map(|(.., bytes)| bytes.clone()).unwrap_or_default();

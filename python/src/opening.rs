@@ -62,7 +62,8 @@ pub(crate) fn open(
     cut: Cut,
 ) -> somatic::Result<Opened> {
     let (own, calibration) = match spec {
-        _ if options.map.is_some() => return open_by_map(spec, body, options, cut),
+        // What is live has no end: a read of it would not return.
+        _ if options.map.is_some() && spec.is_recording() => return open_by_map(spec, body, options, cut),
         SourceSpec::Mcap(path) if options.skip_bad => {
             let what = "skip_bad is for CSV, exports and ROS 2 bags; leave it out here";
             return Err(Error::usage(what).at(path.display()));
@@ -96,7 +97,10 @@ pub(crate) fn open(
             return Err(Error::usage("it is a LeRobot dataset; read it with somatic_touch.lerobot.read").at(spec));
         }
         SourceSpec::Csv(_) => (None, None),
-        _ => return Err(Error::usage("only files are read here; give live frames to `Engine.step`")),
+        _ => {
+            let what = "only recordings are read here; somatic_touch.live gives percepts of it as its frames come";
+            return Err(Error::usage(what).at(spec));
+        }
     };
     // A recording's calibration is that of its body.
     let calibration = calibration.filter(|_| body.is_none() || matches!(spec, SourceSpec::Vendor(_)));
@@ -114,7 +118,7 @@ fn open_by_map(spec: &SourceSpec, body: Option<&PyBody>, options: &VendorOptions
         None => Some(PyBody::of_bytes("map.glb", open_mapped(spec, options)?.body()?)?),
         Some(_) => None,
     };
-    let (ids, again, kept) = (body.map(PyBody::ids), spec.clone(), options.clone());
+    let (ids, again, kept) = (body.map(PyBody::channels), spec.clone(), options.clone());
     let open = move || -> somatic::Result<Box<dyn Source + Send>> {
         let mapped = open_mapped(&again, &kept)?;
         Ok(Box::new(match &ids {

@@ -1,10 +1,16 @@
 //! Work without Python's lock, on threads that this process has.
 
-use std::process;
+use std::panic::resume_unwind;
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+use std::{process, thread};
 
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// How long is waited until Ctrl-C is heard.
+const WAIT: Duration = Duration::from_millis(40);
 
 /// The process that has imported the module, whose threads the library starts for itself.
 static IMPORTED_BY: OnceLock<u32> = OnceLock::new();
@@ -36,6 +42,32 @@ pub(crate) fn free<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> 
         Some(pool) => pool.install(work),
         None => work(),
     })
+}
+
+/// Runs `work`, which may wait for a board or a network, on a thread of its own.
+///
+/// # Errors
+/// What Python raises for a signal meanwhile, such as Ctrl-C; then `work` ends by itself, and what it made is dropped.
+pub(crate) fn waiting<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    let (sender, mut found) = sync_channel(1);
+    let thread = thread::spawn(move || {
+        let made = match threads_of_fork() {
+            Some(pool) => pool.install(work),
+            None => work(),
+        };
+        drop(sender.send(made));
+    });
+    loop {
+        let found = &mut found;
+        match py.detach(move || found.recv_timeout(WAIT)) {
+            Ok(made) => return Ok(made),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => match thread.join() {
+                Err(panic) => resume_unwind(panic),
+                Ok(()) => unreachable!("it sends what it made, or panics"),
+            },
+        }
+    }
 }
 
 /// Whether to go on: what Python raises for a signal is kept.

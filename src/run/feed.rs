@@ -1,5 +1,7 @@
 //! Reads a source on its own thread, so that a blocked read holds up neither who watches nor a clean end.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -71,6 +73,14 @@ pub struct Feed {
     spare: Sender<Vec<Frame>>,
     next: Option<Arrival>,
     most: usize,
+    /// That nobody waits for frames any more.
+    stopped: Arc<AtomicBool>,
+}
+
+impl Drop for Feed {
+    fn drop(&mut self) {
+        self.stopped.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Feed {
@@ -101,12 +111,14 @@ impl Feed {
     fn read_by(mut source: Box<dyn Source + Send>, mode: ReadMode, queue: Queue, with_losses: bool) -> Self {
         let (sender, arrivals) = queue;
         let (spare, used) = channel();
+        let stopped = Arc::default();
+        source.stop_by(&stopped);
         thread::spawn(move || {
             let end = read(&mut *source, mode, with_losses, &sender, &used);
             // The command may have ended already.
             let _ = sender.send(end);
         });
-        Self { arrivals, spare, next: None, most: mode.most }
+        Self { arrivals, spare, next: None, most: mode.most, stopped }
     }
 
     /// The next arrival, if it comes within `wait`.
@@ -258,6 +270,36 @@ mod tests {
             assert_eq!(times, [0.0, 1.0, 2.0, 3.0]);
             assert!(error.to_string().contains("oops"), "{error}");
         }
+    }
+
+    /// A source of which nothing comes until it is stopped.
+    struct Silent(Arc<AtomicBool>, Sender<()>);
+
+    impl Source for Silent {
+        fn taxels(&self) -> &[u32] {
+            &[4]
+        }
+
+        fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+            self.0 = Arc::clone(stopped);
+        }
+
+        fn next_frame(&mut self, _: &mut Frame) -> crate::error::Result<bool> {
+            while !self.0.load(Ordering::Relaxed) {
+                thread::sleep(Duration::from_millis(1));
+            }
+            self.1.send(()).unwrap();
+            Ok(false)
+        }
+    }
+
+    #[test]
+    fn a_source_that_nobody_reads_any_more_does_not_wait_for_ever() {
+        let (sender, ended) = channel();
+        let mut feed = Feed::start_live(Box::new(Silent(Arc::default(), sender)), 1);
+        assert!(feed.next(Duration::from_millis(20)).is_none() && ended.try_recv().is_err());
+        drop(feed);
+        assert!(ended.recv_timeout(Duration::from_secs(20)).is_ok());
     }
 
     #[test]

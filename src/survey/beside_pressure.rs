@@ -73,6 +73,14 @@ impl Findings {
         median(&mut ids.filter_map(|id| self.shear_noise(id)).collect::<Vec<f64>>())
     }
 
+    /// Where gains of tangential values are from that no known force has told, in words.
+    pub(super) fn assumed_gains(&self) -> Option<String> {
+        let are_assumed = !self.curves.is_empty() && !self.with_axes.is_empty();
+        are_assumed.then(|| {
+            "no known force pulled along the skin: tangential values have the average gain of their curves, in [shear]".to_owned()
+        })
+    }
+
     /// Which axes have no baseline, in words.
     pub(super) fn unknown_axes(&self) -> Option<String> {
         let unknown: Vec<u32> =
@@ -154,6 +162,113 @@ mod tests {
         assert_eq!(Some(first), calibration.taxels[0].noise);
         assert!((0.6..0.8).contains(&first) && (second - 1.0 / 12.0_f64.sqrt()).abs() < 1e-6, "{text}");
         assert!(Engine::new(&body, Options::default().calibration(calibration)).is_ok());
+    }
+
+    /// A sheet of taxels of these kinds, in a row.
+    fn row_of(kinds: &[Modality]) -> Body {
+        let cell = |(id, &kind): (usize, &Modality)| {
+            let mut cell = SheetCell::rectangle(id as u32, [0.01 * id as f64, 0.0], 0.01, 0.01);
+            cell.modality = kind;
+            cell.with_axes(kind == Modality::Force3)
+        };
+        let cells = kinds.iter().enumerate().map(cell).collect();
+        let bytes = sheets(&[Sheet::new("pad", cells)]).unwrap().to_bytes().unwrap();
+        Body::from_bytes("pad", &bytes).unwrap()
+    }
+
+    /// What is found where each taxel that feels pressure is pressed `presses` times, harder and harder, by which all its values rise or fall.
+    fn pressed_in_turns(
+        body: &Body,
+        ids: &[u32],
+        presses: usize,
+        invert: bool,
+        wishes: Wishes,
+    ) -> crate::survey::Findings {
+        let mut survey = Survey::new(ids).on(body).unwrap();
+        let toward = if invert { -1.0 } else { 1.0 };
+        let mut frame = |n: usize, pressed: Option<(u32, f64)>| {
+            let value = |&id: &u32| {
+                let (channel, noise) = (Channel(id), [0.0, 1.0, 0.0, -1.0][(n + id as usize) % 4]);
+                let depth = pressed.filter(|(taxel, _)| *taxel == channel.taxel()).map_or(0.0, |(_, depth)| depth);
+                RawValue::new((500.0 + noise + toward * depth * (1.0 + 0.1 * f64::from(channel.taxel()))).round())
+            };
+            let values: Vec<RawValue> = ids.iter().map(value).collect();
+            if pressed.is_some() { survey.press(&values) } else { survey.rest(&values) }
+        };
+        (0..300).for_each(|n| frame(n, None));
+        for taxel in body.taxels.iter().filter(|taxel| taxel.modality.is_pressed()) {
+            for press in 1..=presses {
+                (0..40).for_each(|n| frame(n, Some((taxel.id, f64::from(n.min(39 - n) as u32) * 4.0 * press as f64))));
+            }
+        }
+        survey.finish(wishes).unwrap()
+    }
+
+    #[test]
+    fn what_is_written_is_accepted_for_every_kind_of_taxel_and_form_of_curve() {
+        use Modality::{Force3, Other, Pressure, Proximity, Temperature};
+        let bodies: [&[Modality]; 6] = [
+            &[Pressure; 3],
+            &[Force3; 3],
+            &[Pressure, Force3],
+            &[Force3, Temperature, Proximity, Force3],
+            &[Temperature, Pressure, Proximity],
+            &[Other(9), Force3],
+        ];
+        let known: [Option<(&str, &str)>; 5] = [
+            None,
+            Some(("2N", "taxel")),
+            Some(("1N,2N,4.90333N", "taxel")),
+            Some(("2N", "field")),
+            Some(("1N,2N,4N", "field")),
+        ];
+        let mut curves = 0;
+        for ((kinds, known), invert) in bodies
+            .iter()
+            .flat_map(|kinds| known.map(|known| (kinds, known)))
+            .flat_map(|both| [true, false].map(|invert| (both, invert)))
+        {
+            let body = row_of(kinds);
+            let (all, normal): (Vec<u32>, Vec<u32>) =
+                (Channel::all_of(&body), body.taxels.iter().map(|taxel| taxel.id).collect());
+            for (ids, bits, equalise) in [(&all, None, false), (&all, Some(10), true), (&normal, None, false)] {
+                let presses =
+                    if known.is_some_and(|(forces, on)| forces.contains(',') && on == "taxel") { 3 } else { 1 };
+                let wishes = Wishes { bits, equalise, ..Wishes::default() };
+                let mut found = pressed_in_turns(&body, ids, presses, invert, wishes);
+                if let Some((forces, on)) = known {
+                    // One scale for all is found from as many presses as there are forces.
+                    match found.know(&forces.parse().unwrap(), on.parse().unwrap()) {
+                        Err(why) if on == "field" && forces.contains(',') => {
+                            assert!(why.to_string().contains("presses, and 3 forces") || why.is_usage(), "{why}");
+                            continue;
+                        }
+                        done => done.unwrap(),
+                    }
+                }
+                let text = found.calibration("pad");
+                let kinds: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+                let read = Calibration::parse_for(&text, &kinds).unwrap_or_else(|e| panic!("{e}\n{text}"));
+                let options = Options::default().backend(crate::BackendKind::Cpu).calibration(read.clone());
+                let engine = Engine::new(&body, options);
+                assert!(engine.is_ok(), "{:?}\n{text}", engine.err());
+                let is_curved = text.contains("[curve.");
+                let is_told = found.remarks().join("\n").contains("no known force pulled along the skin");
+                curves += usize::from(is_curved);
+                assert_eq!(is_told, text.contains("[shear]\n#"));
+                assert_eq!(
+                    text.contains("shear_gain") || text.contains("[shear]\n#"),
+                    is_curved && kinds.iter().any(|(_, kind)| *kind == Force3)
+                );
+                for (index, _) in kinds.iter().enumerate().filter(|(_, (_, kind))| is_curved && *kind == Force3) {
+                    // 4.90333 N at three presses of 76 raw units, and 10 % more from taxel to taxel.
+                    let gain = read.shear.gain_of(index, 1.0, 1.0) * read.taxels[index].gain.abs().recip();
+                    let wanted = 4.903_33 / (228.0 * (1.0 + 0.1 * f64::from(body.taxels[index].id)));
+                    assert!((gain / wanted - 1.0).abs() < 0.02, "{gain} {wanted}\n{text}");
+                }
+            }
+        }
+        assert!(curves >= 24, "{curves}");
     }
 
     #[test]

@@ -48,8 +48,19 @@ impl Findings {
             line("missing", format!("{:?}", self.missing));
         }
         let shear_noise = self.usual_shear_noise(sound().map(|found| found.id)).map(number);
+        let shear_gain =
+            self.curves.last().filter(|_| !self.with_axes.is_empty()).and_then(KnownCurve::gain).map(number);
+        if shear_noise.is_some() || shear_gain.is_some() {
+            text += "\n[shear]\n";
+        }
+        if let Some(gain) = shear_gain {
+            let _ = write!(
+                text,
+                "# As the heaviest known force has it, on average: none pulled along the skin.\ngain = {gain}\n"
+            );
+        }
         if let Some(noise) = shear_noise {
-            let _ = write!(text, "\n[shear]\nnoise = {noise}\n");
+            let _ = writeln!(text, "noise = {noise}");
         }
         for found in &self.sensors {
             let mut own: Vec<(&str, String)> = Vec::new();
@@ -73,6 +84,9 @@ impl Findings {
                 if let Some([u, v]) = self.shear_baseline(found.id) {
                     own.push(("shear_baseline", format!("[{u}, {v}]")));
                 }
+                if let Some(gain) = self.shear_gain(found).filter(|own| Some(*own) != shear_gain) {
+                    own.push(("shear_gain", gain.to_string()));
+                }
                 if let Some(noise) = self.shear_noise(found.id).map(number).filter(|own| Some(*own) != shear_noise) {
                     own.push(("shear_noise", noise.to_string()));
                 }
@@ -93,10 +107,19 @@ impl Findings {
 
     /// The P of `found` where it went `raw` units.
     fn p_of(&self, found: &Found, raw: f64) -> f64 {
-        let own = self.curves.iter().find(|curve| curve.id == Some(found.id));
-        let curve: Option<&KnownCurve> = own.or(self.curves.last());
-        let p = curve.map_or(raw, |curve| curve.at(raw));
+        let p = self.curve_of(found).map_or(raw, |curve| curve.at(raw));
         p * found.gain * self.scale.unwrap_or(1.0)
+    }
+
+    fn curve_of(&self, found: &Found) -> Option<&KnownCurve> {
+        self.curves.iter().find(|curve| curve.id == Some(found.id)).or(self.curves.last())
+    }
+
+    /// P for each raw unit of tangential values of `found`, if it has three axes and its curve says nothing of them. Without a curve it
+    /// is its gain.
+    fn shear_gain(&self, found: &Found) -> Option<f64> {
+        let curve = self.curve_of(found).filter(|_| self.with_axes.contains(&found.id))?;
+        Some(number(curve.gain()? * found.gain * self.scale.unwrap_or(1.0)))
     }
 }
 

@@ -140,6 +140,9 @@ impl Findings {
             continued(&mut knots, found.full);
             curves.push(KnownCurve { id: Some(found.id), knots });
         }
+        if curves.is_empty() {
+            return Err(Error::failed("no sensor was pressed, so that nothing is known of the force"));
+        }
         let middle = |knot: usize, part: usize| {
             let mut all: Vec<f64> = curves.iter().map(|curve| curve.knots[knot][part]).collect();
             median(&mut all)
@@ -164,7 +167,8 @@ pub(super) fn clear(presses: impl Iterator<Item = f64> + Clone, forces: &[f64]) 
 fn continued(knots: &mut Vec<[f64; 2]>, full: Option<f64>) {
     let ([from, low], [to, high]) = (knots[knots.len() - 2], knots[knots.len() - 1]);
     let end = full.filter(|&full| full > to).unwrap_or(2.0 * to);
-    knots.push([end, rounded(high + (end - to) * (high - low) / (to - from))]);
+    // Rounded to fewer digits than the force before has, it could be less.
+    knots.push([end, high + (end - to) * (high - low) / (to - from)]);
 }
 
 /// The factor that makes `wholes`, what presses were all together, the `forces` that follow each other; and how well it does. One
@@ -215,6 +219,10 @@ mod tests {
         let mut knots = curve.knots[..3].to_vec();
         continued(&mut knots, Some(250.0));
         assert_eq!(knots[3], [250.0, 5.5]);
+        // Just before its end it still rises.
+        let mut knots = vec![[0.0, 0.0], [100.0, 1.0], [200.0, 4.903_33]];
+        continued(&mut knots, Some(200.01));
+        assert!(knots[3][1] > knots[2][1], "{knots:?}");
     }
 
     #[test]

@@ -17,6 +17,12 @@ impl KnownCurve {
         low + (raw - from) * (high - low) / (to - from)
     }
 
+    /// The force for each raw unit up to the heaviest known one, N; what comes after that is no measurement.
+    pub(super) fn gain(&self) -> Option<f64> {
+        let [.., [raw, newtons], _] = self.knots[..] else { return None };
+        (raw > 0.0).then(|| newtons / raw)
+    }
+
     pub(super) fn name(&self) -> String {
         self.id.map_or_else(|| "usual".to_owned(), |id| format!("taxel_{id}"))
     }

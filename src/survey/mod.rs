@@ -21,20 +21,22 @@ pub mod press_order;
 mod presses;
 mod remarks;
 pub mod scale;
+mod travel;
 pub mod tuning;
 mod which_way;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use crate::Body;
+use crate::body::{Body, Modality, Taxel};
 use crate::error::{Error, Result};
 use crate::signal::{Channel, RawValue, UnitOfP};
 
-use self::at_rest::{MIN_TRAVEL_BANDS, chance_of, median, middle, movement_of, rest_of, sigma_of};
+use self::at_rest::{MIN_TRAVEL_BANDS, chance_of, median, movement_of, rest_of, sigma_of};
 use self::crosstalk::{Crosstalk, Leaks};
 use self::known_curve::KnownCurve;
 pub use self::presses::Press;
 use self::presses::Presses;
+use self::travel::{Pressed, travels};
 
 /// Maximum number of values kept per sensor; a longer rest is decimated by powers of two.
 const MAX_REST_VALUES: usize = 4096;
@@ -69,6 +71,8 @@ pub struct Survey {
     before_press: Vec<Option<(f64, f64)>>,
     whole_numbers: bool,
     apart: Option<Box<Apart>>,
+    /// Taxels with three axes, where the body says so.
+    with_axes: BTreeSet<u32>,
 }
 
 /// Where values are in a frame that no press shows, and what they deliver at rest.
@@ -81,36 +85,6 @@ struct Apart {
     /// The places of tangential ones of these taxels.
     tangential: Vec<usize>,
     survey: Survey,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Pressed {
-    last: [f32; 2],
-    seen: usize,
-    low: f32,
-    high: f32,
-}
-
-impl Default for Pressed {
-    fn default() -> Self {
-        Self { last: [0.0; 2], seen: 0, low: f32::INFINITY, high: f32::NEG_INFINITY }
-    }
-}
-
-impl Pressed {
-    fn see(&mut self, value: f32) {
-        if self.seen >= 2 {
-            let middle = middle(self.last[0], self.last[1], value);
-            (self.low, self.high) = (self.low.min(middle), self.high.max(middle));
-        }
-        self.last = [self.last[1], value];
-        self.seen += 1;
-    }
-
-    /// Whether it is nearer to `baseline` than to the end of its way of `travel` when the pressing ends.
-    fn came_back(&self, baseline: f64, travel: f64) -> bool {
-        (f64::from(self.last[1]) - baseline).abs() < travel / 2.0
-    }
 }
 
 /// What is wanted of a calibration.
@@ -175,6 +149,8 @@ pub struct Findings {
     pub tangential: BTreeMap<u32, Option<f64>>,
     /// By tangential channel, the standard deviation of its raw value at rest, where it delivered enough to tell.
     pub tangential_sigmas: BTreeMap<u32, f64>,
+    /// The body's taxels with three axes, which feel shear, whether or not the survey had their tangential values.
+    pub with_axes: BTreeSet<u32>,
 }
 
 impl Survey {
@@ -203,6 +179,7 @@ impl Survey {
             before_press: Vec::new(),
             whole_numbers: true,
             apart: None,
+            with_axes: BTreeSet::new(),
         }
     }
 
@@ -219,7 +196,9 @@ impl Survey {
             let what = "no taxel measures pressure, which a survey is of; write [temperature] and [proximity] by hand";
             return Err(Error::usage(what).at(&body.name));
         }
-        Ok(Self { leaks: Leaks::new(body, &new.ids)?, ..new })
+        let has_axes = |taxel: &&Taxel| taxel.modality == Modality::Force3;
+        let with_axes = body.taxels.iter().filter(has_axes).map(|taxel| taxel.id).collect();
+        Ok(Self { leaks: Leaks::new(body, &new.ids)?, with_axes, ..new })
     }
 
     /// Takes the values of a frame in which nothing touches the robot. Missing and faulty ones are left out.
@@ -378,6 +357,7 @@ impl Survey {
             forces_agree: None,
             tangential: self.apart.as_ref().map(|apart| apart.baselines()).unwrap_or_default(),
             tangential_sigmas: self.apart.as_ref().map(|apart| apart.sigmas()).unwrap_or_default(),
+            with_axes: self.with_axes.clone(),
         })
     }
 
@@ -415,16 +395,6 @@ impl Survey {
         let all = at_rest.chain(pressed.flat_map(|pressed| [pressed.low, pressed.high]));
         let (low, high) = all.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         (f64::from(high) - f64::from(low)).max(0.0)
-    }
-}
-
-/// How far a sensor went down and up from its baseline.
-fn travels(rest: &Option<(f64, f64)>, pressed: &Pressed) -> [f64; 2] {
-    match rest {
-        Some((baseline, _)) if pressed.seen > 2 => {
-            [(baseline - f64::from(pressed.low)).max(0.0), (f64::from(pressed.high) - baseline).max(0.0)]
-        }
-        _ => [0.0; 2],
     }
 }
 

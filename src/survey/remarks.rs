@@ -58,6 +58,7 @@ impl Findings {
             .chain(self.crosstalk.map(|found| found.to_string()))
             .chain(self.forces_agree.clone())
             .chain(self.unknown_axes())
+            .chain(self.assumed_gains())
             .collect()
     }
 

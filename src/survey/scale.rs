@@ -113,9 +113,11 @@ pub fn with_scale(text: &str, estimate: &ScaleEstimate) -> Result<String> {
         if estimate.becomes_newton && taxel.contains_key("unit") {
             return Err(Error::failed(format!("[taxel.{id}] has a unit of its own; remove it")));
         }
-        multiply(taxel, &["dead_band", "p_max"], scale);
+        multiply(taxel, &["dead_band", "p_max", "shear_gain"], scale);
     }
-    for (name, keys) in [("contact", &["on", "off"][..]), ("change", &["dead_band", "on", "off"])] {
+    // Gains of tangential values are P for each raw unit, and `scale` is for those of normal ones.
+    let tables = [("contact", &["on", "off"][..]), ("change", &["dead_band", "on", "off"]), ("shear", &["gain"])];
+    for (name, keys) in tables {
         let Some(table) = document.get_mut(name).and_then(Item::as_table_like_mut) else { continue };
         multiply(table, keys, scale);
         let fields = table.get_mut("field").and_then(Item::as_table_like_mut);
@@ -154,7 +156,7 @@ mod tests {
     #[test]
     fn a_scale_goes_into_a_calibration_with_what_is_counted_in_p() {
         let text = "# Mine.\n[all]\ngain = 2\ndead_band = 3 # counts\n\n[taxel.7]\ngain = 4.0\np_max = 800\n\n[contact]\non = 10\n\
-                    [contact.field.\"a\"]\non = 20\n";
+                    [contact.field.\"a\"]\non = 20\n[shear]\ngain = 3\n[taxel.3]\nshear_gain = 5\n";
         let estimate = ScaleEstimate { scale: 0.01, presses: 1, remark: String::new(), becomes_newton: true };
         let once = with_scale(text, &estimate).unwrap();
         assert!(once.contains("# Mine.") && once.contains("gain = 4.0"), "{once}");
@@ -162,6 +164,7 @@ mod tests {
         assert_eq!(read.taxels.iter().map(|taxel| taxel.gain).collect::<Vec<_>>(), [0.02, 0.04]);
         assert_eq!((read.taxels[1].dead_band, read.taxels[1].p_max), (0.03, 8.0));
         assert_eq!((read.contact.on, read.fields["a"].on), (0.1, 0.2));
+        assert_eq!([0, 1].map(|taxel| read.shear.gain_of(taxel, 1.0, 1.0)), [0.05, 0.03]);
         assert_eq!(read.taxels[0].quantity, Quantity::Newton);
         let twice =
             with_scale(&once, &ScaleEstimate { scale: 2.0, becomes_newton: false, ..estimate.clone() }).unwrap();

@@ -635,6 +635,10 @@ fn a_body_named_in_the_file_is_found_from_the_files_folder() {
     std::fs::write(folder.path().join("my.glb"), b"no glb").unwrap();
     let line = SimulatedSource::open(&path).err().unwrap().to_string();
     assert!(line.contains("a.toml: line 1, column 8: ") && line.contains("my.glb"), "{line}");
+    for name in somatic::bundled::BODIES {
+        let text = format!("body = \"{name}\"\nrate_hz = 10\nduration_s = 1\n");
+        assert_eq!(SimulatedSource::from_text("a.toml", &text, folder.path()).unwrap().body().name, name);
+    }
     assert!(SimulatedSource::open(folder.path().join("b.toml")).err().unwrap().kind() == somatic::ErrorKind::NotFound);
 }
 

@@ -56,7 +56,6 @@ ELSEWHERE = {
             "the command measures made-up skins; this measures a body, from Python",
         ),
         "outputs": "=scene",
-        "letters": "=scene",
         "calls": "=seconds",
         "json": ITS_RESULT,
     },

@@ -186,6 +186,31 @@ def test_what_does_not_change_is_pickled_copied_and_compared(thing) -> None:
         assert hash(again) == hash(thing)
 
 
+class Pickled:
+    """What pickles as a calibration did that an older version wrote."""
+
+    def __init__(self, *parts: object) -> None:
+        self.parts = parts
+
+    def __reduce__(self):
+        return st.Calibration._of_parts, self.parts  # type: ignore[attr-defined]
+
+
+def test_pickles_of_older_calibrations_load() -> None:
+    ids = BODY.taxels["id"].tolist()
+    again = pickle.loads(pickle.dumps(Pickled(CALIBRATION.text, "hand", ids)))
+    assert again == CALIBRATION and pickle.loads(pickle.dumps(again)) == CALIBRATION
+    touch = st.read("hand")
+    values = [touch.engine(None, given, "cpu").process(touch.t, touch.values)["total"] for given in (again, CALIBRATION)]
+    assert np.array_equal(*values, equal_nan=True)
+    renamed = pickle.loads(pickle.dumps(Pickled("[upkeep]\ncadence_s = 1\n", "hand", ids)))
+    assert renamed == st.Calibration(renamed.text, BODY) and "[drift]" in renamed.text
+    with pytest.raises(st.InputError, match=r"a pickled calibration: .*\[taxel.7\] names a taxel that the body does not have"):
+        pickle.loads(pickle.dumps(Pickled("[taxel.7]\ngain = 2", "hand", [1, 2])))
+    with pytest.raises(TypeError, match="taxels"):
+        pickle.loads(pickle.dumps(Pickled("", "hand", "all")))
+
+
 def test_what_differs_is_not_equal() -> None:
     assert st.Body.grid(2, 2, 0.01) != st.Body.grid(2, 3, 0.01) and st.Body.grid(2, 2, 0.01) == st.Body.grid(2, 2, 0.01)
     assert st.Calibration("", BODY) != CALIBRATION

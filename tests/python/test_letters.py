@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import pathlib
 import pickle
 import subprocess
@@ -125,6 +126,30 @@ def test_values_of_three_axes_are_those_of_their_channels() -> None:
     again = copy.copy(engine)
     assert again.channels == engine.channels and same(again.process(t + 1, values), engine.process(t + 1, values))
     assert pickle.loads(pickle.dumps(calibrated(body))).channels == body.channels
+
+
+def test_columns_of_a_table_are_by_their_names() -> None:
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    body, values = pad(), in_channels(forces(6))
+    t = 0.01 * np.arange(6)
+    wanted = calibrated(body).process(t, values)
+    # As files have them: the three of a taxel side by side.
+    names = [f"{id}{axis}" for id in range(COUNT) for axis in ("", ".u", ".v")]
+    order = [body.channels.index(name) for name in names]
+    table = pandas.DataFrame(values[:, order], columns=names)
+    for given in (table, polars.DataFrame({name: values[:, at] for name, at in zip(names, order, strict=True)}), pandas.DataFrame(values)):
+        assert same(calibrated(body).process(t, given), wanted)
+    assert same(calibrated(body).step(0.0, table.iloc[0]), calibrated(body).step(0.0, values[0]))
+    missing = np.zeros_like(values, dtype=bool)
+    missing[:, 4] = True
+    assert same(calibrated(body).process(t, table, missing[:, order]), calibrated(body).process(t, values, missing))
+    other = table.rename(columns={"3.v": "99.v"})
+    with pytest.raises(KeyError, match="values have a column of channel `99.v`; the engine's are 0, 1"):
+        calibrated(body).process(t, other)
+    with pytest.raises(KeyError, match="channel `3.u` is there twice"):
+        calibrated(body).process(t, table.rename(columns={"3.v": "3.u"}))
+    # Names of something else say nothing.
+    assert same(calibrated(body).process(t, pandas.DataFrame(values, columns=[f"pad {name}" for name in range(75)])), wanted)
 
 
 def test_a_mask_is_of_values_or_of_taxels() -> None:
@@ -312,6 +337,66 @@ def test_touches_have_their_shear() -> None:
     assert np.linalg.norm(p.touches["shear_in_chart"][0]) == pytest.approx(length, rel=1e-5)
     assert p.touches["slip_ratio"][0] == 2 * p.touches["friction"][0]
     assert np.array_equal(p.touches.to_pandas()[["shear_x", "shear_y", "shear_z"]], shear)
+
+
+def test_notebooks_show_what_each_letter_tells() -> None:
+    read = st.read("sensing-hand")
+    p = read.engine(backend="cpu").process(read.t, read.values)
+    shown = p._repr_html_()
+    for head in ("largest force [N]", "largest shear [N]", "warmest [°C]", "nearest [m]"):
+        assert f"<th>{head}</th>" in shown, shown
+    shear = np.linalg.norm(p.select("hand", letters="shear")["shear_vector"][:, 0], axis=1)
+    row = next(row for row in shown.split("<tr>") if "hand · shear" in row)
+    assert f"<td>{np.nanmax(shear):.4g}</td>" in row and row.count("<td></td>") == 3
+    alone = p.select(letters="proximity")._repr_html_()
+    assert "nearest [m]" in alone and "force" not in alone
+
+
+def test_a_bundled_body_is_simulated_with_its_senses() -> None:
+    touch = 'on = "hand/midhand/index"\nindenter = "ball"\nradius_m = 0.01\npath = [[0, 0]]\ntimes_s = [0]\nforce_newton = [[0, 2], [1, 2]]\nfriction = 0.5'
+    made = st.simulate(f'body = "sensing-hand"\nrate_hz = 20\nduration_s = 1\n[layer]\nthickness_m = 0.005\n[sensor]\nkind = "ideal"\n[[touch]]\n{touch}\n')
+    assert len(made.recording.channels) == 93 and made.recording.body.name == "sensing-hand"
+    p = made.recording.engine(backend="cpu").process(made.recording.t, made.recording.values)
+    assert set(p.letters) >= {"sustained", "shear"} and np.isfinite(p.select(letters="shear")["friction"]).any()
+
+
+def test_letters_are_measured_beside_pressures() -> None:
+    body = skin()
+    told = st.bench(body, backend="cpu", seconds=0.05)
+    assert "letters" not in told
+    # Each taxel is of a letter, and one with three axes of two.
+    kind = dict(zip(body.taxels["id"].tolist(), body.taxels["modality"].tolist(), strict=True))
+    members = [kind[id] for field in body.fields.values() for id in field.taxels.tolist()]
+    assert told["rate"] * told["us_median"] / 1e6 == pytest.approx(len(members) + members.count("force3"))
+    for letters, of in [("shear", 1), (["sustained", "shear"], 2), (["sustained", "change", "shear"], 3)]:
+        told = st.bench(body, {"max_gap_s": 2}, st.Calibration(CALIBRATION, body), "cpu", letters=letters, frames=4, seconds=0.05)  # type: ignore[arg-type]
+        assert told["letters"] == ([letters] if isinstance(letters, str) else letters)
+        assert told["rate"] * told["us_median"] / 4e6 == pytest.approx(of * members.count("force3")) and told["us_median_pressure"] > 0
+    told = st.bench(pad(), st.Scene(letters=["sustained"]), backend="cpu", letters="sustained", seconds=0.2)
+    assert 0.2 < told["us_median"] / told["us_median_pressure"] < 5
+    for body, letters, why in [
+        ("hand", "shear", "letter `shear` has no taxels"),
+        (pad(), "sheer", "did you mean `shear`"),
+        (pad(), [], "letters should have one letter or more"),
+    ]:
+        with pytest.raises(st.UsageError, match=why):
+            st.bench(body, letters=letters)  # type: ignore[arg-type]
+
+
+def test_messages_with_three_axes_are_read_for_a_body(tmp_path: pathlib.Path) -> None:
+    body, values = pad(), forces(5)
+    lines = [json.dumps({"t": 0.1 * at, "force": frame.astype(float).ravel().tolist()}) for at, frame in enumerate(values)]
+    (tmp_path / "frames.ndjson").write_text("\n".join(lines) + "\n")
+    (tmp_path / "map.toml").write_text('values = "force"\naxes = "nuv"\n')
+    keys: dict[str, Any] = {"map": str(tmp_path / "map.toml"), "body": body}
+    wanted = calibrated(body).process(0.1 * np.arange(5), values)
+    for skip_bad in (False, True):
+        read = st.read(tmp_path / "frames.ndjson", skip_bad=skip_bad, **keys)
+        assert same(read.engine(None, st.Calibration(CALIBRATION, body), "cpu").process(read.t, read.values), wanted)
+    with st.open(tmp_path / "frames.ndjson", seconds=0.25, **keys) as parts:
+        assert sum(len(part) for part in parts) == 5
+    with pytest.raises(st.SomaticError, match="a message has 25 taxels with three axes, and the body 0"):
+        st.read(tmp_path / "frames.ndjson", map=keys["map"], body=st.Body.grid(5, 5, PITCH))
 
 
 def test_hdf5_of_three_axes(tmp_path: pathlib.Path) -> None:

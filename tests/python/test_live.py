@@ -7,10 +7,13 @@ import json
 import os
 import pathlib
 import pickle
+import socket
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+import tty
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -173,3 +176,137 @@ def test_what_makes_no_sense_is_one_line(tmp_path: pathlib.Path) -> None:
         assert "\n" not in str(raised.value)
     with pytest.raises(st.UsageError, match="not both"):
         st.live(tmp_path / "a.toml", body="hand")
+
+
+class Paxini:
+    """A board of PaXini with the tip of an index finger of two taxels: it sends frames until it is silent, or is never heard of at all."""
+
+    def __init__(self) -> None:
+        self.end, self.line = os.openpty()
+        tty.setraw(self.line)
+        self.name = f"paxini:{os.ttyname(self.line)}"
+        self.over, self.is_silent, self.is_pressed = threading.Event(), threading.Event(), threading.Event()
+        self.thread = threading.Thread(target=self.play, daemon=True)
+        self.thread.start()
+
+    @staticmethod
+    def summed(*parts: int) -> bytes:
+        return bytes([*parts, -sum(parts) % 256])
+
+    def play(self) -> None:
+        os.set_blocking(self.end, False)
+        request, sends = b"", False
+        while not self.over.wait(0.005):
+            with contextlib.suppress(BlockingIOError):
+                request += os.read(self.end, 100)
+            while len(request) >= (wanted := 9 + (request[3:4] == b"\x10")):
+                asked, request = request[:wanted], request[wanted:]
+                if self.is_silent.is_set():
+                    continue
+                is_write = asked[3] == 0x10
+                data = [0] * (1 if is_write else asked[6])
+                if asked[4] == 0x10:
+                    data[0] = 0b100_0000
+                elif asked[4] == 0x30:
+                    data[12] = 2
+                sends = is_write and asked[4] == 0x17 and asked[8] == 1
+                os.write(self.end, self.summed(0xAA, 0x55, 0, asked[3], asked[4], 0, len(data), 0, *data))
+            if sends and not self.is_silent.is_set():
+                harder = 100 if self.is_pressed.is_set() else 0
+                with contextlib.suppress(BlockingIOError):
+                    os.write(self.end, self.summed(0xAA, 0x56, 0, 13, 0, 0, *[0] * 6, 10, 246, 50 + harder, 20, 0, 30 + harder))
+
+    def close(self) -> None:
+        self.over.set()
+        self.thread.join()
+        os.close(self.line)
+        os.close(self.end)
+
+
+@pytest.fixture
+def paxini() -> Iterator[Paxini]:
+    board = Paxini()
+    yield board
+    board.close()
+
+
+@pytest.mark.once
+@pytest.mark.filterwarnings("ignore")
+def test_ctrl_c_ends_a_board_of_three_axes_that_is_silent(paxini: Paxini) -> None:
+    live = st.live(source=paxini.name, backend="cpu")
+    assert live.channels == ["0.u", "0.v", "0", "1.u", "1.v", "1"] and live.body.taxels["modality"].tolist() == ["force3"] * 2
+    p = next(p for p in live if np.isfinite(p["shear"]).any()).select("index_tip")
+    assert p.letters == ["sustained", "shear"] and p["total"][0, 0] == pytest.approx(8) and p["shear"][0, 1] == pytest.approx([3, -1])
+    paxini.is_silent.set()
+    with ctrl_c(2.5):
+        for _ in live:
+            pass
+    assert not list(live)
+
+
+@pytest.mark.once
+def test_what_is_live_is_not_read_to_an_end_that_never_comes(paxini: Paxini, tmp_path: pathlib.Path) -> None:
+    begin = time.perf_counter()
+    for source in (paxini.name, "modbus://127.0.0.1:9", "ros2:/skin"):
+        for call in (st.read, st.open, lambda source, **keys: st.convert(source, tmp_path / "a.mcap", **keys)):
+            keys = {} if source.startswith("paxini") else {"map": "inspire"}
+            with pytest.raises(st.UsageError, match="only recordings are read here; somatic_touch.live gives percepts of it") as raised:
+                call(source, **keys)  # type: ignore[operator]
+            assert source in str(raised.value) and "\n" not in str(raised.value)
+    for skip_bad in (False, True):
+        with pytest.raises(st.UsageError, match="only recordings"):
+            st.read(paxini.name, map="paxini", skip_bad=skip_bad)
+    with pytest.raises(st.UsageError, match="only recordings"):
+        st.run(paxini.name, tmp_path / "a.csv", body=SENSORS)
+    assert time.perf_counter() - begin < 2 and not list(tmp_path.iterdir())
+
+
+@pytest.mark.once
+def test_ctrl_c_is_heard_while_a_device_does_not_answer() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as device:
+        name = f"modbus://127.0.0.1:{device.getsockname()[1]}"
+        with ctrl_c():
+            st.live(source=name, map="inspire")
+        with ctrl_c():
+            st.calibrate(st.Body.grid(1, 1, 0.01), name, map="inspire")
+        with pytest.raises(st.InputError, match="no answer within 3 s"):
+            st.live(source=name, map="inspire", skip_bad=True)
+
+
+def when_free(call: Callable[[], Any]) -> Any:
+    """What `call` gives once the port is not taken any more, which takes a moment."""
+    until = time.monotonic() + 10
+    while True:
+        try:
+            return call()
+        except st.InputError as error:
+            if "does another program use it" not in str(error) or time.monotonic() > until:
+                raise
+        time.sleep(0.05)
+
+
+@pytest.mark.once
+@pytest.mark.filterwarnings("ignore")
+def test_a_port_is_free_when_its_loop_has_ended_also_where_nothing_comes(paxini: Paxini) -> None:
+    live = st.live(source=paxini.name, backend="cpu")
+    next(live)
+    paxini.is_silent.set()
+    time.sleep(1.5)
+    live.stop()
+    with pytest.raises(st.InputError, match="no answer at 921600 baud"):
+        when_free(lambda: st.live(source=paxini.name, backend="cpu"))
+
+
+@pytest.mark.once
+@pytest.mark.filterwarnings("ignore")
+def test_a_board_of_three_axes_is_calibrated(paxini: Paxini) -> None:
+    with st.live(source=paxini.name, backend="cpu") as live:
+        body = live.body
+
+    def press(told: str) -> None:
+        if told.startswith("now press"):
+            paxini.is_pressed.set()
+
+    found = when_free(lambda: st.calibrate(body, paxini.name, rest=0.5, press=0.5, say=press))
+    assert found["travel"].tolist() == pytest.approx([10, 10]) and "shear_baseline = [1, -1]" in found.calibration.text
+    st.Engine(body, None, found.calibration, "cpu").step(0, [[5, 1, -1], [3, 2, 0]])

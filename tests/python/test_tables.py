@@ -129,7 +129,7 @@ def test_recordings(somatic, touch: st.Recording, tmp_path: pathlib.Path) -> Non
         st.read(ROOT / "bodies" / "touch.csv").engine()
     with pytest.raises(st.UsageError, match="simulate"):
         st.read("sim:a.toml")
-    with pytest.raises(st.UsageError, match="step"):
+    with pytest.raises(st.UsageError, match="somatic_touch.live gives"):
         st.read("serial:/dev/ttyUSB0")
     bad = tmp_path / "bad.csv"
     bad.write_text("t,0,1\n0,1,2\n1,oops,3\n")

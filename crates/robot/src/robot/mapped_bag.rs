@@ -14,6 +14,8 @@ struct MappedBag {
     kind: String,
     bag: BagReader,
     reading: MessageReading,
+    /// Whether the bag could not be read any more.
+    has_failed: bool,
 }
 
 /// Frames from arrays within the messages of `bag`, by `map`, which names the topic or its type. Where it names neither, it is the
@@ -31,6 +33,7 @@ pub fn mapped_bag(bag: &BagName, map: &ArrayMap, skip_bad: bool) -> Result<Mappe
         kind: topic.kind,
         bag: reader,
         reading: MessageReading::new(map, plan),
+        has_failed: false,
     };
     MappedSource::new(Box::new(messages), map, skip_bad)
 }
@@ -106,7 +109,10 @@ fn plan(topic: &DefinedTopic, map: &ArrayMap) -> Result<Plan> {
 
 impl Messages for MappedBag {
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came> {
-        let Some(message) = self.bag.next_message()? else { return Ok(Came::End) };
+        self.has_failed = true;
+        let message = self.bag.next_message()?;
+        self.has_failed = false;
+        let Some(message) = message else { return Ok(Came::End) };
         let (bytes, log) = (message.data.len(), time_of(message.log_ns));
         let read = self.reading.read(message.data, log, values);
         match read.map_err(|e| e.at(format!("{}: the message of {} s", self.name, log.s)))? {
@@ -119,6 +125,10 @@ impl Messages for MappedBag {
                 Ok(Came::Damaged)
             }
         }
+    }
+
+    fn has_failed(&self) -> bool {
+        self.has_failed
     }
 
     fn named(&self) -> &[(String, usize)] {

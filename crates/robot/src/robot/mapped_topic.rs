@@ -1,5 +1,7 @@
 //! Arrays within live messages of a topic of ROS 2, of any type that a map defines.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::defined::{MessageReading, Plan, is_usual, not_defined};
@@ -27,6 +29,9 @@ struct MappedTopic {
     reading: MessageReading,
     has_come: bool,
     damaged: u64,
+    /// Whether no message came, or the network is gone.
+    has_failed: bool,
+    stopped: Arc<AtomicBool>,
     read_at: Option<Instant>,
 }
 
@@ -55,16 +60,27 @@ impl MappedTopic {
         let plan = plan(&kind, map)?;
         let reader = node.bytes_reader(topic, &kind, Delivery::BestEffort { depth: DEPTH })?;
         let reading = MessageReading::new(map, plan);
-        Ok(Self { name: name.to_owned(), kind, node, reader, reading, has_come: false, damaged: 0, read_at: None })
+        Ok(Self {
+            name: name.to_owned(),
+            kind,
+            node,
+            reader,
+            reading,
+            has_come: false,
+            damaged: 0,
+            has_failed: false,
+            stopped: Arc::default(),
+            read_at: None,
+        })
     }
 
-    /// The bytes of the next message.
-    fn wait(&mut self) -> Result<Vec<u8>> {
+    /// The bytes of the next message; `None` where nobody waits for one any more.
+    fn wait(&mut self) -> Result<Option<Vec<u8>>> {
         let since = Instant::now();
-        loop {
+        while !self.stopped.load(Ordering::Relaxed) {
             if let Some(message) = self.reader.next(WAIT)? {
                 self.has_come = true;
-                return Ok(message.0);
+                return Ok(Some(message.0));
             }
             if !self.has_come && since.elapsed() >= FIRST_WITHIN {
                 return Err(failed!(
@@ -75,6 +91,7 @@ impl MappedTopic {
                 ));
             }
         }
+        Ok(None)
     }
 }
 
@@ -91,7 +108,10 @@ fn plan(kind: &str, map: &ArrayMap) -> Result<Plan> {
 
 impl Messages for MappedTopic {
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came> {
+        self.has_failed = true;
         let message = self.wait().map_err(|e| e.at(&self.name))?;
+        self.has_failed = false;
+        let Some(message) = message else { return Ok(Came::End) };
         self.read_at = Some(Instant::now());
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let came = FrameTime::from_ns(i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
@@ -102,6 +122,14 @@ impl Messages for MappedTopic {
                 Ok(Came::Damaged)
             }
         }
+    }
+
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        self.stopped = Arc::clone(stopped);
+    }
+
+    fn has_failed(&self) -> bool {
+        self.has_failed
     }
 
     fn named(&self) -> &[(String, usize)] {

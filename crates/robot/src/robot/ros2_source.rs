@@ -1,5 +1,7 @@
 //! Live frames from a topic of ROS 2: a cloud of points, or numbers in the order of the body's taxels.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::messages::{Float32MultiArray, Message, PointCloud2};
@@ -26,6 +28,7 @@ pub struct Ros2Source {
     _node: Node,
     topic: Topic,
     places: Places,
+    stopped: Arc<AtomicBool>,
     /// The system's time of the last message.
     read_at: Option<Instant>,
 }
@@ -60,7 +63,7 @@ impl Ros2Source {
             Float32MultiArray::TYPE => Topic::Arrays(node.reader(topic, &kind, delivery)?),
             _ => return Err(not_read(&kind)),
         };
-        Ok(Self { name, _node: node, topic, places: Places::new(body), read_at: None })
+        Ok(Self { name, _node: node, topic, places: Places::new(body), stopped: Arc::default(), read_at: None })
     }
 }
 
@@ -90,8 +93,12 @@ impl Source for Ros2Source {
         self.places.ids()
     }
 
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        self.stopped = Arc::clone(stopped);
+    }
+
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
-        loop {
+        while !self.stopped.load(Ordering::Relaxed) {
             let read = match &mut self.topic {
                 Topic::Clouds(reader) => {
                     reader.next(WAIT)?.map(|cloud| self.places.cloud(&cloud, cloud.header.stamp.frame_time(), frame))
@@ -111,6 +118,7 @@ impl Source for Ros2Source {
                 return read.map(|()| true).map_err(|e| e.at(&self.name));
             }
         }
+        Ok(false)
     }
 
     fn read_at(&mut self) -> Option<Instant> {

@@ -67,6 +67,8 @@ pub use spec::SourceSpec;
 pub use text::{FrameEnd, TextColumns, TextIds, TextOptions, TextPlace, TextSource, TextTime, TimeColumnName};
 pub use vendor::{Cell, Layout, Panel, VendorFormat, VendorOptions, VendorSource};
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use crate::error::Result;
@@ -91,6 +93,14 @@ pub trait Source {
     /// As [`wrapped`](Self::wrapped); both or neither.
     fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
         None
+    }
+
+    /// Has a read that waits for frames end once `stopped` is set, from any thread, as if there were no other one: nobody reads them then. What
+    /// reads to an end by itself does not heed it.
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        if let Some(source) = self.wrapped_mut() {
+            source.stop_by(stopped);
+        }
     }
 
     /// The share of the input that has been read, 0..=1, if known.

@@ -45,6 +45,8 @@ pub struct JsonLines {
     start: Instant,
     read_at: Option<Instant>,
     losses: Vec<String>,
+    /// Whether the last read went wrong.
+    has_failed: bool,
 }
 
 somatic_skin::debug_by_name!(JsonLines);
@@ -73,6 +75,7 @@ impl JsonLines {
             start: Instant::now(),
             read_at: None,
             losses: Vec::new(),
+            has_failed: false,
         }
     }
 
@@ -99,6 +102,7 @@ impl JsonLines {
             self.line.clear();
             self.line_number += 1;
             let most = (&mut self.reader).take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut self.line);
+            self.has_failed = most.is_err();
             let read = most.map_err(|e| Error::failed(e.to_string()))?;
             self.read_at = self.length.is_none().then(Instant::now);
             self.read += read as u64;
@@ -220,6 +224,10 @@ impl Messages for JsonLines {
             }
             return Ok(Came::Message(time));
         }
+    }
+
+    fn has_failed(&self) -> bool {
+        self.has_failed
     }
 
     fn named(&self) -> &[(String, usize)] {

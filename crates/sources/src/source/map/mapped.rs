@@ -1,5 +1,7 @@
 //! Frames from arrays within messages, wherever these come from.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::super::Source;
@@ -28,6 +30,14 @@ pub trait Messages {
     /// # Errors
     /// It cannot be read, or has not what the map says.
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came>;
+
+    /// Whether its last error is of what sends messages, and not of one message: the next ones would be errors too, so that it is never skipped.
+    fn has_failed(&self) -> bool {
+        false
+    }
+
+    /// As [`Source::stop_by`]: then there is no other message.
+    fn stop_by(&mut self, _stopped: &Arc<AtomicBool>) {}
 
     /// The names of the last message's sensors, with how many values each has, or taxels with three axes; none where they have no names.
     fn named(&self) -> &[(String, usize)] {
@@ -157,6 +167,7 @@ impl MappedSource {
                     let error = what.at(format!("{}: the message of {} s", self.messages.name(), time.s));
                     ("another number of values", error)
                 }
+                Err(e) if self.messages.has_failed() => return Err(e),
                 Err(e) => ("not what the map says", e),
             };
             self.skipped.skip("message", wrong.0, wrong.1)?;
@@ -230,6 +241,10 @@ impl Source for MappedSource {
         Ok(true)
     }
 
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        self.messages.stop_by(stopped);
+    }
+
     fn progress(&self) -> Option<f64> {
         self.messages.progress()
     }
@@ -276,6 +291,43 @@ mod tests {
         fn taken(&self) -> String {
             "given: a".to_owned()
         }
+    }
+
+    /// Messages up to where what sends them breaks, and is asked again.
+    struct Breaks(u32);
+
+    impl Messages for Breaks {
+        fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came> {
+            self.0 += 1;
+            values.push(RawValue::new(1.0));
+            match self.0 {
+                ..3 => Ok(Came::Message(FrameTime::from_ns(5))),
+                ..9 => Err(Error::failed("the line is cut")),
+                _ => panic!("it is asked for ever"),
+            }
+        }
+
+        fn has_failed(&self) -> bool {
+            self.0 > 2
+        }
+
+        fn name(&self) -> String {
+            "line".to_owned()
+        }
+
+        fn taken(&self) -> String {
+            "line: a".to_owned()
+        }
+    }
+
+    #[test]
+    fn what_breaks_is_not_skipped() {
+        let map = ArrayMap::parse("values = 'a'").unwrap();
+        let mut source = MappedSource::new(Box::new(Breaks(0)), &map, true).unwrap();
+        let mut frame = Frame::default();
+        assert!(source.next_frame(&mut frame).unwrap() && source.next_frame(&mut frame).unwrap());
+        assert_eq!(source.next_frame(&mut frame).unwrap_err().to_string(), "the line is cut");
+        assert!(source.losses().is_empty());
     }
 
     fn frames(given: Vec<Result<Vec<f64>>>, map: &str, skip_bad: bool) -> Result<(Vec<Vec<RawValue>>, Vec<String>)> {

@@ -37,6 +37,10 @@ pub(in crate::source) struct ModbusRegisters {
     bytes: Vec<u8>,
     start: Instant,
     read_at: Option<Instant>,
+    /// Whether an answer did not come, or another one came in its place: what comes next belongs to none.
+    is_gone: bool,
+    /// Whether any values came: a device that refuses from the beginning goes on with that.
+    has_come: bool,
 }
 
 /// The address with its port, and the unit, that `HOST[:PORT][/UNIT]` names.
@@ -98,6 +102,8 @@ impl ModbusRegisters {
             bytes: Vec::new(),
             start: Instant::now(),
             read_at: None,
+            is_gone: false,
+            has_come: false,
         })
     }
 
@@ -117,6 +123,7 @@ impl ModbusRegisters {
             ErrorKind::UnexpectedEof => Error::failed("the device has closed the connection"),
             _ => failed!("{e}"),
         };
+        self.is_gone = true;
         self.device.write_all(&request).map_err(gone)?;
         let mut header = [0; HEADER_BYTES];
         self.device.read_exact(&mut header).map_err(gone)?;
@@ -128,7 +135,7 @@ impl ModbusRegisters {
         }
         self.bytes.resize(length - 1, 0);
         self.device.read_exact(&mut self.bytes).map_err(gone)?;
-        self.read_at = Some(Instant::now());
+        (self.is_gone, self.read_at) = (false, Some(Instant::now()));
         checked(&self.bytes, count)
     }
 }
@@ -164,7 +171,12 @@ impl Messages for ModbusRegisters {
             let map = &self.map;
             self.decoder.bytes(&self.bytes[2..], |number| values.push(map.value(number)))?;
         }
+        self.has_come = true;
         Ok(Came::Message(FrameTime::from(self.start.elapsed().as_secs_f64())))
+    }
+
+    fn has_failed(&self) -> bool {
+        self.is_gone || !self.has_come
     }
 
     fn name(&self) -> String {
@@ -272,6 +284,30 @@ mod tests {
         assert!(why.contains("is it the right port?") || why.contains("reset"), "{why}");
         let why = ModbusRegisters::connect(&address, &map).err().unwrap().to_string();
         assert!(why.contains("no connection to 127.0.0.1:"), "{why}");
+    }
+
+    #[test]
+    fn a_device_that_is_gone_or_never_answers_is_no_message_to_skip() {
+        let map = ArrayMap::parse(MAP).unwrap();
+        let open = |address: &str| {
+            let messages = ModbusRegisters::connect(address, &map).unwrap();
+            MappedSource::new(Box::new(messages), &map, true)
+        };
+        let why = open(&device(|_, _, _| vec![0x83, 2])).err().unwrap().to_string();
+        assert!(why.contains("register 3000: the device refuses, with error 2"), "{why}");
+        // The second message is refused, which is skipped; then the device stops.
+        let asked = std::sync::atomic::AtomicU32::new(0);
+        let address = device(move |_, _, count| match asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) {
+            2 => vec![0x83, 6],
+            0..5 => registers(count, |at| at as i16),
+            _ => panic!("it is switched off"),
+        });
+        let mut source = open(&address).unwrap();
+        let mut frame = Frame::default();
+        assert!(source.next_frame(&mut frame).unwrap() && source.next_frame(&mut frame).unwrap());
+        let why = source.next_frame(&mut frame).unwrap_err().to_string();
+        assert!(why.contains("the device has closed the connection") || why.contains("reset"), "{why}");
+        assert_eq!(source.losses().len(), 1, "{:?}", source.losses());
     }
 
     #[test]

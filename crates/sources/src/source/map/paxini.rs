@@ -6,6 +6,8 @@
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read as _, Write as _};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -69,6 +71,7 @@ pub(in crate::source) struct PaxiniBoard {
     error: u8,
     with_error: u64,
     notices: Vec<String>,
+    stopped: Arc<AtomicBool>,
 }
 
 enum Line {
@@ -118,6 +121,7 @@ impl PaxiniBoard {
             error: 0,
             with_error: 0,
             notices: Vec::new(),
+            stopped: Arc::default(),
         };
         board.connect()?;
         board.begin().map_err(|e| e.at(&board.name))?;
@@ -188,7 +192,7 @@ impl PaxiniBoard {
                 port.write_all(request).map_err(|e| failed!("{e}"))?;
             }
             let until = Instant::now() + ANSWERS_WITHIN;
-            while Instant::now() < until {
+            while Instant::now() < until && !self.stopped.load(Ordering::Relaxed) {
                 match self.packets.next() {
                     Some(Packet::Pushed { error, data }) => self.frames.push_back((error, data)),
                     Some(Packet::Answer { function: own, register: at, data }) if at == register => {
@@ -345,7 +349,7 @@ impl PaxiniBoard {
 
 impl Messages for PaxiniBoard {
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came> {
-        loop {
+        while !self.stopped.load(Ordering::Relaxed) {
             if let Some((error, data)) = self.frame() {
                 self.last = Instant::now();
                 if self.take(&data, values) {
@@ -377,6 +381,16 @@ impl Messages for PaxiniBoard {
                 Heard::Gone | Heard::Nothing | Heard::Bytes => self.wait()?,
             }
         }
+        Ok(Came::End)
+    }
+
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        self.stopped = Arc::clone(stopped);
+    }
+
+    /// Each of its errors is of the board: damaged frames are counted.
+    fn has_failed(&self) -> bool {
+        true
     }
 
     fn named(&self) -> &[(String, usize)] {
@@ -420,8 +434,6 @@ impl Messages for PaxiniBoard {
 mod tests {
     use std::fs::File;
     use std::os::unix::fs::symlink;
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicBool, Ordering};
 
     use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
@@ -582,7 +594,8 @@ mod tests {
 
     fn opened(board: &Board) -> Result<MappedSource> {
         let map = ArrayMap::named("paxini").unwrap();
-        MappedSource::new(Box::new(on_line(board, &map)?), &map, false)
+        // What is wrong with a board is no message that could be skipped.
+        MappedSource::new(Box::new(on_line(board, &map)?), &map, true)
     }
 
     /// The next frame that is as wanted, of at most 2,000 and within a minute.
@@ -681,6 +694,23 @@ mod tests {
         let why = (0..2_000).find_map(|_| source.next_frame(&mut frame).err()).unwrap().to_string();
         assert!(why.contains("other sensors are connected") && why.lines().count() == 1, "{why}");
         drop(other);
+    }
+
+    #[test]
+    fn a_board_that_is_silent_is_asked_until_nobody_reads_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut board = Board::plugged(folder.path(), TWO);
+        let mut source = opened(&board).unwrap();
+        until(&mut source, is_known);
+        board.unplug();
+        until(&mut source, is_stale);
+        let stopped: Arc<AtomicBool> = Arc::default();
+        source.stop_by(&stopped);
+        let thread = thread::spawn(move || source.next_frame(&mut Frame::default()).unwrap());
+        thread::sleep(SILENT_AFTER / 2);
+        assert!(!thread.is_finished());
+        stopped.store(true, Ordering::Relaxed);
+        assert!(!thread.join().unwrap(), "there is no other frame");
     }
 
     #[test]

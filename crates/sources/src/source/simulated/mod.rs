@@ -383,13 +383,12 @@ fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
     let Some(body) = &file.body else {
         return Err(text.wrong(0..0, "`body` is missing; give a file, or hand, sensing-hand, mat or humanoid"));
     };
-    let bundled = [("hand", bundled::HAND), ("mat", bundled::MAT), ("humanoid", bundled::HUMANOID)];
-    if let Some((name, bytes)) = bundled.iter().find(|(name, _)| name == body.get_ref()) {
-        return Body::from_bytes(name, bytes);
+    if let Some(bytes) = bundled::body(body.get_ref()) {
+        return Body::from_bytes(body.get_ref(), bytes);
     }
     Body::load(folder.join(body.get_ref())).map_err(|e| {
         if e.kind() == ErrorKind::NotFound {
-            text.unknown(body, "body", bundled.map(|(name, _)| name))
+            text.unknown(body, "body", bundled::BODIES)
         } else {
             text.wrong(body.span(), e.to_string())
         }

@@ -20,6 +20,8 @@ mod stamps;
 #[cfg(feature = "websocket")]
 mod web_socket;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub use self::options::{FrameEnd, TextColumns, TextIds, TextOptions, TextTime, TimeColumnName};
@@ -70,6 +72,7 @@ pub struct TextSource {
     has_stale: bool,
     is_gone: bool,
     is_ended: bool,
+    stopped: Arc<AtomicBool>,
     told_restarts: u64,
     notices: Vec<String>,
 }
@@ -136,6 +139,7 @@ impl TextSource {
             has_stale: false,
             is_gone: false,
             is_ended,
+            stopped: Arc::default(),
             told_restarts: 0,
             notices: Vec::new(),
             form,
@@ -318,12 +322,16 @@ impl Source for TextSource {
         &self.ids
     }
 
+    fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
+        self.stopped = Arc::clone(stopped);
+    }
+
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             if self.ready(frame) {
                 return Ok(true);
             }
-            if self.is_ended {
+            if self.is_ended || self.stopped.load(Ordering::Relaxed) {
                 return Ok(false);
             }
             self.read_at = None;
