@@ -138,7 +138,7 @@ fn a_drag_has_its_direction_within_a_degree() {
             let truth = moment.truth.as_ref().unwrap().shear_uv.unwrap();
             assert!(off(truth).abs() < 1e-9);
             let shear = moment.percept.shear.unwrap();
-            assert_eq!(moment.percept.shear_direction, Some(shear[1].atan2(shear[0])));
+            assert_eq!(moment.percept.shear_direction, Some(libm::atan2(shear[1], shear[0])));
             shears.push(shear);
         }
         let sum = |shears: &[[f64; 2]]| shears.iter().fold([0.0; 2], |[u, v], shear| [u + shear[0], v + shear[1]]);
