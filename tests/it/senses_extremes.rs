@@ -8,7 +8,7 @@ use somatic::internal::signal::FrameBlock;
 use somatic::percept::{LinkShare, TouchFlags};
 use somatic::signal::Pose;
 use somatic::{
-    BackendKind, Body, Calibration, Engine, Flags, Frame, Letter, Options, Percept, RawValue, Receptor, Scene,
+    BackendKind, Body, Calibration, Engine, Flags, Frame, Letter, Options, Outputs, Percept, RawValue, Receptor, Scene,
     TouchOutputs, touch,
 };
 
@@ -193,8 +193,11 @@ fn after_a_call_that_stopped_half_way_links_are_pressed_as_before_it() {
 #[test]
 fn letters_without_a_position_forget_that_they_were_in_the_world() {
     let body = skin(3);
-    let scene =
-        Scene::default().letters(Letter::all_of(&[Receptor::Temperature, Receptor::Proximity], &[])).touches(None);
+    let outputs = Outputs::WARMEST_POSITION | Outputs::NEAREST_POSITION;
+    let scene = Scene::default()
+        .outputs(outputs)
+        .letters(Letter::all_of(&[Receptor::Temperature, Receptor::Proximity], &[]))
+        .touches(None);
     let pose = Pose { translation: DVec3::Z, rotation: DQuat::IDENTITY };
     for kind in backends() {
         let make = || engine(&body, kind, scene.clone());

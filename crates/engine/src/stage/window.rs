@@ -72,8 +72,9 @@ impl Window {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Trend {
     window: Window,
-    /// What the value would be now if all members had been there all the time.
+    /// What the value would be now if all members had been there all the time, and by how much that is more than it is.
     level: f64,
+    above: f64,
     /// By member, what it was when the value was known last.
     before: Vec<Option<f64>>,
 }
@@ -94,21 +95,29 @@ impl Trend {
         window_s: f64,
         value_of: impl Fn(&mut dyn Iterator<Item = (usize, f64)>) -> Option<f64>,
     ) -> Option<f64> {
-        let both = || {
-            now.iter()
-                .zip(&self.before)
-                .enumerate()
-                .filter_map(|(member, (now, before))| Some((member, (*now)?, (*before)?)))
+        let mut there = now.iter().enumerate().filter_map(|(member, now)| Some((member, (*now)?)));
+        let Some(value) = value_of(&mut there) else {
+            self.window.clear();
+            return None;
         };
-        let was = value_of(&mut both().map(|(member, _, before)| (member, before)));
-        let is = value_of(&mut both().map(|(member, now, _)| (member, now)));
-        match (was, is) {
-            (Some(was), Some(is)) => self.level += is - was,
-            _ => {
+        let are_the_same = self.before.len() == now.len()
+            && self.before.iter().zip(now).all(|(before, now)| before.is_some() == now.is_some());
+        // As long as they are the same, nothing adds up from frame to frame, and no rounding stays.
+        if !are_the_same {
+            let both = || {
+                let pairs = now.iter().zip(&self.before).enumerate();
+                pairs.filter_map(|(member, (now, before))| Some((member, (*now)?, (*before)?)))
+            };
+            let was = value_of(&mut both().map(|(member, _, before)| (member, before)));
+            let is = value_of(&mut both().map(|(member, now, _)| (member, now)));
+            if let (Some(was), Some(is)) = (was, is) {
+                self.above = self.level + (is - was) - value;
+            } else {
                 self.window.clear();
-                self.level = value_of(&mut now.iter().enumerate().filter_map(|(member, now)| Some((member, (*now)?))))?;
+                self.above = 0.0;
             }
         }
+        self.level = value + self.above;
         self.before.clear();
         self.before.extend(now);
         self.window.take(t_s, self.level, window_s)
@@ -140,6 +149,33 @@ mod tests {
         // Where no member stays, nothing is known of what was before.
         assert!(trend.take(1.99, &[None, Some(54.0)], 0.5, mean).is_some());
         assert_eq!(trend.take(2.0, &[Some(24.0), None], 0.5, mean), None);
+    }
+
+    #[test]
+    fn a_wild_reading_leaves_nothing_behind() {
+        let mut trend = Trend::default();
+        for frame in 0..3000 {
+            // It comes after a sample that stays, and the next frame takes its place.
+            let wild = if frame == 1001 { 1e17 } else { 20.3 };
+            let slope = trend.take(1e-3 * f64::from(frame), &[Some(wild), Some(20.1)], 1.0, mean);
+            assert!(frame == 1001 || slope.is_none_or(|slope| slope.abs() < 1e-9), "{frame}: {slope:?}");
+        }
+        // What is equal in time is one sample, the last.
+        let mut window = Window::default();
+        let slopes = (0..600).map(|frame| {
+            let t_s = 0.01 * f64::from(frame / 3);
+            (t_s, window.take(t_s, 7.0 - 4.0 * t_s + f64::from(frame % 3 - 2), 0.5))
+        });
+        for (t_s, slope) in slopes.skip(2).step_by(3) {
+            assert!(t_s < 0.25 || (slope.unwrap() + 4.0).abs() < 1e-9, "{t_s}: {slope:?}");
+        }
+        assert!(window.samples.len() < 60);
+        // No time is none, and does not stay.
+        for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(window.take(wrong, 1.0, 0.5), None);
+            let last = (0..100).filter_map(|frame| window.take(3.0 + 0.01 * f64::from(frame), 1.0, 0.5)).last();
+            assert_eq!(last, Some(0.0));
+        }
     }
 
     #[test]
