@@ -121,8 +121,11 @@ impl Calibration {
             if kind.is_some_and(|kind| !kind.is_pressed()) {
                 drafts[index].of_no_pressure();
             }
-            for sense in [&mut temperature, &mut proximity] {
-                keys.sense(index, sense, (&curves, &names), text)?;
+            for (of, sense) in [(Modality::Temperature, &mut temperature), (Modality::Proximity, &mut proximity)] {
+                // Where it is not known, whatever it may be.
+                if kind.is_none_or(|kind| kind == of) {
+                    keys.sense(index, sense, (&curves, &names), text)?;
+                }
             }
             keys.shear(index, &mut shear, text)?;
             only_for_fsr(&keys, drafts[index].is_fsr(), text)?;

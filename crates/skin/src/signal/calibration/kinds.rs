@@ -88,6 +88,15 @@ mod tests {
     }
 
     #[test]
+    fn what_a_taxel_has_of_its_own_is_of_its_kind_alone() {
+        let keys = "baseline = 3\ngain = 2\nraw_range = [0, 255]\n";
+        let all: String = TAXELS.iter().map(|(id, _)| format!("[taxel.{id}]\n{keys}")).collect();
+        let read = read(&all).unwrap();
+        let own = [&read.temperature, &read.proximity].map(|sense| sense.own.keys().copied().collect::<Vec<_>>());
+        assert_eq!(own, [[2], [3]]);
+    }
+
+    #[test]
     fn keys_of_pressures_are_refused_for_what_feels_none() {
         for key in [
             "dead_band = 1",
