@@ -302,7 +302,7 @@ mod tests {
             values.push(RawValue::new(1.0));
             match self.0 {
                 ..3 => Ok(Came::Message(FrameTime::from_ns(5))),
-                ..9 => Err(Error::failed("the line is cut")),
+                3..9 => Err(Error::failed("the line is cut")),
                 _ => panic!("it is asked for ever"),
             }
         }
