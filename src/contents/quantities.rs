@@ -31,18 +31,25 @@ const LISTS: [(TouchOutputs, &str, &str); 5] = [
     (TouchOutputs::FIT_SIGMAS, "", "The standard deviations of the fit's place, force, direction, width and length."),
 ];
 
-/// What letters beside pressure give touches. The first brings more than one quantity.
+/// What letters beside pressure give touches, in other words where it is more than one quantity.
 const OF_LETTERS: [(TouchOutputs, &str, Option<&str>); 3] = [
     (
         TouchOutputs::SHEAR,
         "shear",
         Some(
-            "Σs over its taxels that have three axes; also shear_in_chart, shear_direction, force_vector, torsion, friction and \
+            "Σs over its taxels that have three axes, weighted as its place; also shear_in_chart, shear_direction, force_vector, torsion, friction and \
              slip_ratio.",
         ),
     ),
     (TouchOutputs::FRICTION_SIGMA, "shear", None),
-    (TouchOutputs::TEMPERATURE, "temperature", None),
+    (
+        TouchOutputs::TEMPERATURE,
+        "temperature",
+        Some(
+            "Mean of the temperature taxels that are nearest to its taxels, °C; also warmest, warmest_taxel, coldest, coldest_taxel, \
+             temperature_gradient and temperature_rate.",
+        ),
+    ),
 ];
 
 /// What letters give touches unless other outputs are named.

@@ -262,7 +262,7 @@ mod tests {
                 );
                 for (index, _) in kinds.iter().enumerate().filter(|(_, (_, kind))| is_curved && *kind == Force3) {
                     // 4.90333 N at three presses of 76 raw units, and 10 % more from taxel to taxel.
-                    let gain = read.shear.gain_of(index, 1.0, 1.0) * read.taxels[index].gain.abs().recip();
+                    let gain = read.shear.gains_of(index, 1.0, 1.0)[0] * read.taxels[index].gain.abs().recip();
                     let wanted = 4.903_33 / (228.0 * (1.0 + 0.1 * f64::from(body.taxels[index].id)));
                     assert!((gain / wanted - 1.0).abs() < 0.02, "{gain} {wanted}\n{text}");
                 }

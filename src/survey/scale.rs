@@ -164,7 +164,7 @@ mod tests {
         assert_eq!(read.taxels.iter().map(|taxel| taxel.gain).collect::<Vec<_>>(), [0.02, 0.04]);
         assert_eq!((read.taxels[1].dead_band, read.taxels[1].p_max), (0.03, 8.0));
         assert_eq!((read.contact.on, read.fields["a"].on), (0.1, 0.2));
-        assert_eq!([0, 1].map(|taxel| read.shear.gain_of(taxel, 1.0, 1.0)), [0.05, 0.03]);
+        assert_eq!([0, 1].map(|taxel| read.shear.gains_of(taxel, 1.0, 1.0)), [[0.05; 2], [0.03; 2]]);
         assert_eq!(read.taxels[0].quantity, Quantity::Newton);
         let twice =
             with_scale(&once, &ScaleEstimate { scale: 2.0, becomes_newton: false, ..estimate.clone() }).unwrap();

@@ -4,13 +4,19 @@ Which taxels a touch has, its link, and whether it goes around a limb are taken 
 at one of its taxels: all that is in the chart must be right for one of them.
 """
 
+import sys
+from pathlib import Path
+
 import numpy as np
 
+sys.path.insert(1, str(Path(__file__).resolve().parents[1] / "touches"))
 from calibrated import PRESSURES, SAME, Value, arc, read, sensed
+from definition import unrolled
 from made import ALONG, unit
 
 TOUCHES = [
     "total", "shear", "shear_in_chart", "shear_direction", "force_vector", "torsion", "friction", "slip_ratio", "temperature",
+    "warmest", "warmest_taxel", "coldest", "coldest_taxel", "temperature_gradient",
 ]
 # P is of single precision on the CPU: some units of the terms that it is made of.
 SAME_ON_CPU = 4 * 2.0**-24
@@ -30,8 +36,10 @@ class TouchesOf:
         self.poses = [body.pose(link) for link in range(len(body.links))]
         self.link_of = {name: link for link, (name, *_) in enumerate(body.links)}
         self.at, self.normal, self.first, self.second = self.in_body(self.taxels)
+        cells = {taxel["id"]: taxel["cell"] for taxel in listed["taxels"]}
+        self.cell = np.array([cells[body.ids[taxel]] for taxel in self.taxels], float)
         self.calibrate(recording)
-        self.find_warm(recording, {taxel["id"]: taxel for taxel in listed["taxels"]})
+        self.find_warm(recording)
 
     def in_body(self, taxels):
         """Places, normals and both tangents on the body at rest."""
@@ -70,6 +78,8 @@ class TouchesOf:
         cross = np.array(keys.get("cross_axis", np.eye(3)), float)
         self.cross = np.vstack([np.eye(3)[: 3 - len(cross)], cross])
         self.slips_at = keys.get("slips_at")
+        # A sensor that measures a force has added up over its cell.
+        self.weight = np.ones(len(self.taxels)) if quantity == "N" else self.cell
         area = body.area[self.taxels]
         self.newtons = {
             "N": np.ones(len(area)), "Pa": np.where(area > 0, area, np.nan), None: np.full(len(area), np.nan),
@@ -88,20 +98,22 @@ class TouchesOf:
         is_leaky = self.known & np.isfinite(leak) & np.any(self.cross[0] != [1, 0, 0])
         self.raw = np.where(is_leaky, raw + np.where(is_leaky, leak, 0), raw).astype(np.float32).astype(float)
 
-    def find_warm(self, recording, listed):
+    def find_warm(self, recording):
         """By node, the taxels of temperature that are nearest to it on its link."""
         warm = [taxel for taxel, kind in enumerate(self.body.kind) if kind == "temperature"]
-        self.warm_of = {}
+        self.warm_of, self.warm_at, self.warm_node = {}, self.in_body(warm)[0], {}
+        self.warm_ids = [self.body.ids[taxel] for taxel in warm]
         self.celsius, _, missing, faulty = sensed(recording, "temperature", warm)
         self.reads = ~missing & ~faulty
-        for place, (taxel, at) in enumerate(zip(warm, self.in_body(warm)[0])):
+        for place, (taxel, at) in enumerate(zip(warm, self.warm_at)):
             on_link = [node for node, own in enumerate(self.taxels) if self.body.link[own] == self.body.link[taxel]]
             if not on_link:
                 continue
             away = np.linalg.norm(self.at[on_link] - at, axis=1)
             node = on_link[away.argmin()]
-            if away.min() <= REACH * np.sqrt(listed[self.body.ids[self.taxels[node]]]["cell"]):
+            if away.min() <= REACH * np.sqrt(self.cell[node]):
                 self.warm_of.setdefault(node, []).append(place)
+                self.warm_node[place] = node
 
     def right(self, frame, touch):
         """What is right of a touch: quantities, and those in each chart that it may have."""
@@ -110,11 +122,20 @@ class TouchesOf:
         p = self.gain[nodes] * (self.raw[frame, nodes] - self.baseline[nodes])
         p_size = np.abs(self.gain[nodes]) * (np.abs(self.raw[frame, nodes]) + np.abs(self.baseline[nodes]))
         found = {"total": Value(p.sum(), p_size.sum())}
-        under = [place for node in nodes for place in self.warm_of.get(node, []) if self.reads[frame, place]]
+        under = sorted(place for node in nodes for place in self.warm_of.get(int(node), []) if self.reads[frame, place])
         if under:
-            found["temperature"] = Value(self.celsius[frame, under].mean(), np.abs(self.celsius[frame, under]).max() + 300)
+            celsius = self.celsius[frame, under]
+            size = np.abs(celsius).max() + 300
+            found["temperature"] = Value(celsius.mean(), size)
+            for name, place in (("warmest", celsius.argmax()), ("coldest", celsius.argmin())):
+                found[name] = Value(celsius[place], size)
+                found[f"{name}_taxel"] = Value(self.warm_ids[under[place]])
+        # The nearest to its middle first: it is mostly that.
+        load = self.weight[nodes] * p
+        away = np.linalg.norm(self.at[nodes] - load @ self.at[nodes] / load.sum(), axis=1)
+        bases = nodes[away.argsort(kind="stable")]
         there = self.has_axes[nodes] & self.known[frame, nodes]
-        own, presses = nodes[there], self.has_axes[nodes]
+        own = nodes[there]
         # What was measured along the normal, of which the matrix makes P.
         lateral, large = self.lateral[:, frame, own], self.large[:, frame, own]
         measured = (p[there] - self.cross[0, 1:] @ lateral) / self.cross[0, 0]
@@ -122,46 +143,59 @@ class TouchesOf:
         along = self.cross[1:] @ np.vstack([measured, lateral])
         terms = (np.abs(self.cross[1:]) @ np.vstack([size, large])).sum(axis=0)
         each = along[0][:, None] * self.first[own] + along[1][:, None] * self.second[own]
-        force = (self.newtons[own, None] * each).sum(axis=0)
-        force -= ((self.newtons[nodes] * p)[presses, None] * self.normal[nodes[presses]]).sum(axis=0)
-        if presses.any() and np.isfinite(force).all():
-            sizes = (self.newtons[own] * terms).sum() + (self.newtons[nodes] * p_size)[presses].sum()
+        force = (self.newtons[own, None] * each).sum(axis=0) - (self.newtons[nodes] * p) @ self.normal[nodes]
+        if self.has_axes[nodes].any() and np.isfinite(force).all():
+            sizes = (self.newtons[own] * terms).sum() + (self.newtons[nodes] * p_size).sum()
             found["force_vector"] = Value(turn @ force, sizes)
-        if len(own) == 0:
-            return found, [{}]
-        found["shear"] = Value(turn @ each.sum(axis=0), terms.sum())
-        # The nearest to its middle first: it is mostly that.
-        away = np.linalg.norm(self.at[nodes] - p @ self.at[nodes] / p.sum(), axis=1)
-        pressures, pulls = (p[there], p_size[there]), (each, terms)
-        return found, (self.in_chart(touch, base, own, pressures, pulls) for base in nodes[away.argsort(kind="stable")])
+        weight = self.weight[own]
+        if len(own):
+            # In the unit of the touch's total.
+            scale = p[there].sum() / (weight @ p[there])
+            found["shear"] = Value(turn @ (scale * weight @ each), scale * weight @ terms * p_size.sum() / p.sum())
+        pulls = (weight, p[there], p_size[there], each, terms)
+        return found, (self.in_chart(frame, touch, base, (own, pulls), under) for base in bases)
 
-    def in_chart(self, touch, base, own, pressures, pulls):
-        (p, p_size), (each, terms) = pressures, pulls
-        up, link = self.normal[base], self.link_of[touch["link"]]
-        rotation = self.poses[link][0]
+    def in_chart(self, frame, touch, base, pulled, under):
+        (own, (weight, p, p_size, each, terms)), up, link = pulled, self.normal[base], self.link_of[touch["link"]]
+        rotation, is_wrapped = self.poses[link][0], "wrapped" in touch["flags"]
         u = rotation @ self.default_u(rotation.T @ up)
-        turned = np.array([arc(normal, up, pull) for normal, pull in zip(self.normal[own], each)])
-        total, found = turned.sum(axis=0), {}
-        is_wrapped = "wrapped" in touch["flags"]
-        pull = np.linalg.norm(each.sum(axis=0) if is_wrapped else total)
-        middle, reach = p @ self.at[own] / p.sum(), np.abs(self.at[own]).max()
+        axes, found = np.array([u, np.cross(up, u)]), {}
+        if len(under) >= 3 and not is_wrapped:
+            normals = self.normal[[self.warm_node[place] for place in under]]
+            away = unrolled(self.warm_at[under] - self.at[base], up, normals)[0] @ axes.T
+            away, celsius = away - away.mean(axis=0), self.celsius[frame, under]
+            least, most = np.linalg.eigvalsh(away.T @ away)
+            share = least * most / (least + most) ** 2
+            if share > 1.001e-6:
+                gradient = np.linalg.lstsq(away, celsius - celsius.mean(), rcond=None)[0]
+                size = 10 * (np.abs(celsius).max() + 300) / np.sqrt(least / len(under))
+                found["temperature_gradient"] = Value(gradient, size)
+            elif share > 0.999e-6:
+                found["temperature_gradient"] = None
+        if len(own) == 0:
+            return found
+        load, offsets = weight @ p, self.at[own] - self.at[base]
+        scale, doubt = p.sum() / load, p_size.sum() / p.sum()
+        # Around a limb there is no chart: its plane.
+        turned = each if is_wrapped else np.array([arc(normal, up, pull) for normal, pull in zip(self.normal[own], each)])
+        places = (offsets if is_wrapped else unrolled(offsets, up, self.normal[own])[0]) @ axes.T
+        flat, size = turned @ axes.T, weight @ terms
+        total = weight @ flat
+        pull = np.linalg.norm(weight @ each) if is_wrapped else np.linalg.norm(total)
         # The sum of P may be off by as much as its terms.
-        doubt = p_size.sum() / p.sum()
-        found["friction"] = Value(pull / p.sum(), doubt * (terms.sum() + pull) / p.sum())
+        found["friction"] = Value(pull / load, doubt * (size + pull) / load)
         if self.slips_at is not None:
-            found["slip_ratio"] = Value(pull / p.sum() / self.slips_at, found["friction"].size / self.slips_at)
+            found["slip_ratio"] = Value(pull / load / self.slips_at, found["friction"].size / self.slips_at)
         if len(own) > 1:
-            torsion = (np.cross(self.at[own] - middle, each) @ up).sum()
-            found["torsion"] = Value(torsion, 8 * doubt * terms.sum() * reach)
+            arms = places - (weight * p) @ places / load
+            torsion = scale * weight @ (arms[:, 0] * flat[:, 1] - arms[:, 1] * flat[:, 0])
+            found["torsion"] = Value(torsion, 8 * doubt * scale * size * (np.abs(places).max() + np.abs(self.at[own]).max()))
         if is_wrapped:
             return found
-        flat = np.array([total @ u, total @ np.cross(up, u)])
-        found["shear_in_chart"] = Value(flat, terms.sum())
-        length, rounding = np.linalg.norm(flat), 2.0**-24 * np.linalg.norm(each, axis=1).sum()
-        if length > 1.000001 * rounding:
-            found["shear_direction"] = Value(np.arctan2(flat[1], flat[0]), 4 * max(1, terms.sum() / length))
-        elif length > 0.999999 * rounding and rounding > 0:
-            found["shear_direction"] = None
+        found["shear_in_chart"] = Value(scale * total, doubt * scale * size)
+        # Near what rounding may make of nothing there may be a direction or none.
+        told = pull > 2.0**-20 * size
+        found["shear_direction"] = Value(np.arctan2(total[1], total[0]), 4 * max(1, size / pull)) if told else None
         return found
 
     def wrong(self, frame, touch, largest):
