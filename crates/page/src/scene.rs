@@ -228,7 +228,7 @@ fn chart(field: &PlanField) -> Option<Value> {
         field.places.iter().map(|place| [place.x * unit_m, place.y * unit_m]).collect()
     };
     Some(json!({
-        "kind": if chart.kind == ChartKind::Geodesic { "geodesic" } else { "plane" },
+        "kind": if chart.kind.is_stored() { "geodesic" } else { "plane" },
         "origin": field.origin_in_anchor.to_array(),
         "u": chart.u_in_anchor.to_array(),
         "v": chart.v_in_anchor.to_array(),

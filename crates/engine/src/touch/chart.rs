@@ -10,36 +10,13 @@
 
 use glam::{DMat3, DVec3};
 
-/// Normals with a smaller sine between them are parallel.
-const PARALLEL_SINE: f64 = 1e-9;
+pub(super) use crate::field::place_by_normals as place;
 
 /// Angle of normals to the base's from which on a taxel is on the other side of a limb: cos 120°.
 pub(super) const WRAPPED_COSINE: f64 = -0.5;
 
 /// cos 10°: where +u would be nearer to the normal than this, another axis takes its place.
 const PARALLEL_COSINE: f64 = 0.984_807_753_012_208;
-
-/// θ/2 ÷ sin(θ/2), from the sine.
-fn arc_by_chord(half_sine: f64) -> f64 {
-    if half_sine < 1e-4 { 1.0 + half_sine * half_sine / 6.0 } else { libm::asin(half_sine.min(1.0)) / half_sine }
-}
-
-/// The place of a taxel at `offset` from the base, as a vector across the base's `normal`; `other` is the taxel's own normal.
-pub(super) fn place(offset: DVec3, normal: DVec3, other: DVec3) -> DVec3 {
-    let flat = offset - normal * offset.dot(normal);
-    let cosine = normal.dot(other);
-    let tilt = other - normal * cosine;
-    let sine = tilt.length();
-    if sine < PARALLEL_SINE {
-        return flat;
-    }
-    let towards = tilt / sine;
-    let half_cosine = ((1.0 + cosine) / 2.0).max(0.0).sqrt();
-    // The first form loses nothing at small angles, the second nothing at large ones.
-    let half_sine = if cosine > 0.0 { sine / (2.0 * half_cosine) } else { ((1.0 - cosine) / 2.0).max(0.0).sqrt() };
-    let chord = offset.dot(towards * half_cosine - normal * half_sine);
-    flat + towards * (chord * arc_by_chord(half_sine) - flat.dot(towards))
-}
 
 /// Directions of +u and +v across `normal`, for the axes of the link: u is its +x projected, or its +z within 10° of the normal;
 /// (u, v, normal) is right-handed.

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
+use super::by_normals;
 use super::chart::NoChart;
 use super::distortion::Distortion;
 use super::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
@@ -89,6 +90,14 @@ impl<'a> Unroller<'a> {
             }
             laid => laid,
         }
+    }
+
+    /// `spec` with a chart by the normals of its taxels and its own members' (u, v); else as [`Unroller::unroll`].
+    ///
+    /// # Errors
+    /// Why there is no such chart.
+    pub fn unroll_by_normals(&self, spec: &FieldSpec) -> Result<FieldSpec, NoChart> {
+        by_normals::unroll(self.body, spec)
     }
 }
 
