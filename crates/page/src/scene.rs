@@ -14,7 +14,7 @@ use super::sense_scale::SenseScales;
 use super::senses::{PageSenses, sense_word};
 use super::text::Names;
 use super::touches::TouchPlaces;
-use crate::body::{Body, ChartKind};
+use crate::body::Body;
 use crate::colours::pressure_colours;
 use crate::signal::{Quantity, Wiring};
 use somatic_engine::percept::{Column, Flags, Outputs, TouchFlags, Unit};

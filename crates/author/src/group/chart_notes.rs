@@ -2,8 +2,12 @@
 
 use crate::field::NoChart;
 
-/// A chart with more distortion is split, if requested, or reported.
+/// A chart with more distortion is reported.
 pub(super) const POOR_DISTORTION: f64 = 0.25;
+
+/// One with more than this is split, if requested. Taxels on the edges of a robot's boxes and on shells that do not meet have about so
+/// much; split at less, a fifth of them would be alone.
+pub(super) const SPLIT_DISTORTION: f64 = 0.5;
 
 const SPLIT: &str = "to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
 
@@ -80,7 +84,11 @@ impl Kind {
         match why {
             NoChart::SeveralLinks(_) => Self::Links,
             NoChart::NoSurface => Self::Surface,
-            NoChart::Wraps(_) | NoChart::CutLocus { .. } | NoChart::Torn(..) | NoChart::Bent(..) => Self::Wraps,
+            NoChart::Wraps(_)
+            | NoChart::Turns(_)
+            | NoChart::CutLocus { .. }
+            | NoChart::Torn(..)
+            | NoChart::Bent(..) => Self::Wraps,
             _ => Self::Other,
         }
     }

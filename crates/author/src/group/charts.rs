@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DVec2, DVec3};
 
 use super::axis::least_axis;
-use super::chart_notes::{self, ChartNotes, POOR_DISTORTION};
+use super::chart_notes::{self, ChartNotes, POOR_DISTORTION, SPLIT_DISTORTION};
 use super::grouper::{FieldDraft, Grouper, Grouping};
 use super::rule::{ChartWish, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
@@ -199,6 +199,7 @@ impl Grouper<'_> {
             ChartWish::None => Ok(asked(ChartKind::None, whole)),
             ChartWish::Plane => plane.map(|_| planar(whole.clone(), made.u)),
             ChartWish::Geodesic => self.unroller.unroll(&asked(ChartKind::Geodesic, whole)),
+            ChartWish::Normals => self.unroller.unroll(&asked(ChartKind::Normals, whole)),
             ChartWish::Auto => {
                 let flat = plane.as_ref().is_ok_and(|chart| chart.distortion <= MAX_PLANE_DISTORTION);
                 if flat || matches!(plane, Err(NoChart::SeveralLinks(_))) {
@@ -216,7 +217,7 @@ impl Grouper<'_> {
                 let best = match best {
                     Ok(best) if best.0 <= POOR_DISTORTION => Ok(best),
                     // Where paths over the surface lead around holes, or nowhere.
-                    other => match self.unroller.unroll_by_normals(&asked(ChartKind::Normals, whole)) {
+                    other => match self.unroller.unroll(&asked(ChartKind::Normals, whole)) {
                         Ok(by_normals) => {
                             let by_normals = (self.distortion(&by_normals), by_normals);
                             Ok(other.map_or(by_normals.clone(), |best| truer(best, by_normals)))
@@ -225,7 +226,7 @@ impl Grouper<'_> {
                     },
                 };
                 let (off, truer) = best?;
-                if off > POOR_DISTORTION && made.wrap == Wrap::Split {
+                if off > SPLIT_DISTORTION && made.wrap == Wrap::Split {
                     return Err(NoChart::Untrue(off));
                 }
                 if off > POOR_DISTORTION {

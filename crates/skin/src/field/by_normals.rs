@@ -42,9 +42,8 @@ pub fn place_by_normals(offset: DVec3, normal: DVec3, other: DVec3) -> DVec3 {
     flat + towards * (chord * arc_by_chord(half_sine) - flat.dot(towards))
 }
 
-
-/// `spec` with a chart by normals and its own members' (u, v). The direction of +u is that of `spec`'s chart, else the default of a
-/// plane chart; the base is the member nearest to the middle.
+/// `spec` with a chart by normals and its own members' (u, v). The base is the member nearest to the origin of `spec`'s chart, else to the
+/// middle; the direction of +u is that of `spec`'s chart, else the default of a plane chart.
 ///
 /// # Errors
 /// Why there is no such chart.
@@ -65,12 +64,17 @@ pub(super) fn unroll(body: &Body, spec: &FieldSpec) -> Result<FieldSpec, NoChart
         .collect();
     let mean = members.iter().map(|(position, _)| *position).sum::<DVec3>() / members.len() as f64;
     let facing = members.iter().map(|(_, normal)| *normal).sum::<DVec3>().normalize_or_zero();
-    let off = |(position, normal): &(DVec3, DVec3)| position.distance(mean) * (2.0 - normal.dot(facing));
+    let wanted = spec.chart.and_then(|chart| chart.origin_in_anchor).map(DVec3::from_array);
+    let off = |(position, normal): &(DVec3, DVec3)| match wanted {
+        Some(origin) => position.distance(origin),
+        // One that looks another way is farther.
+        None => position.distance(mean) * (2.0 - normal.dot(facing)),
+    };
     let base = members.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
     let Some((origin, normal)) = base else { return Err(NoChart::NoTaxels) };
     let least = members.iter().map(|(_, other)| other.dot(normal)).fold(1.0, f64::min);
     if least < MAX_TURN_COSINE {
-        return Err(NoChart::Wraps(least.clamp(-1.0, 1.0).acos()));
+        return Err(NoChart::Turns(least.clamp(-1.0, 1.0).acos()));
     }
     let wanted = spec.chart.and_then(|chart| chart.u_in_anchor).map(DVec3::from_array);
     let [u, v, normal] = tangent_frame(normal, wanted);
@@ -87,4 +91,43 @@ pub(super) fn unroll(body: &Body, spec: &FieldSpec) -> Result<FieldSpec, NoChart
         }
     }
     Ok(spec)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::place_by_normals as place;
+    use super::*;
+
+    #[test]
+    fn planes_spheres_and_cylinders_are_unrolled_exactly() {
+        let radius_m = 0.04;
+        for turn in [0.0, 1e-10, 1e-7, 1e-4, 0.01, 0.5, 1.5, FRAC_PI_2, 2.5, 3.1_f64] {
+            for side in [1.0, -1.0] {
+                let normal = DVec3::new(side * turn.sin(), 0.0, turn.cos());
+                let arc_m = side * radius_m * turn;
+                let on_cylinder = (normal - DVec3::Z) * radius_m + DVec3::Y * 0.013;
+                let found = place(on_cylinder, DVec3::Z, normal);
+                assert!(found.distance(DVec3::new(arc_m, 0.013, 0.0)) < 1e-11, "{turn}: {found}");
+                let on_sphere = (normal - DVec3::Z) * radius_m;
+                assert!(place(on_sphere, DVec3::Z, normal).distance(DVec3::X * arc_m) < 1e-11);
+                // Seen from inside, normals turn the other way.
+                assert!(place(-on_sphere, DVec3::Z, normal).distance(-DVec3::X * arc_m) < 1e-11);
+            }
+        }
+        let flat = DVec3::new(0.3, -0.2, 0.0);
+        assert_eq!(place(flat, DVec3::Z, DVec3::Z), flat);
+        // A height over the plane is not a distance on it.
+        assert_eq!(place(flat + DVec3::Z, DVec3::Z, DVec3::Z), flat);
+        assert!(place(flat, DVec3::Z, -DVec3::Z).is_finite());
+    }
+
+    #[test]
+    fn the_two_forms_of_the_half_angle_meet() {
+        let at = |turn: f64| DVec3::new(turn.sin(), 0.0, turn.cos());
+        for turn in [FRAC_PI_2 - 1e-9, FRAC_PI_2 + 1e-9] {
+            assert!((place(at(turn) - DVec3::Z, DVec3::Z, at(turn)).x - turn).abs() < 1e-12);
+        }
+    }
 }

@@ -50,7 +50,7 @@ impl<'a> Unroller<'a> {
         &mut self.surfaces
     }
 
-    /// `spec` with a geodesic chart and its own members' (u, v). The origin and the direction of +u are those of `spec`'s
+    /// `spec` with a geodesic chart, or with one by normals if it asks for that, and its own members' (u, v). The origin and the direction of +u are those of `spec`'s
     /// chart, else the defaults of a plane chart. A parent needs its descendants' taxels among its own:
     /// [`FieldSpec::with_members`].
     ///
@@ -58,6 +58,9 @@ impl<'a> Unroller<'a> {
     /// Why there is no such chart.
     pub fn unroll(&mut self, spec: &FieldSpec) -> Result<FieldSpec, NoChart> {
         let body = self.body;
+        if spec.chart.is_some_and(|chart| chart.kind == ChartKind::Normals) {
+            return by_normals::unroll(body, spec);
+        }
         let taxels: Vec<usize> = spec.members.keys().filter_map(|&id| body.taxel_index(id)).collect();
         if taxels.is_empty() {
             return Err(NoChart::NoTaxels);
@@ -90,14 +93,6 @@ impl<'a> Unroller<'a> {
             }
             laid => laid,
         }
-    }
-
-    /// `spec` with a chart by the normals of its taxels and its own members' (u, v); else as [`Unroller::unroll`].
-    ///
-    /// # Errors
-    /// Why there is no such chart.
-    pub fn unroll_by_normals(&self, spec: &FieldSpec) -> Result<FieldSpec, NoChart> {
-        by_normals::unroll(self.body, spec)
     }
 }
 

@@ -13,7 +13,7 @@ use super::patch::Pressure;
 use super::path::{Path, PathFrame};
 use super::profile::Profile;
 use super::radial::Radial;
-use crate::body::{Body, ChartKind, SurfaceIndex};
+use crate::body::{Body, SurfaceIndex};
 use crate::error::Result;
 use crate::field::{FieldSet, Lift};
 use crate::keys::Text;
