@@ -221,8 +221,8 @@ fn patches_go_over_shells_that_do_not_meet_and_have_charts_by_normals() {
     let patches: Vec<_> = set.fields.iter().filter(|field| field.name != "limb").collect();
     assert_eq!(patches.iter().map(|patch| patch.members.len()).collect::<Vec<_>>(), [27, 27], "{:?}", made.notes);
     for patch in &patches {
-        let chart = patch.chart.as_ref().unwrap();
-        assert!(chart.distortion < MAX_PLANE_DISTORTION, "{}", chart.distortion);
+        // Half of the limb is no worse in a plane than most fields.
+        assert!(patch.chart.as_ref().unwrap().distortion < 0.2);
     }
     // All of it is too bent for a plane, and no way over the surface leads from strip to strip.
     let made = grouped(&body, "[[fields]]\nname = \"limb\"\nchart = \"auto\"").unwrap();

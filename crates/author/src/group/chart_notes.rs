@@ -2,11 +2,11 @@
 
 use crate::field::NoChart;
 
-/// A chart with more distortion is reported.
+/// A chart with more distortion is split, if requested, or reported.
 pub(super) const POOR_DISTORTION: f64 = 0.25;
 
-/// One with more than this is split, if requested. Taxels on the edges of a robot's boxes and on shells that do not meet have about so
-/// much; split at less, a fifth of them would be alone.
+/// The same where no ways over the surface lead to all taxels. On the edges of a robot's boxes and on shells that do not meet charts have
+/// about so much; split at less, a fifth of the taxels would be alone.
 pub(super) const SPLIT_DISTORTION: f64 = 0.5;
 
 const SPLIT: &str = "to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";

@@ -205,28 +205,26 @@ impl Grouper<'_> {
                 if flat || matches!(plane, Err(NoChart::SeveralLinks(_))) {
                     return plane.map(|_| planar(whole.clone(), made.u));
                 }
-                let unrolled = self.unroller.unroll(&asked(ChartKind::Geodesic, whole));
-                let unrolled = unrolled.map(|unrolled| (self.distortion(&unrolled), unrolled));
+                let on_surface = self.unroller.unroll(&asked(ChartKind::Geodesic, whole));
+                let on_surface = on_surface.map(|unrolled| (self.distortion(&unrolled), unrolled));
+                let most = if on_surface.is_ok() { POOR_DISTORTION } else { SPLIT_DISTORTION };
                 let plane = plane.map(|chart| (chart.distortion, planar(whole.clone(), made.u)));
                 let truer = |one: Measured, other: Measured| if other.0 < one.0 { other } else { one };
-                let best = match (unrolled, plane) {
+                let best = match (on_surface, plane) {
                     (Ok(unrolled), Ok(plane)) => Ok(truer(unrolled, plane)),
-                    (Err(_), Ok(plane)) => Ok(plane),
-                    (unrolled, Err(_)) => unrolled,
-                };
-                let best = match best {
-                    Ok(best) if best.0 <= POOR_DISTORTION => Ok(best),
-                    // Where paths over the surface lead around holes, or nowhere.
-                    other => match self.unroller.unroll(&asked(ChartKind::Normals, whole)) {
+                    (Err(_), Ok(plane)) if plane.0 <= POOR_DISTORTION => Ok(plane),
+                    // Ways over the surface lead around holes, or nowhere.
+                    (Err(why), plane) => match self.unroller.unroll(&asked(ChartKind::Normals, whole)) {
                         Ok(by_normals) => {
                             let by_normals = (self.distortion(&by_normals), by_normals);
-                            Ok(other.map_or(by_normals.clone(), |best| truer(best, by_normals)))
+                            Ok(plane.map_or(by_normals.clone(), |plane| truer(plane, by_normals)))
                         }
-                        Err(_) => other,
+                        Err(_) => plane.map_err(|_| why),
                     },
+                    (unrolled, Err(_)) => unrolled,
                 };
                 let (off, truer) = best?;
-                if off > SPLIT_DISTORTION && made.wrap == Wrap::Split {
+                if off > most && made.wrap == Wrap::Split {
                     return Err(NoChart::Untrue(off));
                 }
                 if off > POOR_DISTORTION {
