@@ -185,6 +185,63 @@ fn patches_go_by_the_way_over_the_surface() {
     assert!(two.fields.len() == 2 && two.notes[0].contains("2 patches instead of 1"), "{:?}", two.notes);
 }
 
+/// A part of a limb of 40 mm, 132° around it, in strips that do not meet: nine taxels in each.
+fn strips() -> Body {
+    let (radius, half_gap) = (0.04, 0.01);
+    let at = |turn: f64, along: f64| DVec3::new(radius * turn.sin(), along, radius * turn.cos());
+    let (mut meshes, mut taxels) = (Vec::new(), Vec::new());
+    for strip in 0..6_u32 {
+        let middle = (f64::from(strip) - 2.5) * 0.38;
+        let turns = [-1.0, 0.0, 1.0].map(|side| middle + side * (0.19 - half_gap));
+        let positions: Vec<DVec3> = turns.iter().flat_map(|&turn| [at(turn, -0.03), at(turn, 0.03)]).collect();
+        meshes.push(MeshData {
+            normals: positions.iter().map(|p| [(p.x / radius) as f32, 0.0, (p.z / radius) as f32]).collect(),
+            positions: positions.iter().map(|p| p.as_vec3().to_array()).collect(),
+            triangles: (0..2_u32)
+                .flat_map(|q| [[2 * q, 2 * q + 2, 2 * q + 3], [2 * q, 2 * q + 3, 2 * q + 1]])
+                .collect(),
+            skinning: None,
+        });
+        taxels.extend((0..3_u32).flat_map(|column| (0..3_u32).map(move |row| (column, row))).map(|(column, row)| {
+            let turn = middle + 0.12 * (f64::from(column) - 1.0);
+            let id = 9 * strip + 3 * column + row;
+            taxel(id, at(turn, 0.01 * (f64::from(row) - 1.0)), DVec3::new(turn.sin(), 0.0, turn.cos()))
+        }));
+    }
+    let names: Vec<String> = (0..6).map(|strip| format!("strip {strip}")).collect();
+    body(&names.iter().map(String::as_str).zip(&meshes).collect::<Vec<_>>(), &taxels)
+}
+
+#[test]
+fn patches_go_over_shells_that_do_not_meet_and_have_charts_by_normals() {
+    let body = strips();
+    let made =
+        grouped(&body, "[[fields]]\nname = \"limb\"\npatches = { of = 27, even = true }\nwrap = \"split\"").unwrap();
+    let set = complete(&body, &made);
+    let patches: Vec<_> = set.fields.iter().filter(|field| field.name != "limb").collect();
+    assert_eq!(patches.iter().map(|patch| patch.members.len()).collect::<Vec<_>>(), [27, 27], "{:?}", made.notes);
+    for patch in &patches {
+        // Half of the limb is no worse in a plane than most fields.
+        assert!(patch.chart.as_ref().unwrap().distortion < 0.2);
+    }
+    // All of it is too bent for a plane, and no way over the surface leads from strip to strip.
+    let made = grouped(&body, "[[fields]]\nname = \"limb\"\nchart = \"auto\"").unwrap();
+    assert_eq!(field(&made, "limb").chart.unwrap().kind, ChartKind::Normals, "{:?}", made.notes);
+    let set = complete(&body, &made);
+    let limb = &set.fields[0];
+    assert!(limb.chart.as_ref().unwrap().distortion < 1e-6);
+    for (a, b) in limb.members.iter().zip(&limb.members[1..]) {
+        let turn = |taxel: usize| body.taxels[taxel].position_in_link.x.atan2(body.taxels[taxel].position_in_link.z);
+        let right = 0.04 * (turn(b.taxel) - turn(a.taxel)).abs();
+        assert!(((b.place - a.place).x.abs() - right).abs() < 1e-6, "an arc is as long as it is");
+    }
+    assert!(why(&body, "[[fields]]\nname = \"limb\"\nchart = \"geodesic\"").contains("no path on the surface"));
+    let asked = grouped(&body, "[[fields]]\nname = \"limb\"\nchart = \"normals\"").unwrap();
+    assert_eq!(field(&asked, "limb").members, field(&made, "limb").members);
+    let around = why(&tube(24, 3), "[[fields]]\nname = \"tube\"\nchart = \"normals\"");
+    assert!(around.contains("over the limit of 120°"), "{around}");
+}
+
 #[test]
 fn discs_hold_what_is_within_their_radius_and_overlap_as_asked() {
     let sheet = plate(40, 40, |_, _| true);

@@ -1,8 +1,8 @@
 //! Recomputes what a layout derives from the surface.
 
-use super::lint::{SurfaceFit, drift};
+use super::lint::{SurfaceFit, drift, may_be_stale};
 use super::surface_search::SurfaceSearch;
-use crate::body::{Body, ChartKind, FieldSpec, listed};
+use crate::body::{Body, listed};
 use crate::field::Unroller;
 
 /// A surface farther off than this is not that of a taxel, m.
@@ -29,8 +29,7 @@ pub fn refresh(body: &mut Body) -> Vec<String> {
     }
     let mut fields = body.fields.clone();
     let mut unroller = Unroller::new(body);
-    let is_geodesic = |spec: &FieldSpec| spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
-    for spec in fields.iter_mut().filter(|spec| is_geodesic(spec) && !body.surfaces.is_empty()) {
+    for spec in fields.iter_mut().filter(|spec| may_be_stale(body, spec)) {
         if drift(&mut unroller, spec) == Some(0.0) {
             continue;
         }
@@ -40,7 +39,7 @@ pub fn refresh(body: &mut Body) -> Vec<String> {
                 *spec = current;
             }
             Err(why) => {
-                notes.push(format!("field `{}` lost its geodesic chart: {why}", spec.name));
+                notes.push(format!("field `{}` lost its stored chart: {why}", spec.name));
                 spec.members.values_mut().for_each(|member| member.uv = None);
             }
         }

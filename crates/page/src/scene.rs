@@ -14,7 +14,7 @@ use super::sense_scale::SenseScales;
 use super::senses::{PageSenses, sense_word};
 use super::text::Names;
 use super::touches::TouchPlaces;
-use crate::body::{Body, ChartKind};
+use crate::body::Body;
 use crate::colours::pressure_colours;
 use crate::signal::{Quantity, Wiring};
 use somatic_engine::percept::{Column, Flags, Outputs, TouchFlags, Unit};
@@ -228,7 +228,7 @@ fn chart(field: &PlanField) -> Option<Value> {
         field.places.iter().map(|place| [place.x * unit_m, place.y * unit_m]).collect()
     };
     Some(json!({
-        "kind": if chart.kind == ChartKind::Geodesic { "geodesic" } else { "plane" },
+        "kind": if chart.kind.is_stored() { "geodesic" } else { "plane" },
         "origin": field.origin_in_anchor.to_array(),
         "u": chart.u_in_anchor.to_array(),
         "v": chart.v_in_anchor.to_array(),

@@ -179,6 +179,7 @@ fn kind(kind: ChartKind) -> &'static str {
     match kind {
         ChartKind::Plane => "plane",
         ChartKind::Geodesic => "geodesic",
+        ChartKind::Normals => "normals",
         ChartKind::None => "none",
     }
 }

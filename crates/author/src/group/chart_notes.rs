@@ -5,6 +5,10 @@ use crate::field::NoChart;
 /// A chart with more distortion is split, if requested, or reported.
 pub(super) const POOR_DISTORTION: f64 = 0.25;
 
+/// The same where no ways over the surface lead to all taxels. On the edges of a robot's boxes and on shells that do not meet charts have
+/// about so much; split at less, a fifth of the taxels would be alone.
+pub(super) const SPLIT_DISTORTION: f64 = 0.5;
+
 const SPLIT: &str = "to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
 
 /// Fields that a note names.
@@ -80,7 +84,11 @@ impl Kind {
         match why {
             NoChart::SeveralLinks(_) => Self::Links,
             NoChart::NoSurface => Self::Surface,
-            NoChart::Wraps(_) | NoChart::CutLocus { .. } | NoChart::Torn(..) | NoChart::Bent(..) => Self::Wraps,
+            NoChart::Wraps(_)
+            | NoChart::Turns(_)
+            | NoChart::CutLocus { .. }
+            | NoChart::Torn(..)
+            | NoChart::Bent(..) => Self::Wraps,
             _ => Self::Other,
         }
     }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DVec2, DVec3};
 
 use super::axis::least_axis;
-use super::chart_notes::{self, ChartNotes, POOR_DISTORTION};
+use super::chart_notes::{self, ChartNotes, POOR_DISTORTION, SPLIT_DISTORTION};
 use super::grouper::{FieldDraft, Grouper, Grouping};
 use super::rule::{ChartWish, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
@@ -35,6 +35,9 @@ const MAX_PROPOSED_PARTS: usize = 12;
 
 /// Windows that the search for the chart of a field and its parts may take: about 0.1 s. What is left goes to the next ones.
 const WINDOWS_OF_FIELD: usize = 150_000;
+
+/// A field with a chart, and its distortion.
+type Measured = (f64, FieldSpec);
 
 type Fitted = std::result::Result<FieldSpec, NoChart>;
 
@@ -127,7 +130,7 @@ impl Grouper<'_> {
             Ok(spec) => {
                 parts_on_left.extend(on_left.map(|taxels| (taxels, Vec::new())));
                 // With a plane chart, a parent needs no members of its own.
-                let unrolled = spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
+                let unrolled = spec.chart.is_some_and(|chart| chart.kind.is_stored());
                 fields.push(if unrolled { spec } else { FieldSpec { chart: spec.chart, ..made.spec } });
                 return Ok(());
             }
@@ -196,21 +199,32 @@ impl Grouper<'_> {
             ChartWish::None => Ok(asked(ChartKind::None, whole)),
             ChartWish::Plane => plane.map(|_| planar(whole.clone(), made.u)),
             ChartWish::Geodesic => self.unroller.unroll(&asked(ChartKind::Geodesic, whole)),
+            ChartWish::Normals => self.unroller.unroll(&asked(ChartKind::Normals, whole)),
             ChartWish::Auto => {
                 let flat = plane.as_ref().is_ok_and(|chart| chart.distortion <= MAX_PLANE_DISTORTION);
                 if flat || matches!(plane, Err(NoChart::SeveralLinks(_))) {
                     return plane.map(|_| planar(whole.clone(), made.u));
                 }
-                let unrolled = self.unroller.unroll(&asked(ChartKind::Geodesic, whole));
-                let unrolled = unrolled.map(|unrolled| (self.distortion(&unrolled), unrolled));
+                let on_surface = self.unroller.unroll(&asked(ChartKind::Geodesic, whole));
+                let on_surface = on_surface.map(|unrolled| (self.distortion(&unrolled), unrolled));
+                let most = if on_surface.is_ok() { POOR_DISTORTION } else { SPLIT_DISTORTION };
                 let plane = plane.map(|chart| (chart.distortion, planar(whole.clone(), made.u)));
-                let (off, truer) = match (unrolled, plane) {
-                    (Ok(unrolled), Ok(plane)) if plane.0 < unrolled.0 => plane,
-                    (Ok(unrolled), _) => unrolled,
-                    (Err(_), Ok(plane)) => plane,
-                    (Err(why), Err(_)) => return Err(why),
+                let truer = |one: Measured, other: Measured| if other.0 < one.0 { other } else { one };
+                let best = match (on_surface, plane) {
+                    (Ok(unrolled), Ok(plane)) => Ok(truer(unrolled, plane)),
+                    (Err(_), Ok(plane)) if plane.0 <= POOR_DISTORTION => Ok(plane),
+                    // Ways over the surface lead around holes, or nowhere.
+                    (Err(why), plane) => match self.unroller.unroll(&asked(ChartKind::Normals, whole)) {
+                        Ok(by_normals) => {
+                            let by_normals = (self.distortion(&by_normals), by_normals);
+                            Ok(plane.map_or(by_normals.clone(), |plane| truer(plane, by_normals)))
+                        }
+                        Err(_) => plane.map_err(|_| why),
+                    },
+                    (unrolled, Err(_)) => unrolled,
                 };
-                if off > POOR_DISTORTION && made.wrap == Wrap::Split {
+                let (off, truer) = best?;
+                if off > most && made.wrap == Wrap::Split {
                     return Err(NoChart::Untrue(off));
                 }
                 if off > POOR_DISTORTION {
@@ -221,7 +235,7 @@ impl Grouper<'_> {
         }
     }
 
-    /// The distortion of the geodesic chart of `unrolled`.
+    /// The distortion of the stored chart of `unrolled`.
     fn distortion(&self, unrolled: &FieldSpec) -> f64 {
         let of_member = |(&id, member): (&u32, &MemberSpec)| {
             let taxel = &self.body.taxels[self.body.taxel_index(id)?];
@@ -315,7 +329,7 @@ impl Grouper<'_> {
         }
         // Halves are smaller than what they are of, so this ends; each becomes a part or more, so it ends after twice `most`
         // halves at the latest.
-        let halves = self.patches(taxels, 2, SPLIT_ROUNDS);
+        let halves = self.halves_of(taxels);
         if halves.len() < 2 || halves.len() > most {
             return None;
         }
@@ -330,6 +344,17 @@ impl Grouper<'_> {
             }
         }
         Some(parts)
+    }
+
+    /// `taxels` in two halves, or more on several parts of the surface.
+    fn halves_of(&mut self, taxels: &[usize]) -> Vec<Vec<usize>> {
+        if self.are_apart(taxels) {
+            let halves = self.even_patches(taxels, taxels.len().div_ceil(2));
+            if halves.len() > 1 {
+                return halves;
+            }
+        }
+        self.patches(taxels, 2, SPLIT_ROUNDS)
     }
 
     /// The child of `whole` with `taxels`, and whether it has its chart.

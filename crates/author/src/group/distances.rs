@@ -9,6 +9,7 @@ use std::rc::Rc;
 
 use glam::{DVec2, DVec3};
 
+use crate::body::point_tree;
 use crate::field::LinkSurface;
 use crate::field::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
 
@@ -17,6 +18,12 @@ const NEIGHBOUR_DISTANCE: f64 = 2.0;
 
 /// Maximum number of taxels on the same triangle that a taxel is connected to in a net.
 const MAX_JOINED_ON_TRIANGLE: usize = 8;
+
+/// Taxels on parts that do not meet are neighbours up to this many median distances to the nearest.
+const GAP: f64 = 3.0;
+
+/// Maximum number of such neighbours of a taxel.
+const MAX_JOINED: usize = 6;
 
 /// How often the limit is doubled before it is dropped.
 const MAX_DOUBLINGS: u32 = 4;
@@ -30,6 +37,9 @@ pub(super) struct TaxelDistance {
 
 const UNREACHED: TaxelDistance = TaxelDistance { distance_m: f64::INFINITY, uv: None };
 
+/// Per node the nodes beside it and the ways there, m: the surface's vertices, then the taxels.
+type Net = Vec<Vec<(u32, f64)>>;
+
 /// Taxels of one link, and the distances between them.
 pub(super) struct LinkDistances {
     /// Indices of the taxels in their body.
@@ -40,7 +50,9 @@ pub(super) struct LinkDistances {
     places: Vec<SurfacePlace>,
     /// The limit from which exact distances have failed, m.
     too_long_m: Option<f64>,
-    net: Option<Vec<Vec<(u32, f64)>>>,
+    net: Option<Net>,
+    /// The same with lines between taxels of parts that do not meet.
+    joined_net: Option<Net>,
     /// How many windows may still be used; then distances are those in space. Without it, each map has a limit of its own.
     pub(super) windows_left: Option<usize>,
 }
@@ -49,7 +61,7 @@ impl LinkDistances {
     /// Distances on `surface` between `taxels` at `points` (position, normal).
     pub(super) fn new(surface: Rc<LinkSurface>, taxels: Vec<usize>, points: Vec<(DVec3, DVec3)>) -> Self {
         let places: Vec<SurfacePlace> = points.iter().filter_map(|&(p, normal)| surface.locate(p, normal)).collect();
-        Self { taxels, points, surface, places, too_long_m: None, net: None, windows_left: None }
+        Self { taxels, points, surface, places, too_long_m: None, net: None, joined_net: None, windows_left: None }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -122,20 +134,39 @@ impl LinkDistances {
         self.places.iter().map(reach).collect()
     }
 
-    /// Distances from taxel `from` along the net to the taxels `wanted`, or to all, m: longer than along the surface, by up to
-    /// a third, but soon known. Those to other taxels may be too long.
-    pub(super) fn along_net_from(&mut self, from: usize, wanted: Option<&[usize]>) -> Vec<f64> {
-        self.along_net(from, f64::INFINITY, wanted).into_iter().map(|way| way.distance_m).collect()
+    /// Whether its taxels are on several parts of the surface, which do not meet.
+    pub(super) fn are_apart(&self) -> bool {
+        let part = |place: &SurfacePlace| self.surface.topology.part[place.triangle as usize];
+        self.places.iter().any(|place| part(place) != part(&self.places[0]))
     }
 
-    /// Distances along the net (Dijkstra), final for the taxels `wanted`; for the others, they may be too long.
+    /// Distances from taxel `from` along the net to the taxels `wanted`, or to all, m: longer than along the surface, by up to
+    /// a third, but soon known. Those to other taxels may be too long. Lines lead from shell to shell of the surface.
+    pub(super) fn along_net_from(&mut self, from: usize, wanted: Option<&[usize]>) -> Vec<f64> {
+        if !self.are_apart() {
+            return self.along_net(from, f64::INFINITY, wanted).into_iter().map(|way| way.distance_m).collect();
+        }
+        let net = self.joined_net.take().unwrap_or_else(|| self.joined());
+        let lengths_m = self.along(&net, from, f64::INFINITY, wanted);
+        self.joined_net = Some(net);
+        lengths_m
+    }
+
+    /// Distances along the net, final for the taxels `wanted`; for the others, they may be too long.
     fn along_net(&mut self, from: usize, limit_m: f64, wanted: Option<&[usize]>) -> Vec<TaxelDistance> {
-        let first_taxel = if self.places.is_empty() { 0 } else { self.surface.topology.positions.len() };
         let net = match self.net.take() {
             Some(net) => net,
             None if self.places.is_empty() => self.beside(),
             None => self.along_edges(),
         };
+        let lengths_m = self.along(&net, from, limit_m, wanted);
+        self.net = Some(net);
+        lengths_m.into_iter().map(|distance_m| TaxelDistance { distance_m, uv: None }).collect()
+    }
+
+    /// The lengths of the ways in `net` from taxel `from` to the taxels (Dijkstra), final for those `wanted`.
+    fn along(&self, net: &Net, from: usize, limit_m: f64, wanted: Option<&[usize]>) -> Vec<f64> {
+        let first_taxel = if self.places.is_empty() { 0 } else { self.surface.topology.positions.len() };
         let mut lengths = vec![f64::INFINITY; net.len()];
         // Non-negative floats sort like their bits.
         let mut open = BinaryHeap::from([(Reverse(0_u64), (first_taxel + from) as u32)]);
@@ -165,12 +196,35 @@ impl LinkDistances {
                 }
             }
         }
-        self.net = Some(net);
-        lengths[first_taxel..].iter().map(|&distance_m| TaxelDistance { distance_m, uv: None }).collect()
+        lengths.split_off(first_taxel)
+    }
+
+    /// The net of the surface's edges, and lines between taxels near each other on parts that do not meet.
+    fn joined(&self) -> Net {
+        let mut net = self.along_edges();
+        let first_taxel = net.len() - self.len();
+        let tree = point_tree(self.points.iter().map(|(position, _)| *position));
+        let apart = |i: usize, j: usize| self.points[i].0.distance(self.points[j].0);
+        let near = |i: usize| {
+            let sorted = tree.nearest_neighbor_iter(self.points[i].0.to_array()).map(|spot| spot.data);
+            sorted.filter(move |&j| j != i)
+        };
+        let mut nearest: Vec<f64> = (0..self.len()).filter_map(|i| Some(apart(i, near(i).next()?))).collect();
+        nearest.sort_by(f64::total_cmp);
+        let reach_m = GAP * nearest.get(nearest.len() / 2).copied().unwrap_or(0.0);
+        let part = |i: usize| self.surface.topology.part[self.places[i].triangle as usize];
+        for i in 0..self.len() {
+            let beyond = |&j: &usize| part(i) != part(j) && self.points[i].1.dot(self.points[j].1) > 0.0;
+            for j in near(i).take_while(|&j| apart(i, j) <= reach_m).filter(beyond).take(MAX_JOINED) {
+                net[first_taxel + i].push(((first_taxel + j) as u32, apart(i, j)));
+                net[first_taxel + j].push(((first_taxel + i) as u32, apart(i, j)));
+            }
+        }
+        net
     }
 
     /// The net of the surface's edges, with each taxel connected to its triangle's corners and nearest taxels.
-    fn along_edges(&self) -> Vec<Vec<(u32, f64)>> {
+    fn along_edges(&self) -> Net {
         let vertices = &self.surface.topology.positions;
         let mut net = vec![Vec::new(); vertices.len() + self.len()];
         let mut join = |a: usize, b: usize, length: f64| {
@@ -204,7 +258,7 @@ impl LinkDistances {
     }
 
     /// The net of neighbouring taxels with normals less than 90° apart.
-    fn beside(&self) -> Vec<Vec<(u32, f64)>> {
+    fn beside(&self) -> Net {
         let apart = |i: usize, j: usize| self.points[i].0.distance(self.points[j].0);
         let others = |i: usize| (0..self.len()).filter(move |&j| j != i);
         let nearest = |i: usize| others(i).map(|j| apart(i, j)).filter(|&d| d > 0.0).fold(f64::INFINITY, f64::min);

@@ -156,6 +156,11 @@ impl Grouper<'_> {
         })
     }
 
+    /// Whether `chosen` are on parts of the surface that do not meet.
+    pub(super) fn are_apart(&mut self, chosen: &[usize]) -> bool {
+        self.distances(chosen).iter().any(LinkDistances::are_apart)
+    }
+
     fn note_approximate(&mut self, links: &[LinkDistances]) {
         for distances in links.iter().filter(|distances| distances.is_approximate()) {
             let link = &self.body.links[self.body.taxels[distances.taxels[0]].link].name;

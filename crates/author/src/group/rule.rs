@@ -168,13 +168,15 @@ pub struct Rows {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChartWish {
-    /// A plane where that is true to length, else the truer of a plane and a geodesic one.
+    /// A plane where that is true to length, else the truer of a plane and a geodesic one; one by normals where both are poor.
     #[default]
     Auto,
     /// The tangent plane's.
     Plane,
     /// A geodesic one.
     Geodesic,
+    /// One by the normals of its taxels.
+    Normals,
     /// None.
     None,
 }

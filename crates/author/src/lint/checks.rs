@@ -196,9 +196,7 @@ fn stale_charts(body: &Body, progress: &mut dyn FnMut(f64)) -> Option<Finding> {
     let mut unroller = Unroller::new(body);
     let mut stale: Vec<String> = Vec::new();
     let mut worst: Option<(f64, String)> = None;
-    let geodesic = |spec: &FieldSpec| spec.chart.is_some_and(|chart| chart.kind == ChartKind::Geodesic);
-    for (index, spec) in body.fields.iter().enumerate().filter(|(_, spec)| geodesic(spec) && !body.surfaces.is_empty())
-    {
+    for (index, spec) in body.fields.iter().enumerate().filter(|(_, spec)| may_be_stale(body, spec)) {
         progress(index as f64 / body.fields.len() as f64);
         match drift(&mut unroller, spec) {
             Some(0.0) => continue,
@@ -214,12 +212,21 @@ fn stale_charts(body: &Body, progress: &mut dyn FnMut(f64)) -> Option<Finding> {
     }
     let by = worst.as_ref().map(|(most, place)| format!("; most {place}, {:.3} mm", most * 1e3)).unwrap_or_default();
     let fields = count(stale.len(), "field");
-    let what = format!("{fields} with a geodesic chart that differs from the surface's: {}{by}", listed(&stale));
+    let what = format!("{fields} with a stored chart that differs from a new one: {}{by}", listed(&stale));
     let (worst, place) = worst.unzip();
     Some(Finding { worst, place, ..Finding::of_fields(FindingKind::StaleChart, stale, what) })
 }
 
-/// The error of the stored (u, v) of `spec`, which has a geodesic chart, m; 0 if all are current, `None` if some are
+/// Whether the layout of `body` stores a chart of `spec` that can be computed anew.
+pub(in super::super) fn may_be_stale(body: &Body, spec: &FieldSpec) -> bool {
+    spec.chart.is_some_and(|chart| match chart.kind {
+        ChartKind::Geodesic => !body.surfaces.is_empty(),
+        ChartKind::Normals => true,
+        ChartKind::Plane | ChartKind::None => false,
+    })
+}
+
+/// The error of the stored (u, v) of `spec`, m; 0 if all are current, `None` if some are
 /// missing or the chart cannot be computed.
 pub(in super::super) fn drift(unroller: &mut Unroller<'_>, spec: &FieldSpec) -> Option<f64> {
     // A parent without taxels of its own has no (u, v).

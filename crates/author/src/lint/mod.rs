@@ -12,7 +12,7 @@ mod spacing;
 mod taxels_at_rest;
 mod touchable;
 
-pub(super) use checks::{SurfaceFit, drift};
+pub(super) use checks::{SurfaceFit, drift, may_be_stale};
 pub use checks::{lint, lint_in_poses, lint_with_progress};
 pub use drawn_poses::DrawnPoses;
 #[cfg(feature = "meshes")]

@@ -61,8 +61,20 @@ pub enum ChartKind {
     Plane,
     /// Geodesic polar coordinates, stored in the layout: the shortest path on the surface from the origin.
     Geodesic,
+    /// Unrolled by the normals of its taxels, stored in the layout: lengths are estimated from positions and normals, also where the
+    /// surface has holes or consists of shells that do not meet.
+    Normals,
     /// No chart.
     None,
+}
+
+impl ChartKind {
+    /// Whether the layout stores (u, v) of such a chart.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn is_stored(self) -> bool {
+        matches!(self, Self::Geodesic | Self::Normals)
+    }
 }
 
 /// The chart specified in a layout.
@@ -127,7 +139,7 @@ impl FieldSpec {
             return Err(bad("its chart has a number that is not finite".into()));
         }
         if let Some(chart) = &json.chart
-            && chart.kind == ChartKind::Geodesic
+            && chart.kind.is_stored()
             && (chart.origin_in_anchor.is_none() || chart.u_in_anchor.is_none())
         {
             return Err(bad("a geodesic chart needs its `origin` and `u`; lay it again".into()));

@@ -5,7 +5,8 @@
 //! link.
 //!
 //! A geodesic chart gives each point the length and the initial direction of the shortest path from the origin over the
-//! surface, and so unrolls a limb. It is stored in the layout; [`super::Unroller`] computes it.
+//! surface, and so unrolls a limb. A chart by normals estimates that from positions and normals ([`super::place_by_normals`]), and
+//! requires all normals within 120° of the middle one. Both are stored in the layout; [`super::Unroller`] computes them.
 
 use std::fmt;
 
@@ -37,6 +38,8 @@ pub enum NoChart {
     SeveralLinks(usize),
     /// A member's normal is this far from the mean, rad: the field wraps around a part.
     Wraps(f64),
+    /// A member's normal is this far from that of the member in the middle, rad: a chart by normals cannot hold it.
+    Turns(f64),
     /// The layout requests no chart.
     ByChoice,
     /// This many members of a geodesic chart have no (u, v) in the layout.
@@ -74,6 +77,10 @@ impl fmt::Display for NoChart {
                     "a taxel's normal is {:.0}° from the mean, over the limit of 75°; split it",
                     angle.to_degrees()
                 )
+            }
+            Self::Turns(angle) => {
+                let degrees = angle.to_degrees();
+                write!(f, "a taxel's normal is {degrees:.0}° from the middle taxel's, over the limit of 120°; split it")
             }
             Self::ByChoice => f.write_str("the layout has none for it"),
             Self::Unplaced(count) => {

@@ -3,6 +3,7 @@
 //! [`FieldSet::new`] builds the fields that a body's file specifies: a parent gets the union of its descendants' taxels,
 //! every field an anchor, and a chart if it has one.
 
+mod by_normals;
 mod cell_surface;
 mod cells;
 mod chart;
@@ -23,6 +24,7 @@ mod surface_groups;
 mod unroll;
 
 pub use crate::body::default_u;
+pub use by_normals::place_by_normals;
 pub use cell_surface::CellSurface;
 pub use cells::{COINCIDENT_M, CellPoint, Divided, Relaxation};
 pub use chart::{Chart, NoChart};

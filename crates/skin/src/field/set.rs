@@ -10,6 +10,9 @@ use crate::body::{BitsHasher, Body, ChartKind, FieldSpec, Hit, KeptOfShape, Near
 use crate::error::{Result, failed};
 
 /// cos 75°: maximum angle of a member's normal from the mean.
+/// Cosine of the angle from which on a member is on the other side of its part: 120°.
+pub(super) const MAX_TURN_COSINE: f64 = -0.5;
+
 const MIN_NORMAL_COSINE: f64 = 0.258_819_045_102_520_76;
 
 /// Name of the world frame, which is z up, x forward, y left: of fields whose links share no ancestor, and of percepts in posed frames.
@@ -141,10 +144,16 @@ fn complete(
     let laid = match (kind, anchor.filter(|_| links.len() == 1), mean_normal) {
         (ChartKind::None, ..) => Err(NoChart::ByChoice),
         (_, None, _) => Err(NoChart::SeveralLinks(links.len())),
-        (ChartKind::Geodesic, ..) if unplaced > 0 => Err(NoChart::Unplaced(unplaced)),
+        (ChartKind::Geodesic | ChartKind::Normals, ..) if unplaced > 0 => Err(NoChart::Unplaced(unplaced)),
         (ChartKind::Geodesic, Some(anchor), _) => {
             let origin = wanted_origin.unwrap_or(mean_position);
             Ok((origin, tangent_frame(normal_at(shape, anchor, origin, &in_anchor), wanted_u)))
+        }
+        (ChartKind::Normals, ..) => {
+            let origin = wanted_origin.unwrap_or(mean_position);
+            let far = |(position, _): &&(DVec3, DVec3)| position.distance(origin);
+            let nearest = in_anchor.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
+            Ok((origin, tangent_frame(nearest.map_or(DVec3::Z, |(_, normal)| *normal), wanted_u)))
         }
         (ChartKind::Plane, Some(anchor), Some(normal)) if least_cosine >= MIN_NORMAL_COSINE => {
             let on_surface = || shape.0.in_link(anchor, mean_position).unwrap_or(mean_position);
@@ -156,7 +165,7 @@ fn complete(
     let place_of = |uv: Option<[f64; 2]>, position: DVec3| {
         let offset = position - origin_in_anchor;
         match (&laid, kind, uv) {
-            (Ok(_), ChartKind::Geodesic, Some([u, v])) => DVec3::new(u, v, 0.0),
+            (Ok(_), ChartKind::Geodesic | ChartKind::Normals, Some([u, v])) => DVec3::new(u, v, 0.0),
             (Ok((_, [u, v, normal])), ..) => DVec3::new(offset.dot(*u), offset.dot(*v), offset.dot(*normal)),
             (Err(_), ..) => offset,
         }

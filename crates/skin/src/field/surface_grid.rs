@@ -67,7 +67,7 @@ impl Lift {
         let uvs = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
         let uvs = uvs.map(|(column, row)| low + cell_m * DVec2::new(column as f64, row as f64));
         let nodes = match chart.kind {
-            ChartKind::Geodesic => {
+            ChartKind::Geodesic | ChartKind::Normals => {
                 let curved = GeodesicSurface::new(body, field, chart.u_in_anchor, &surface);
                 let node = |uv: DVec2| {
                     let (offset, normal) = curved.at(uv);
@@ -84,7 +84,7 @@ impl Lift {
         };
         let grid = Grid { corner: low, cell_m, columns, rows, nodes };
         let steepest = match chart.kind {
-            ChartKind::Geodesic => grid.steepest_anywhere(),
+            ChartKind::Geodesic | ChartKind::Normals => grid.steepest_anywhere(),
             ChartKind::Plane | ChartKind::None => grid.steepest_over_plane(),
         };
         Some(Self { grid, steepest })

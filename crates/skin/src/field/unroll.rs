@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
+use super::by_normals;
 use super::chart::NoChart;
 use super::distortion::Distortion;
 use super::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
@@ -49,7 +50,7 @@ impl<'a> Unroller<'a> {
         &mut self.surfaces
     }
 
-    /// `spec` with a geodesic chart and its own members' (u, v). The origin and the direction of +u are those of `spec`'s
+    /// `spec` with a geodesic chart, or with one by normals if it asks for that, and its own members' (u, v). The origin and the direction of +u are those of `spec`'s
     /// chart, else the defaults of a plane chart. A parent needs its descendants' taxels among its own:
     /// [`FieldSpec::with_members`].
     ///
@@ -57,6 +58,9 @@ impl<'a> Unroller<'a> {
     /// Why there is no such chart.
     pub fn unroll(&mut self, spec: &FieldSpec) -> Result<FieldSpec, NoChart> {
         let body = self.body;
+        if spec.chart.is_some_and(|chart| chart.kind == ChartKind::Normals) {
+            return by_normals::unroll(body, spec);
+        }
         let taxels: Vec<usize> = spec.members.keys().filter_map(|&id| body.taxel_index(id)).collect();
         if taxels.is_empty() {
             return Err(NoChart::NoTaxels);

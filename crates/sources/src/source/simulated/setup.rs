@@ -13,7 +13,7 @@ use super::patch::Pressure;
 use super::path::{Path, PathFrame};
 use super::profile::Profile;
 use super::radial::Radial;
-use crate::body::{Body, ChartKind, SurfaceIndex};
+use crate::body::{Body, SurfaceIndex};
 use crate::error::Result;
 use crate::field::{FieldSet, Lift};
 use crate::keys::Text;
@@ -233,7 +233,7 @@ impl Setup<'_> {
             return Err(self.text.unknown(&keys.on, "field", self.names()));
         };
         match (&field.chart, field.anchor) {
-            (Ok(chart), Some(link)) if chart.kind == ChartKind::Geodesic => {
+            (Ok(chart), Some(link)) if chart.kind.is_stored() => {
                 let lift = Lift::new(self.body, field).expect("it has a chart");
                 let (chart, origin_in_link) = (chart.clone(), field.origin_in_anchor);
                 Ok((link, Some(on.clone()), PathFrame::Curved { chart, origin_in_link, lift: Box::new(lift) }))
