@@ -81,6 +81,8 @@ class TouchFlags(_Flags):
     UNSURE = 1 << 19
     YOUNG_FIT = 1 << 20
     STILL = 1 << 21
+    NO_GRADIENT = 1 << 22
+    NO_PREVIOUS = 1 << 23
 
 
 Flags.__module__ = TouchFlags.__module__ = "somatic_touch"

@@ -14,6 +14,14 @@ class Value:
         self.size = float(np.abs(self.value).max() if size is None else size)
 
 
+def gradient_within(gradient, celsius, weights, least, most):
+    """`gradient` of temperatures, K/m, by moments A with the eigenvalues `least` and `most`. Rounding moves A by a share of `most`
+    and A's right side by a share of sqrt(most * Σw) |T|; both come into the gradient divided by `least`."""
+    size = np.abs(celsius).max() + 300
+    moved = np.sqrt(most * weights.sum()) * size / least + most / least * np.linalg.norm(gradient)
+    return Value(gradient, 10 * moved)
+
+
 def interpolated(curve, x):
     raw, p = np.array(curve["raw"], float), np.array(curve["p"], float)
     return np.interp(x, raw, p)

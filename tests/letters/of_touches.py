@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(1, str(Path(__file__).resolve().parents[1] / "touches"))
-from calibrated import PRESSURES, SAME, Value, arc, read, sensed
+from calibrated import PRESSURES, SAME, Value, arc, gradient_within, read, sensed
 from definition import unrolled
 from made import ALONG, unit
 
@@ -168,8 +168,7 @@ class TouchesOf:
             share = least * most / (least + most) ** 2
             if share > 1.001e-6:
                 gradient = np.linalg.lstsq(away, celsius - celsius.mean(), rcond=None)[0]
-                size = 10 * (np.abs(celsius).max() + 300) / np.sqrt(least / len(under))
-                found["temperature_gradient"] = Value(gradient, size)
+                found["temperature_gradient"] = gradient_within(gradient, celsius, np.ones(len(under)), least, most)
             elif share > 0.999e-6:
                 found["temperature_gradient"] = None
         if len(own) == 0:

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from calibrated import PRESSURES, SAME, UNITS, Value, arc, read, sensed
+from calibrated import PRESSURES, SAME, UNITS, Value, arc, gradient_within, read, sensed
 from made import Recording, recordings
 from of_touches import TOUCHES, TouchesOf
 
@@ -124,7 +124,7 @@ def temperatures(recording, field, frames):
             share = least * most / (least + most) ** 2
             if share > 1.001e-6:
                 gradient = np.linalg.lstsq(root[:, None] * away, root * (celsius - mean), rcond=None)[0]
-                found["temperature_gradient"] = Value(gradient, 10 * size / np.sqrt(least / weights.sum()))
+                found["temperature_gradient"] = gradient_within(gradient, celsius, weights, least, most)
             elif share > 0.999e-6:
                 found["temperature_gradient"] = None
             else:

@@ -97,9 +97,9 @@ impl Kind {
 /// The note of `count` fields whose surface was too fine to measure all ways on it.
 pub(super) fn bounded(count: usize) -> String {
     format!(
-        "{} in smaller parts, or without a chart, as their surface is too fine, or its triangles too thin, to measure all ways on it; \
-         simplify the mesh, or for a robot try --geometry collision",
-        if count == 1 { "1 field is".to_owned() } else { format!("{count} fields are") }
+        "{} no geodesic chart, as the surface is too fine, or its triangles too thin, to measure all ways on it; simplify the mesh, or \
+         for a robot try --geometry collision",
+        if count == 1 { "1 field has".to_owned() } else { format!("{count} fields have") }
     )
 }
 

@@ -125,17 +125,17 @@ pub struct Touch {
     pub position_sigma_m: Option<[f64; 2]>,
     /// Standard deviation of the principal axis, rad.
     pub principal_axis_sigma_rad: Option<f64>,
-    /// Σs over its taxels that have three axes, in the unit of P.
+    /// Σws over its taxels that have three axes, each with the weight w that it has in the position, times ΣP/ΣwP: in the unit of P.
     pub shear: Option<DVec3>,
     /// The same along u and v of the touch's chart, in the unit of P.
     pub shear_in_chart: Option<[f64; 2]>,
     /// The same as an angle in that chart, in (−π, π], rad.
     pub shear_direction_rad: Option<f64>,
-    /// The force on the skin by those taxels, normal and tangential, N.
+    /// The force on the skin by all its taxels, normal and, where it is known, tangential, N; absent where none has three axes.
     pub force_vector_newton: Option<DVec3>,
-    /// Σ(x − c) × s · n about the mean c of those taxels by P, in the unit of P times m.
+    /// Σw(x − c) × s · n about the mean c of those taxels by wP, times ΣP/ΣwP, in the unit of P times m.
     pub torsion: Option<f64>,
-    /// ‖Σs‖ / ΣP of those taxels, each s turned into the touch's chart.
+    /// ‖Σws‖ / ΣwP of those taxels, each s turned into the touch's chart.
     pub friction: Option<f64>,
     /// Standard deviation of that from the noise of the sensors; only on request.
     pub friction_sigma: Option<f64>,

@@ -224,12 +224,12 @@ touch_columns! {
     TOTAL_SIGMA "total_sigma" P 1 "The standard deviation of its total, from the sensors' noise." |touch| one_of(touch.total_sigma);
     POSITION_SIGMA "position_sigma" Metre 2 "The standard deviation of its position along u and v of its own chart, m." |touch| touch.position_sigma_m.map(|[u, v]| [u, v, 0.0]);
     PRINCIPAL_AXIS_SIGMA "principal_axis_sigma" Radian 1 "The standard deviation of its principal axis, rad." |touch| one_of(touch.principal_axis_sigma_rad);
-    SHEAR "shear" P 3 "Σs over its taxels that have three axes, each along its own tangents." |touch| vector(touch.shear);
+    SHEAR "shear" P 3 "Σws over its taxels that have three axes, w as in its position, in the unit of its total." |touch| vector(touch.shear);
     SHEAR "shear_in_chart" P 2 "The same along u and v of its own chart, each turned into that with its taxel's normal." |touch| touch.shear_in_chart.map(|[u, v]| [u, v, 0.0]);
     SHEAR "shear_direction" Radian 1 "The same as an angle in its own chart, rad in (−π, π]." |touch| one_of(touch.shear_direction_rad);
-    SHEAR "force_vector" Newton 3 "The force on the skin by those taxels, normal and tangential, N." |touch| vector(touch.force_vector_newton);
-    SHEAR "torsion" PMetre 1 "Σ(x − c) × s · n about the mean c of those taxels by P, counter-clockwise seen from outside." |touch| one_of(touch.torsion);
-    SHEAR "friction" One 1 "‖Σs‖ / ΣP of those taxels, each s turned into its own chart." |touch| one_of(touch.friction);
+    SHEAR "force_vector" Newton 3 "The force on the skin by its taxels, normal and, of three axes, tangential, N." |touch| vector(touch.force_vector_newton);
+    SHEAR "torsion" PMetre 1 "Σw(x − c) × s · n about the mean c of those taxels, counter-clockwise seen from outside." |touch| one_of(touch.torsion);
+    SHEAR "friction" One 1 "‖Σws‖ / ΣwP of those taxels, each s turned into its own chart." |touch| one_of(touch.friction);
     SHEAR "slip_ratio" One 1 "Friction over that at which it slips, slips_at of the calibration: a slip begins at 0.95." |touch| one_of(touch.slip_ratio);
     FRICTION_SIGMA "friction_sigma" One 1 "The standard deviation of its friction, from the sensors' noise." |touch| one_of(touch.friction_sigma);
     TEMPERATURE "temperature" Celsius 1 "Mean of the temperature taxels that are nearest to its taxels, °C." |touch| one_of(touch.temperature_celsius);
