@@ -31,7 +31,8 @@ fn allocations(body: &Body, outputs: Outputs, calibration: Option<&str>) -> u64 
 #[test]
 fn a_frame_on_the_cpu_allocates_nothing() {
     let checks = "[all]\nbaseline = 2\np_max = 30\n[checks]\nisolated_ratio = 5\n[contact]\non = 3\noff = 1";
-    for bytes in [bundled::HAND, bundled::MAT, bundled::HUMANOID] {
+    // The sensing hand also measures shear, temperature and proximity.
+    for bytes in [bundled::HAND, bundled::MAT, bundled::HUMANOID, bundled::SENSING_HAND] {
         let body = Body::from_bytes("body", bytes).unwrap();
         for calibration in [None, Some(checks)] {
             for outputs in [Outputs::CENTROID | Outputs::ORIENTATION, Outputs::USUAL_AND_MOTION] {

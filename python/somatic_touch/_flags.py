@@ -83,6 +83,7 @@ class TouchFlags(_Flags):
     STILL = 1 << 21
     NO_GRADIENT = 1 << 22
     NO_PREVIOUS = 1 << 23
+    ONE_PULLED = 1 << 24
 
 
 Flags.__module__ = TouchFlags.__module__ = "somatic_touch"

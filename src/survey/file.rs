@@ -119,7 +119,7 @@ impl Findings {
     /// is its gain.
     fn shear_gain(&self, found: &Found) -> Option<f64> {
         let curve = self.curve_of(found).filter(|_| self.with_axes.contains(&found.id))?;
-        Some(number(curve.gain()? * found.gain * self.scale.unwrap_or(1.0)))
+        Some(number(curve.gain()? * found.gain))
     }
 }
 

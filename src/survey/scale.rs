@@ -113,10 +113,10 @@ pub fn with_scale(text: &str, estimate: &ScaleEstimate) -> Result<String> {
         if estimate.becomes_newton && taxel.contains_key("unit") {
             return Err(Error::failed(format!("[taxel.{id}] has a unit of its own; remove it")));
         }
-        multiply(taxel, &["dead_band", "p_max", "shear_gain"], scale);
+        multiply(taxel, &["dead_band", "p_max"], scale);
     }
-    // Gains of tangential values are P for each raw unit, and `scale` is for those of normal ones.
-    let tables = [("contact", &["on", "off"][..]), ("change", &["dead_band", "on", "off"]), ("shear", &["gain"])];
+    // Gains, also of tangential values, are multiplied by `scale` where they are read.
+    let tables = [("contact", &["on", "off"][..]), ("change", &["dead_band", "on", "off"])];
     for (name, keys) in tables {
         let Some(table) = document.get_mut(name).and_then(Item::as_table_like_mut) else { continue };
         multiply(table, keys, scale);

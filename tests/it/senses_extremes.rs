@@ -84,7 +84,7 @@ fn one_taxel_with_three_axes_among_others_has_no_torsion_and_says_why() {
             let [touch] = &percepts.touches(0).unwrap().touches[..] else { panic!("one touch") };
             assert!(touch.active == 3 && touch.friction.is_some() && touch.shear.is_some());
             assert_eq!(
-                (touch.torsion.is_some(), touch.flags.contains(TouchFlags::ONE_TAXEL)),
+                (touch.torsion.is_some(), touch.flags.contains(TouchFlags::ONE_PULLED)),
                 (has_torsion, !has_torsion)
             );
             let all: Vec<Percept> = percepts.frame(0).collect();
@@ -99,7 +99,7 @@ fn one_taxel_with_three_axes_among_others_has_no_torsion_and_says_why() {
     let touches = engine.process_one(&frame).unwrap().touches(0).unwrap();
     let touch = &touches.touches[0];
     assert!(touch.torsion.is_none() && touch.flags.contains(TouchFlags::INCOMPLETE));
-    assert!(!touch.flags.contains(TouchFlags::ONE_TAXEL));
+    assert!(!touch.flags.contains(TouchFlags::ONE_PULLED));
 }
 
 #[test]

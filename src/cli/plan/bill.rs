@@ -20,7 +20,9 @@ pub(super) struct Bill {
     pub(super) body: String,
     /// Of how many.
     pub(super) taxels: [usize; 2],
+    /// Once for each letter that they have taxels of.
     pub(super) fields: [usize; 2],
+    pub(super) letters: usize,
     pub(super) memberships: usize,
     pub(super) bytes: [usize; 2],
     pub(super) backend: (String, String, String),
@@ -108,6 +110,7 @@ impl Bill {
             body: body.name.clone(),
             taxels: [taxels_read(&plan, body), body.taxels.len()],
             fields: [plan.fields().len(), fields_of_letters(&plan, body)?],
+            letters: plan.letters().len(),
             memberships: plan.memberships(),
             bytes: [plan.bytes_up(), plan.bytes_down()],
             backend,

@@ -13,7 +13,9 @@ impl Bill {
     pub(super) fn text(&self) -> String {
         let mut text = format!("{}\n", title(&self.body));
         let mut line = |what: &str, value: String| text += &format!("  {what:<12}{}\n", one_line(&value));
-        line("fields", format!("{} of {}", self.fields[0], self.fields[1]));
+        let each =
+            if self.letters > 1 { format!(", once for each of {} letters", self.letters) } else { String::new() };
+        line("fields", format!("{} of {}{each}", self.fields[0], self.fields[1]));
         line("taxels", format!("{} of {} are read", self.taxels[0], self.taxels[1]));
         line("memberships", self.memberships.to_string());
         let moved = format!("{} B up, {} B down", self.bytes[0], self.bytes[1]);

@@ -11,6 +11,8 @@ pub(super) const SPLIT_DISTORTION: f64 = 0.5;
 
 const SPLIT: &str = "to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]";
 
+const SMALLER: &str = "smaller `patches`, or `wrap = \"split\"`, in a recipe's [[fields]] make it less";
+
 /// Fields that a note names.
 const MAX_LISTED: usize = 6;
 
@@ -49,8 +51,9 @@ impl ChartNotes {
         if let Some((worst, most)) = self.poor.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
             let names = fields(self.poor.iter().map(|(name, _)| name));
             let most = most * 100.0;
-            lines
-                .push(format!("{names} with a distorted chart, distances up to {most:.0} % off in `{worst}`; {SPLIT}"));
+            lines.push(format!(
+                "{names} with a distorted chart, distances up to {most:.0} % off in `{worst}`; {SMALLER}"
+            ));
         }
         lines
     }
@@ -137,8 +140,8 @@ mod tests {
                  mm lead to taxel 12; to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]",
                 "field `all`: without a chart, so without orientation: its taxels sit on 3 links that move against each \
                  other; for a field on each link, write `each = \"link\"` in a recipe's [[fields]]",
-                "fields `palm`, `back`: with a distorted chart, distances up to 40 % off in `back`; to split a field, write \
-                 `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]",
+                "fields `palm`, `back`: with a distorted chart, distances up to 40 % off in `back`; smaller \
+                 `patches`, or `wrap = \"split\"`, in a recipe's [[fields]] make it less",
             ]
         );
     }

@@ -11,7 +11,7 @@ use super::rule::{ChartWish, Wrap};
 use crate::body::{Body, ChartKind, ChartSpec, FieldSpec, MemberSpec};
 use crate::error::{Error, Result};
 use crate::field::geodesic::MAX_WINDOWS;
-use crate::field::{Chart, Distortion, FieldSet, NoChart, unions};
+use crate::field::{Chart, Distortion, Field, FieldSet, NoChart, unions};
 use crate::placed::{Progress, report_progress};
 
 /// Maximum [`crate::field::Distortion`] at which `auto` takes a plane chart: neighbours 5 mm apart are at most 0.25 mm
@@ -96,9 +96,16 @@ impl Grouper<'_> {
         }
         bounded += usize::from(*self.unroller.windows_left() == Some(0));
         self.notes.extend((bounded > 0).then(|| chart_notes::bounded(bounded)));
-        charted.notes.poor = std::mem::take(&mut self.poor);
+        charted.notes.poor = self.poor(&charted.fields).map_err(|e| (0, e))?;
         self.notes.extend(charted.notes.lines());
         Ok(Grouping { fields: charted.fields, notes: self.notes })
+    }
+
+    /// Those of `fields` whose charts are distorted, though nobody asked for their kind, and how much.
+    fn poor(&self, fields: &[FieldSpec]) -> Result<Vec<(String, f64)>> {
+        let fields = FieldSet::from_specs(self.body, fields)?.fields.into_iter();
+        let distortion = |field: Field| Some((field.name, field.chart.ok()?.distortion));
+        Ok(fields.filter_map(distortion).filter(|(_, off)| *off > POOR_DISTORTION).collect())
     }
 
     /// Adds field `made` to `charted`, with its chart or in parts with theirs. With all its members it is `whole`, and in the plane it
@@ -214,21 +221,20 @@ impl Grouper<'_> {
                     (Ok(unrolled), Ok(plane)) => Ok(truer(unrolled, plane)),
                     (Err(_), Ok(plane)) if plane.0 <= POOR_DISTORTION => Ok(plane),
                     // Ways over the surface lead around holes, or nowhere.
-                    (Err(why), plane) => match self.unroller.unroll(&asked(ChartKind::Normals, whole)) {
-                        Ok(by_normals) => {
-                            let by_normals = (self.distortion(&by_normals), by_normals);
-                            Ok(plane.map_or(by_normals.clone(), |plane| truer(plane, by_normals)))
+                    (Err(why), plane) => {
+                        let by_normals = self.unroller.unroll(&asked(ChartKind::Normals, whole)).ok();
+                        let by_normals = by_normals.map(|unrolled| (self.distortion(&unrolled), unrolled));
+                        // More would be folded.
+                        match by_normals.filter(|(off, _)| *off <= SPLIT_DISTORTION) {
+                            Some(by_normals) => Ok(plane.map_or(by_normals.clone(), |plane| truer(plane, by_normals))),
+                            None => plane.map_err(|_| why),
                         }
-                        Err(_) => plane.map_err(|_| why),
-                    },
+                    }
                     (unrolled, Err(_)) => unrolled,
                 };
                 let (off, truer) = best?;
                 if off > most && made.wrap == Wrap::Split {
                     return Err(NoChart::Untrue(off));
-                }
-                if off > POOR_DISTORTION {
-                    self.poor.push((whole.name.clone(), off));
                 }
                 Ok(truer)
             }
@@ -337,6 +343,8 @@ impl Grouper<'_> {
         for (half, after) in halves.iter().zip((0..halves.len()).rev()) {
             match self.part(made, whole, bare, half) {
                 (part, true) => parts.push(part),
+                // What is left of so few has no orientation.
+                (part, false) if half.len() < 2 * MIN_SECTOR_TAXELS => parts.push(part),
                 _ => {
                     let room = most.checked_sub(parts.len() + after).filter(|&room| room > 1)?;
                     parts.extend(self.parts(made, whole, bare, half, room)?);

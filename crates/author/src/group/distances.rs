@@ -25,6 +25,9 @@ const GAP: f64 = 3.0;
 /// Maximum number of such neighbours of a taxel.
 const MAX_JOINED: usize = 6;
 
+/// Fewer taxels than these are joined to the nearest one.
+const FEW: usize = 3;
+
 /// How often the limit is doubled before it is dropped.
 const MAX_DOUBLINGS: u32 = 4;
 
@@ -220,7 +223,31 @@ impl LinkDistances {
                 net[first_taxel + j].push(((first_taxel + i) as u32, apart(i, j)));
             }
         }
+        self.join_few(&mut net, near);
         net
+    }
+
+    /// Joins each set of fewer than [`FEW`] taxels that `net` connects to the taxel nearest to it: alone they would be no patch.
+    fn join_few<'n, Near: Iterator<Item = usize> + 'n>(&self, net: &mut Net, near: impl Fn(usize) -> Near) {
+        let first_taxel = net.len() - self.len();
+        let mut is_seen = vec![false; self.len()];
+        for i in 0..self.len() {
+            if std::mem::replace(&mut is_seen[i], true) {
+                continue;
+            }
+            let lengths_m = self.along(net, i, f64::INFINITY, None);
+            let own: Vec<usize> = (0..self.len()).filter(|&j| lengths_m[j] < f64::INFINITY).collect();
+            own.iter().for_each(|&j| is_seen[j] = true);
+            if own.len() >= FEW {
+                continue;
+            }
+            let beyond = own.iter().filter_map(|&a| Some((a, near(a).find(|b| !own.contains(b))?)));
+            let apart = |(a, b): (usize, usize)| self.points[a].0.distance(self.points[b].0);
+            if let Some((a, b)) = beyond.min_by(|x, y| apart(*x).total_cmp(&apart(*y))) {
+                net[first_taxel + a].push(((first_taxel + b) as u32, apart((a, b))));
+                net[first_taxel + b].push(((first_taxel + a) as u32, apart((a, b))));
+            }
+        }
     }
 
     /// The net of the surface's edges, with each taxel connected to its triangle's corners and nearest taxels.

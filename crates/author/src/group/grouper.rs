@@ -81,8 +81,6 @@ pub struct Grouper<'a> {
     pub(super) made: Vec<FieldDraft>,
     index_of: HashMap<String, usize>,
     pub(super) notes: Vec<String>,
-    /// Fields with distorted charts, and their distortion.
-    pub(super) poor: Vec<(String, f64)>,
     applied: usize,
     /// Members of all fields so far.
     memberships: usize,
@@ -103,7 +101,6 @@ impl<'a> Grouper<'a> {
             made: Vec::new(),
             index_of: HashMap::new(),
             notes: Vec::new(),
-            poor: Vec::new(),
             applied: 0,
             memberships: 0,
         }

@@ -69,13 +69,13 @@ impl Made<'_> {
 }
 
 impl Cell<'_> {
-    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `pulls` have what the fields of a frame share,
+    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `room` have what the fields of a frame share,
     /// and `trend` what the letter measured before.
     pub(super) fn make(
         &self,
         cell: usize,
         percepts: &mut Percepts,
-        (now, pulls): (&mut Now, &mut Pulls),
+        (now, room): (&mut Now, &mut Room),
         trend: &mut Trend,
     ) {
         percepts.set_present(cell, Outputs::empty());
@@ -89,13 +89,13 @@ impl Cell<'_> {
         match self.plan.letters()[self.field.letter].receptor {
             Receptor::Sustained | Receptor::Change => {}
             Receptor::Shear => {
-                senses.shear.iter().for_each(|by| self.shear(by, pulls, now, &mut made));
+                senses.shear.iter().for_each(|by| self.shear(by, &mut room.pulls, now, &mut made));
             }
             Receptor::Temperature => {
-                senses.temperature.iter().for_each(|by| self.temperature(by, now, &mut made, trend));
+                senses.temperature.iter().for_each(|by| self.temperature(by, &mut room.warm, now, (&mut made, trend)));
             }
             Receptor::Proximity => {
-                senses.proximity.iter().for_each(|by| self.proximity(by, now, &mut made, trend));
+                senses.proximity.iter().for_each(|by| self.proximity(by, &mut room.near, now, (&mut made, trend)));
             }
         }
         made.flags.set(Flags::NO_CONTACT, !made.is_there);
@@ -151,15 +151,18 @@ impl Cell<'_> {
         }
     }
 
-    /// What `read` makes of the values of members that have a reading; the others' flags go into `made`.
-    fn readings<T>(
+    /// Puts what `read` makes of the values of members that have a reading into `readings`; the others' flags go into `made`.
+    fn read<T>(
         &self,
         by: &SenseCalibration,
+        readings: &mut Readings<T>,
         made: &mut Made<'_>,
         read: impl Fn(&SensedMember, f64, bool, &mut Flags) -> Option<T>,
-    ) -> Readings<T> {
+    ) {
         let row = self.sensed.row(self.frame);
-        let mut readings = Readings { members: Vec::new(), values: Vec::new(), by_member: Vec::new() };
+        readings.members.clear();
+        readings.values.clear();
+        readings.by_member.clear();
         for (index, member) in self.field.sensed.iter().enumerate() {
             let reading = by.of_taxel(member.taxel).read(row[member.values[0]]);
             readings.by_member.push(None);
@@ -177,20 +180,25 @@ impl Cell<'_> {
                 },
             }
         }
-        readings
     }
 
-    fn temperature(&self, by: &SenseCalibration, now: &mut Now, made: &mut Made<'_>, trend: &mut Trend) {
-        let Readings { members, values: warm, by_member } =
-            self.readings(by, made, |member, celsius, is_in_range, flags| {
-                flags.set(Flags::OUT_OF_RANGE, flags.contains(Flags::OUT_OF_RANGE) || !is_in_range);
-                Some(Warm { weight: member.weight, celsius, place_m: member.place_m })
-            });
+    fn temperature(
+        &self,
+        by: &SenseCalibration,
+        readings: &mut Readings<Warm>,
+        now: &mut Now,
+        (made, trend): (&mut Made<'_>, &mut Trend),
+    ) {
+        self.read(by, readings, made, |member, celsius, is_in_range, flags| {
+            flags.set(Flags::OUT_OF_RANGE, flags.contains(Flags::OUT_OF_RANGE) || !is_in_range);
+            Some(Warm { weight: member.weight, celsius, place_m: member.place_m })
+        });
+        let Readings { members, values: warm, by_member } = &*readings;
         if warm.is_empty() {
             return;
         }
         made.is_there = true;
-        let mean = temperature::mean(&warm);
+        let mean = temperature::mean(warm);
         made.give(Outputs::TEMPERATURE, Host::Temperature, &[mean]);
         let warmest = [
             (Outputs::WARMEST, Host::Warmest),
@@ -203,7 +211,7 @@ impl Cell<'_> {
             (Outputs::COLDEST_POSITION, Host::ColdestPosition),
         ];
         for (found, [value, taxel, position]) in
-            [(temperature::extreme(&warm, |a, b| a > b), warmest), (temperature::extreme(&warm, |a, b| a < b), coldest)]
+            [(temperature::extreme(warm, |a, b| a > b), warmest), (temperature::extreme(warm, |a, b| a < b), coldest)]
         {
             let Some(found) = found else { continue };
             made.give(value.0, value.1, &[warm[found].celsius]);
@@ -211,7 +219,7 @@ impl Cell<'_> {
             self.give_place(members[found], position, None, now, made);
         }
         if self.field.chart.is_some() {
-            match temperature::gradient(&warm) {
+            match temperature::gradient(warm) {
                 Some(gradient) => {
                     made.give(Outputs::TEMPERATURE_GRADIENT, Host::TemperatureGradient, &gradient.to_array());
                 }
@@ -222,7 +230,7 @@ impl Cell<'_> {
         let mean_of = |members: &mut dyn Iterator<Item = (usize, f64)>| {
             temperature::mean_of(members.map(|(member, celsius)| [sensed[member].weight, celsius]))
         };
-        match trend.take(self.t_s(), &by_member, by.window_s, mean_of) {
+        match trend.take(self.t_s(), by_member, by.window_s, mean_of) {
             Some(rate) => made.give(Outputs::TEMPERATURE_RATE, Host::TemperatureRate, &[rate]),
             None => made.flags |= Flags::NO_PREVIOUS,
         }
@@ -232,22 +240,28 @@ impl Cell<'_> {
         self.frames.frames[0].t_s
     }
 
-    fn proximity(&self, by: &SenseCalibration, now: &mut Now, made: &mut Made<'_>, trend: &mut Trend) {
-        let Readings { members, values: near, by_member } =
-            self.readings(by, made, |member, distance_m, is_in_range, flags| {
-                if !is_in_range || distance_m > by.range_m {
-                    return None;
-                }
-                if distance_m < LEAST_M {
-                    *flags |= Flags::SATURATED;
-                }
-                Some(Near { distance_m: distance_m.max(LEAST_M), place_m: member.place_m })
-            });
+    fn proximity(
+        &self,
+        by: &SenseCalibration,
+        readings: &mut Readings<Near>,
+        now: &mut Now,
+        (made, trend): (&mut Made<'_>, &mut Trend),
+    ) {
+        self.read(by, readings, made, |member, distance_m, is_in_range, flags| {
+            if !is_in_range || distance_m > by.range_m {
+                return None;
+            }
+            if distance_m < LEAST_M {
+                *flags |= Flags::SATURATED;
+            }
+            Some(Near { distance_m: distance_m.max(LEAST_M), place_m: member.place_m })
+        });
+        let Readings { members, values: near, by_member } = &*readings;
         if by_member.iter().all(Option::is_none) {
             return;
         }
         made.give(Outputs::COVERED, Host::Covered, &[near.len() as f64]);
-        let Some(nearest) = proximity::nearest(&near) else {
+        let Some(nearest) = proximity::nearest(near) else {
             made.flags |= Flags::OUT_OF_RANGE;
             trend.clear();
             return;
@@ -260,14 +274,14 @@ impl Cell<'_> {
             [(Outputs::NEAREST_POSITION, Host::NearestPosition), (Outputs::NEAREST_NORMAL, Host::NearestNormal)];
         self.give_place(member, position, Some(normal), now, made);
         if self.field.chart.is_some() {
-            let centroid = proximity::centroid(&near).to_array();
+            let centroid = proximity::centroid(near).to_array();
             made.give(Outputs::PROXIMITY_CENTROID, Host::ProximityCentroid, &centroid);
         }
         let least = |members: &mut dyn Iterator<Item = (usize, f64)>| {
             let least_m = members.map(|(_, distance_m)| distance_m.max(LEAST_M)).fold(f64::INFINITY, f64::min);
             least_m.is_finite().then_some(least_m)
         };
-        match trend.take(self.t_s(), &by_member, by.window_s, least) {
+        match trend.take(self.t_s(), by_member, by.window_s, least) {
             // From 0, so that what stays has no sign.
             Some(slope) => made.give(Outputs::APPROACH_SPEED, Host::ApproachSpeed, &[0.0 - slope]),
             None => made.flags |= Flags::NO_PREVIOUS,
@@ -385,13 +399,34 @@ impl Cell<'_> {
     }
 }
 
+/// Room for what the fields of a frame are made of, used again from frame to frame.
+#[derive(Clone, Debug)]
+pub(super) struct Room {
+    pub(super) pulls: Pulls,
+    warm: Readings<Warm>,
+    near: Readings<Near>,
+}
+
+impl Room {
+    pub(super) fn new(plan: &Plan) -> Self {
+        Self { pulls: Pulls::new(plan), warm: Readings::none(), near: Readings::none() }
+    }
+}
+
 /// What members read, in their order.
+#[derive(Clone, Debug)]
 struct Readings<T> {
     /// Those with a value that counts.
     members: Vec<usize>,
     values: Vec<T>,
     /// Of every member, °C or m; infinite where nothing is in range, `None` where it has no reading.
     by_member: Vec<Option<f64>>,
+}
+
+impl<T> Readings<T> {
+    fn none() -> Self {
+        Self { members: Vec::new(), values: Vec::new(), by_member: Vec::new() }
+    }
 }
 
 /// Adds what `member` feels to `sums`, in whose space it has these tangents and this normal.

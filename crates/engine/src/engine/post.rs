@@ -3,10 +3,9 @@
 use glam::DVec3;
 
 use super::cadence::{self, OnChange};
-use super::letters::{Cell, SensedValues};
+use super::letters::{Cell, Room, SensedValues};
 use super::links::Links;
 use super::place;
-use super::pulls::Pulls;
 use super::spread::{Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::percept::{Flags, Host, Outputs, Percepts, Values};
@@ -24,8 +23,8 @@ pub(super) struct PostState {
     pub(super) last: Option<Percepts>,
     /// The raw values of the last frame by channel, where changes say where fields on several links are touched.
     pub(super) raw_before: Vec<RawValue>,
-    /// Room for what taxels with three axes feel.
-    pub(super) pulls: Pulls,
+    /// Room for what letters are made of that the host makes.
+    pub(super) room: Room,
 }
 
 /// The same of one field.
@@ -49,7 +48,7 @@ impl PostState {
             fields: vec![PostFieldState::default(); plan.fields.len()],
             last: None,
             raw_before: Vec::new(),
-            pulls: Pulls::new(plan),
+            room: Room::new(plan),
         }
     }
 }
@@ -155,13 +154,13 @@ impl Post<'_> {
             return;
         }
         let (alone, mut now) = (std::slice::from_ref(frame), Now::default());
-        state.pulls.forget();
+        state.room.pulls.forget();
         for (number, field) in self.plan.fields.iter().enumerate() {
             let cell = index * self.plan.fields.len() + number;
             if !field.sensed.is_empty() {
                 let frames = self.frames(alone, raw, offset, &state.raw_before);
                 let of = Cell { plan: self.plan, field, frames, frame: index, step, sensed: self.sensed };
-                of.make(cell, percepts, (&mut now, &mut state.pulls), &mut state.fields[number].trend);
+                of.make(cell, percepts, (&mut now, &mut state.room), &mut state.fields[number].trend);
                 continue;
             }
             if let Some(cadence) = self.cadence {

@@ -3,9 +3,9 @@
 use super::Engine;
 use super::cadence::ChangeState;
 use super::drift_state::DriftState;
+use super::letters::Room;
 use super::on_skin::{OnSkin, OnSkinState};
 use super::post::PostState;
-use super::pulls::Pulls;
 use crate::backend::BackendState;
 use crate::error::{Error, Result};
 use crate::signal::{FrameTime, IntakeState, ShearCalibration, TaxelCalibration};
@@ -107,7 +107,7 @@ impl Engine {
         self.backend.restore(&state.backend)?;
         self.intake.restore(&state.intake);
         self.post.clone_from(&state.post);
-        self.post.pulls = Pulls::new(&self.plan);
+        self.post.room = Room::new(&self.plan);
         self.drift.clone_from(&state.drift);
         if let (Some(cadence), Some(state)) = (&mut self.cadence, &state.cadence) {
             cadence.state.clone_from(state);

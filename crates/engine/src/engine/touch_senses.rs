@@ -30,6 +30,8 @@ struct PulledTaxel {
     /// Where its tangential values are among those that are read beside pressures.
     values: [usize; 2],
     tangents_in_body: [DVec3; 2],
+    /// How these are read; `None` where there is no gain: touches and fields refuse that, and wrenches are then of normal forces.
+    sides: Option<Sides>,
 }
 
 /// A taxel of a touch.
@@ -69,6 +71,8 @@ pub(super) struct Sensed<'a> {
 #[derive(Debug)]
 pub(super) struct TouchSenses {
     wanted: TouchOutputs,
+    /// How often the plan was calibrated when `pulled` were.
+    calibration_changes: u64,
     /// By node of the skin.
     pulled: Vec<Option<PulledTaxel>>,
     warmth: Option<Warmth>,
@@ -90,19 +94,33 @@ impl TouchSenses {
             let own = &body.taxels[taxel];
             let values = [value(own.id, Axis::U)?, value(own.id, Axis::V)?];
             let turned = |tangent| body.links[own.link].body_from_link.transform_vector3(tangent);
-            Some(PulledTaxel { taxel, values, tangents_in_body: own.tangents_in_link().map(turned) })
+            Some(PulledTaxel { taxel, values, tangents_in_body: own.tangents_in_link().map(turned), sides: None })
         });
         let pulled: Vec<Option<PulledTaxel>> =
             if plan.senses.shear.is_some() { pulled.collect() } else { vec![None; plan.body_taxels.len()] };
         let wanted = plan.touch_outputs().unwrap_or(TouchOutputs::empty());
         let warmth = if wanted.contains(TouchOutputs::TEMPERATURE) { Warmth::new(body, plan, skin) } else { None };
-        (pulled.iter().any(Option::is_some) || warmth.is_some()).then(|| Self {
+        let has_any = pulled.iter().any(Option::is_some) || warmth.is_some();
+        let mut senses = has_any.then(|| Self {
             wanted,
+            calibration_changes: plan.calibration_changes,
             pulled,
             warmth,
             pulls: Vec::new(),
             link_from_body: body.links.iter().map(|link| link.body_from_link.matrix3.transpose()).collect(),
-        })
+        });
+        senses.iter_mut().for_each(|senses| senses.calibrate(plan));
+        senses
+    }
+
+    fn calibrate(&mut self, plan: &Plan) {
+        self.calibration_changes = plan.calibration_changes;
+        let Some(by) = &plan.senses.shear else { return };
+        for (own, calibration) in self.pulled.iter_mut().zip(&plan.calibrations) {
+            let Some(own) = own else { continue };
+            let has_gain = by.has_gain(own.taxel, calibration.response);
+            own.sides = has_gain.then(|| Sides::of(by, own.taxel, calibration));
+        }
     }
 
     /// Whether touches need lists of their taxels for it.
@@ -122,6 +140,9 @@ impl TouchSenses {
 
     /// Puts them into the touches `found` of a frame, in the frames of their links, and what pulls into their wrenches.
     pub(super) fn add(&mut self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, found: &mut TouchFrame) {
+        if self.calibration_changes != plan.calibration_changes {
+            self.calibrate(plan);
+        }
         if let Some(warmth) = &mut self.warmth {
             warmth.keep(&found.touches, sensed.raw.steps[sensed.offset].restarts());
         }
@@ -219,12 +240,7 @@ impl TouchSenses {
     ) -> Option<Result<Tangential, TouchFlags>> {
         let by = plan.senses.shear.as_ref()?;
         let own = self.pulled[node as usize].as_ref()?;
-        let calibration = &plan.calibrations[node as usize];
-        // Touches and fields refuse that; wrenches are then of normal forces.
-        if !by.has_gain(own.taxel, calibration.response) {
-            return None;
-        }
-        let sides = Sides::of(by, own.taxel, calibration);
+        let sides = own.sides?;
         let values = own.values.map(|value| row.get(value).copied().unwrap_or(RawValue::MISSING));
         Some(tangential(by, sides, pressure, values).map_err(|why| match why {
             why if why.contains(Flags::INCOMPLETE) => TouchFlags::INCOMPLETE,
@@ -251,8 +267,9 @@ impl TouchSenses {
         let mut sums = Sums::default();
         for pull in &self.pulls {
             let own = &skin.taxels()[pull.node as usize];
-            let tangents_in_chart = chart.tangents(pull);
             let felt = pull.felt.unwrap_or_default();
+            let is_known = pull.felt.is_some();
+            let tangents_in_chart = if is_known { chart.tangents(pull) } else { Default::default() };
             let taxel = Pulled {
                 weight: own.weight(),
                 pressure: pull.pressure,
@@ -261,10 +278,10 @@ impl TouchSenses {
                 tangents_in_chart: &tangents_in_chart,
                 tangents: &pull.tangents_in_body,
                 normal: own.normal,
-                place_m: chart.place(pull.node),
+                place_m: if is_known { chart.place(pull.node) } else { DVec2::ZERO },
                 newtons_per_p: newtons_per_p(plan, pull.node),
             };
-            if pull.felt.is_some() { sums.add(&taxel) } else { sums.add_normal(&taxel) }
+            if is_known { sums.add(&taxel) } else { sums.add_normal(&taxel) }
         }
         sums
     }
@@ -275,11 +292,10 @@ impl TouchSenses {
         let scale = known.map(|pull| pull.pressure).sum::<f64>() / found.pull;
         touch.shear = Some(self.link_from_body[touch.link as usize] * (scale * found.in_space()));
         touch.torsion = found.torsion().map(|torsion| scale * torsion);
-        // One taxel has no arm. Where it is not known how others with three axes pull, that is said.
-        let others = self.pulls.iter().filter(|pull| pull.felt.is_none());
-        if touch.torsion.is_none() && others.into_iter().all(|pull| self.pulled[pull.node as usize].is_none()) {
-            touch.flags |= TouchFlags::ONE_TAXEL;
-        }
+        // One taxel has no arm. Where it is not known how others with three axes pull, that is said; and where no other is pressed.
+        let mut others = self.pulls.iter().filter(|pull| pull.felt.is_none());
+        let are_of_one_axis = others.all(|pull| self.pulled[pull.node as usize].is_none());
+        touch.flags.set(TouchFlags::ONE_PULLED, touch.torsion.is_none() && are_of_one_axis && self.pulls.len() > 1);
         if touch.flags.contains(TouchFlags::WRAPPED) {
             return;
         }
@@ -307,7 +323,7 @@ impl TouchSenses {
             let (calibration, own) = (&plan.calibrations[node], self.pulled[node].as_ref()?);
             let noise = calibration.noise?;
             let number = sensed.raw.rows.value(sensed.offset, node).number()?;
-            let gains = Sides::of(by, own.taxel, calibration).gains;
+            let gains = own.sides?.gains;
             let noise = Noise {
                 of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
                 of_sides: gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),

@@ -28,7 +28,7 @@ bitflags! {
         /// A taxel's value was masked or altered: not finite, unbelievable, or distrusted by the calibration's checks.
         const FAULTY_INPUT = 1 << 7;
         /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept. Of letter proximity: nothing
-        /// is in range.
+        /// is in range; of letter shear: it is left out.
         const OUT_OF_RANGE = 1 << 8;
         /// A taxel's value is missing and left out of every sum.
         const INCOMPLETE = 1 << 9;

@@ -61,6 +61,8 @@ bitflags! {
         const NO_GRADIENT = 1 << 22;
         /// Its temperature taxels have not been read for half of the window: no rate.
         const NO_PREVIOUS = 1 << 23;
+        /// Of one of its taxels alone it is known how it pulls, as the others have one axis: no torsion.
+        const ONE_PULLED = 1 << 24;
     }
 }
 

@@ -147,6 +147,12 @@ pub struct TouchColumn {
 }
 
 impl TouchColumn {
+    /// Whether it is a whole number: a count, or the id of a taxel.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.output == TouchOutputs::ACTIVE || self.name.ends_with("_taxel")
+    }
+
     /// The quantity of `touch`, its components first, if it is present.
     #[must_use]
     pub fn value(&self, touch: &Touch) -> Option<[f64; 3]> {

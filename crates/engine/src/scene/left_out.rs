@@ -3,9 +3,10 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::body::Body;
+use crate::body::{Body, Modality};
 use crate::error::{Error, Result};
 use crate::field::{Field, FieldSet};
+use crate::percept::TouchOutputs;
 use crate::signal::Letter;
 
 /// What of a plan's fields is left out.
@@ -47,6 +48,14 @@ impl LeftOut {
             return Err(Error::failed(what).at(&body.name));
         }
         Ok(left)
+    }
+
+    /// Without the temperatures that touches have, if `touches` are given them; fields that have no other taxels are still told.
+    pub(super) fn but_for(mut self, touches: Option<TouchOutputs>) -> Self {
+        if self.fields.is_empty() && touches.is_some_and(|outputs| outputs.contains(TouchOutputs::TEMPERATURE)) {
+            self.taxels.remove(&Modality::Temperature.name());
+        }
+        self
     }
 
     /// What is left out, in a line; none where nothing is.

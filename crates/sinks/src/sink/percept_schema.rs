@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::percept::{COLUMNS, TOUCH_COLUMNS, TouchOutputs, Unit};
+use crate::percept::{COLUMNS, TOUCH_COLUMNS, Unit};
 
 /// The schema.
 pub(super) fn text() -> String {
@@ -78,10 +78,9 @@ fn touch() -> Value {
         ("link", described("string", "The link with most of its total.")),
         ("in", described("string", "The frame of its places and directions: the link, or the world.")),
     ];
-    let columns = TOUCH_COLUMNS.iter().map(|column| {
-        let is_count = column.output == TouchOutputs::ACTIVE;
-        (column.name, quantity(column.unit, is_count, column.components, column.help))
-    });
+    let columns = TOUCH_COLUMNS
+        .iter()
+        .map(|column| (column.name, quantity(column.unit, column.is_whole(), column.components, column.help)));
     let tail = [
         ("links", numbers_by_name("The links that it lies on, with their shares of its total.")),
         ("fields", numbers_by_name("The fields that hold parts of it, with their shares of its total.")),
@@ -140,6 +139,7 @@ fn self_contact() -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::percept::TouchOutputs;
     use crate::sink::line::LineWriter;
     use crate::sink::{FieldNames, SkinNames};
     use crate::{Body, Calibration, Engine, Options, RawValue, Scene, bundled, touch};

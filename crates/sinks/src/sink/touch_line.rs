@@ -88,7 +88,7 @@ impl TouchWriter {
             let Some(components) = column.value(touch) else { continue };
             key(line, column.name);
             match column.components {
-                1 if column.output == TouchOutputs::ACTIVE => print(line, &touch.active),
+                1 if column.is_whole() => print(line, &(components[0] as u64)),
                 1 if column.output == TouchOutputs::FIT_KIND => print(line, &touch.fit.map(|fit| fit.kind)),
                 1 => print(line, &components[0]),
                 count => print(line, &&components[..count]),

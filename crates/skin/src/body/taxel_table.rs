@@ -15,6 +15,9 @@ use crate::limits::MAX_TAXELS;
 const COLUMNS: [&str; 13] =
     ["id", "link", "x", "y", "z", "nx", "ny", "nz", "area", "modality", TANGENT[0], TANGENT[1], TANGENT[2]];
 
+/// Sine of the angle to its normal under which a tangent has no direction along the skin.
+const ALONG_NORMAL: f64 = 1e-3;
+
 /// The columns of a taxel's tangent.
 const TANGENT: [&str; 3] = ["tx", "ty", "tz"];
 
@@ -150,12 +153,18 @@ impl Columns {
         if let Some(known) = modality.filter(|&known| tangent.is_some() && known != Modality::Force3) {
             return Err(failed!("it measures {} and has a tangent; leave that blank, or write force3", known.name()));
         }
+        let normal = direction("normal", self.normal)?;
+        if let Some((tangent, normal)) = tangent.zip(normal)
+            && tangent.cross(normal).length() < ALONG_NORMAL
+        {
+            return Err(failed!("its tangent is along its normal; give one along the skin, or leave it blank"));
+        }
         Ok(TaxelRow {
             line,
             id,
             link: given(self.link).map(str::to_owned),
             position: DVec3::new(x?, y?, z?),
-            normal: direction("normal", self.normal)?,
+            normal,
             area_m2: given(self.area).map(area_of).transpose()?,
             modality,
             tangent,
@@ -251,6 +260,9 @@ mod tests {
         assert!(why("id,x,y,z,tx\n1,0,0,0,1\n").contains("a tangent has three columns, tx, ty"));
         let tangent = "id,x,y,z,tx,ty,tz,modality\n1,0,0,0";
         assert!(why(&format!("{tangent},0,0,0,force3\n")).contains("its tangent is zero"));
+        let normal = "id,x,y,z,nx,ny,nz,tx,ty,tz,modality\n1,0,0,0,0,0,1";
+        assert!(why(&format!("{normal},0,0,-2,force3\n")).contains("line 2: its tangent is along its normal"));
+        assert!(read(&format!("{normal},0.1,0,-2,force3\n")).is_ok());
         assert!(why(&format!("{tangent},0,1,0,temperature\n")).contains("it measures temperature and has a tangent"));
         assert!(why("id,x,y,z\n").contains("no rows"));
     }

@@ -17,13 +17,14 @@ const MAX_MEASURED: usize = 4096;
 /// Each member is compared with its six nearest with normals within 90°. The relative error of a pair is its distance in
 /// (u, v) over its distance on the surface, less 1. The distance on the surface is estimated from positions and normals
 /// for a constant curvature: with the chord c, the angle θ between the normals and m the direction of their difference,
-/// c's part along m is lengthened by (θ/2)/sin(θ/2). That is exact on planes, spheres and cylinders. Of more than 4096
-/// members, 4096 are measured, evenly selected.
+/// c's part along m is lengthened by (θ/2)/sin(θ/2). That is exact on planes, spheres and cylinders. Each is also compared with its
+/// six nearest in (u, v): no way on a surface is shorter than the chord, so where these are nearer to each other than that, the chart is
+/// folded, and the relative error is what is missing. Of more than 4096 members, 4096 are measured, evenly selected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion {
-    /// The largest relative error; 0 without neighbours.
+    /// The largest relative error, also of folds; 0 without neighbours.
     pub largest: f64,
-    /// The root mean square of the relative errors.
+    /// The root mean square of the relative errors of neighbours on the surface.
     pub rms: f64,
     /// The most stretched pair of members, and its factor.
     pub worst: Option<(usize, usize, f64)>,
@@ -34,6 +35,7 @@ impl Distortion {
     #[must_use]
     pub fn measure(members: &[(DVec3, DVec3)], places: &[DVec2]) -> Self {
         let tree = point_tree(members.iter().map(|(position, _)| *position));
+        let in_chart = point_tree(places.iter().map(|place| place.extend(0.0)));
         let mut measured = Self::default();
         let (mut squares, mut pairs) = (0.0, 0_u64);
         for i in (0..members.len()).step_by(members.len().div_ceil(MAX_MEASURED).max(1)) {
@@ -49,6 +51,11 @@ impl Distortion {
                 }
                 squares += error * error;
                 pairs += 1;
+            }
+            let near = in_chart.nearest_neighbor_iter(places[i].extend(0.0).to_array()).map(|spot| spot.data);
+            for j in near.filter(|&j| members[j].0 != position).take(NEIGHBOURS) {
+                measured.largest =
+                    measured.largest.max(1.0 - places[i].distance(places[j]) / members[j].0.distance(position));
             }
         }
         measured.rms = if pairs > 0 { (squares / pairs as f64).sqrt() } else { 0.0 };
@@ -93,6 +100,16 @@ mod tests {
         assert!(projected.rms > 0.0 && projected.rms < projected.largest);
         let doubled: Vec<DVec2> = places.iter().map(|&p| 2.0 * p).collect();
         assert!((Distortion::measure(&members, &doubled).rms - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_two_sides_of_a_fin_are_folded_onto_each_other() {
+        let side = |y: f64, normal: DVec3| (0..4).map(move |i| (DVec3::new(0.01 * f64::from(i), y, 0.0), normal));
+        let members: Vec<_> = side(0.0, DVec3::Y).chain(side(-0.002, DVec3::NEG_Y)).collect();
+        let places: Vec<DVec2> = members.iter().map(|(position, _)| DVec2::new(position.x, -position.z)).collect();
+        assert!((Distortion::measure(&members, &places).largest - 1.0).abs() < 1e-12);
+        let apart: Vec<DVec2> = (0..8).map(|i| DVec2::new(0.01 * f64::from(i % 4), 0.1 * f64::from(i / 4))).collect();
+        assert!(Distortion::measure(&members, &apart).largest < 1e-12);
     }
 
     #[test]

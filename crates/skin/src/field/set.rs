@@ -85,7 +85,8 @@ impl FieldSet {
         Self::from_specs(body, &body.fields)
     }
 
-    pub(super) fn from_specs(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
+    #[doc(hidden)]
+    pub fn from_specs(body: &Body, specs: &[FieldSpec]) -> Result<Self> {
         let parents = parents(specs);
         let taxels = unions(specs);
         let (nearest, kept) = (Nearest::new(body), body.kept_of_shape());

@@ -49,7 +49,7 @@ impl Plan {
         let of_touches = touches.map_or(TouchOutputs::empty(), |touches| touches.outputs);
         plan.senses.check_touches(body, of_touches).map_err(|e| e.at(&body.name))?;
         plan.touch_outputs = touches.map(|touches| touches.outputs | plan.senses.of_touches());
-        plan.left_out = left_out;
+        plan.left_out = left_out.but_for(plan.touch_outputs);
         let first_slots = plan.lay_out_slots(calibration)?;
         if touches.is_some() {
             plan.find_touches(&first_slots)?;

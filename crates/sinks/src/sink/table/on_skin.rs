@@ -28,8 +28,9 @@ pub(super) fn columns(outputs: TouchOutputs, session: &Session<'_>) -> Vec<Table
         ),
     ]);
     for (index, quantity) in TOUCH_COLUMNS.iter().enumerate().filter(|(_, of)| outputs.contains(of.output)) {
-        if quantity.output == TouchOutputs::ACTIVE {
-            columns.push(column(quantity.name, "1", TableType::U32, quantity.help, OfTouch::Active));
+        if quantity.is_whole() {
+            let whole = column(quantity.name, "1", TableType::U32, quantity.help, OfTouch::Whole(index));
+            columns.push(if quantity.output == TouchOutputs::ACTIVE { whole } else { whole.or_absent() });
             continue;
         }
         if quantity.output == TouchOutputs::FIT_KIND {

@@ -87,7 +87,6 @@ pub(super) enum OfTouch {
     Age,
     Link,
     In,
-    Active,
     Kind,
     Links,
     Fields,
@@ -95,6 +94,8 @@ pub(super) enum OfTouch {
     Flags,
     /// A component of one of [`TOUCH_COLUMNS`], by its place there.
     Number(usize, usize),
+    /// The same of a whole number.
+    Whole(usize),
 }
 
 impl TableColumn {
@@ -188,7 +189,10 @@ impl Row<'_> {
         match value {
             ValueOf::Frame => Some(self.percepts.frame_number(self.frame)),
             ValueOf::OnSkin(OfTouch::Id) => self.on_skin.map(|(_, touch)| touch.id),
-            ValueOf::OnSkin(OfTouch::Active) => self.on_skin.map(|(_, touch)| touch.active.into()),
+            ValueOf::OnSkin(OfTouch::Whole(column)) => {
+                let (_, touch) = self.on_skin?;
+                TOUCH_COLUMNS[column].value(touch).map(|[number, ..]| number as u64)
+            }
             ValueOf::ContactId => self.contact.map(|contact| contact.id),
             ValueOf::SideTouch(side) => self.contact.map(|contact| contact.sides[side].touch),
             ValueOf::Output(..) => self.float(value).map(|number| number as u64),
