@@ -448,4 +448,17 @@ mod tests {
         assert_eq!(numbers(&take(&mut intake, &seen)), [Some(120.0), Some(200.0), None]);
         assert_eq!((intake.stale(), intake.notes()), (&[vec![0, 6]][..], &[vec![(0, Reading::Missing)]][..]));
     }
+    #[test]
+    fn the_channels_of_a_large_skin_are_found_at_once() {
+        let ids: Vec<u32> = (0..60_000).collect();
+        let leak = "[shear]\ncross_axis = [[1, 1, 2], [0, 1, 0], [0, 0, 1]]\n";
+        let calibration = Calibration::parse(leak, &ids).unwrap();
+        let (began, taxels) = (std::time::Instant::now(), ids.len());
+        let mut intake = Intake::new(calibration, Vec::new(), 0.0, (0..3 * taxels).map(|at| at % taxels).collect());
+        intake.set_channels((0..3 * taxels).rev().collect());
+        assert!(began.elapsed().as_secs_f64() < 1.0, "{:?}", began.elapsed());
+        let values: Vec<RawValue> =
+            (0..3 * taxels).rev().map(|channel| RawValue::new((channel / taxels) as f64)).collect();
+        assert_eq!(intake.read_alone(3 * taxels - 1, &values).number(), Some(5.0));
+    }
 }
