@@ -61,7 +61,8 @@ impl PyCalibration {
     /// This one laid over `own`, which comes with the file `of`, as the command does it: keys that it has replace the file's own,
     /// others stay. With it, what stays and a unit that is replaced, a line each.
     pub(crate) fn over(&self, own: &Self, of: &str, body: &PyBody) -> somatic::Result<(Self, Vec<String>)> {
-        let laid = Calibration::lay_over(&own.text, &self.text)?;
+        let taxels: Vec<_> = body.inner.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+        let laid = Calibration::lay_over_for(&own.text, &self.text, &taxels)?;
         let stays = match &laid.stays[..] {
             [] => None,
             stays => Some(format!("{of}: of its own calibration, this stays under yours: {}", stays.join(", "))),

@@ -7,6 +7,7 @@ use std::slice;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use somatic::body::Modality;
 use somatic::internal::convert::{FrameFile, is_body};
 use somatic::internal::limits::{self, MAX_TOML_BYTES};
 use somatic::internal::recording::{BODY, CALIBRATION};
@@ -14,12 +15,12 @@ use somatic::internal::run::left_out;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::attached::{self, body_bytes, file_name};
 use somatic::internal::setup::bodies::load_body;
-use somatic::internal::setup::overlaid::{How, overlaid};
+use somatic::internal::setup::overlaid::{How, kinds_in, overlaid};
 use somatic::internal::setup::{open_mapped, source_of};
 use somatic::internal::signal::Channel;
 use somatic::recording::Reader;
 use somatic::source::{SimulatedSource, Source, SourceSpec, VendorOptions, VendorSource};
-use somatic::{Error, Result};
+use somatic::{Body, Error, Result};
 
 use super::bar::Bar;
 use super::exports::ExportFlags;
@@ -180,6 +181,15 @@ fn opened(
 /// What lies beside frames: its name, its media type, its bytes.
 type Beside = (String, String, Vec<u8>);
 
+/// The taxels of the body in the recording that is converted, ids and what they measure; none where it has none: those of exports are of
+/// pressure.
+fn kinds_of(from: &SourceSpec) -> Result<Vec<(u32, Modality)>> {
+    let SourceSpec::Mcap(path) = from else { return Ok(Vec::new()) };
+    let Some((name, bytes)) = attached::body(path)? else { return Ok(Vec::new()) };
+    let body = Body::from_bytes(&name, &bytes).map_err(|e| e.at(path.display()))?;
+    Ok(kinds_in(&body))
+}
+
 /// What is to lie beside the frames. What is named comes before what the recording or the
 /// simulation has.
 fn files(arguments: &Arguments, from: &SourceSpec, export: Option<&VendorSource>) -> Result<Vec<Beside>> {
@@ -197,7 +207,10 @@ fn files(arguments: &Arguments, from: &SourceSpec, export: Option<&VendorSource>
             _ => None,
         };
         let text = match own {
-            Some((of, own)) => overlaid(&of, &own, path, &given, How::Laid, &said())?,
+            Some((of, own)) => {
+                let taxels = kinds_of(from)?;
+                overlaid((&of, &own), (path, &given), &taxels, How::Laid, &said())?
+            }
             None => given,
         };
         files.push((CALIBRATION.to_owned(), "application/toml".to_owned(), text.into_bytes()));

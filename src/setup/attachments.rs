@@ -22,7 +22,7 @@ pub fn attachments(setup: &Setup, body: &Body, scene: Option<&Path>) -> Result<V
         None => (file_name(&body.name), body_bytes(&body.name)?),
     };
     let mut files = vec![(name, BODY.to_owned(), bytes)];
-    let calibration = setup.calibration_text()?.map(|(_, text)| text.into_bytes());
+    let calibration = setup.calibration_text(body)?.map(|(_, text)| text.into_bytes());
     let toml = "application/toml".to_owned();
     files.extend(calibration.map(|bytes| (CALIBRATION.to_owned(), toml.clone(), bytes)));
     if let Some(scene) = scene {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::overlaid::{How, overlaid};
+use super::overlaid::{How, kinds_in, overlaid};
 use super::{Setup, attached};
 use crate::body::{Body, Modality};
 use crate::bundled::MEETING_CALIBRATION;
@@ -27,12 +27,12 @@ impl Setup {
         Ok(attached::calibration(recording, &self.tell)?.map(|text| (recording.clone(), text)))
     }
 
-    /// The text of the calibration that is used, and what it comes with: the named one, laid over the own one of an export or
+    /// The text of the calibration that is used for `body`, and what it comes with: the named one, laid over the own one of an export or
     /// a recording. A simulation's own is replaced.
-    pub(crate) fn calibration_text(&self) -> Result<Option<(PathBuf, String)>> {
+    pub(crate) fn calibration_text(&self, body: &Body) -> Result<Option<(PathBuf, String)>> {
         let Some(path) = &self.calibration else { return self.calibration_found() };
         let given = limits::read_to_string(path, MAX_TOML_BYTES).map_err(|e| Error::io(path, &e))?;
-        Ok(Some((path.clone(), self.over_own(path, given)?)))
+        Ok(Some((path.clone(), self.over_own(path, given, &kinds_in(body))?)))
     }
 
     /// The calibration where none is named: the one that comes with what is read, or with the bundled touch.
@@ -42,11 +42,12 @@ impl Setup {
         Ok(self.own_calibration()?.or_else(|| is_meeting.then(bundled)))
     }
 
-    /// The calibration `given`, at `path`, laid over the one that comes with what is read.
-    fn over_own(&self, path: &Path, given: String) -> Result<String> {
+    /// The calibration `given`, at `path`, laid over the one that comes with what is read, for `taxels`.
+    fn over_own(&self, path: &Path, given: String, taxels: &[(u32, Modality)]) -> Result<String> {
         let Some((of, own)) = self.own_calibration()? else { return Ok(given) };
         let is_replaced = matches!(self.first_source()?, Some(SourceSpec::Sim(_)));
-        let laid = overlaid(&of, &own, path, &given, if is_replaced { How::Replaced } else { How::Laid }, &self.tell)?;
+        let how = if is_replaced { How::Replaced } else { How::Laid };
+        let laid = overlaid((&of, &own), (path, &given), taxels, how, &self.tell)?;
         Ok(if is_replaced { given } else { laid })
     }
 
@@ -59,7 +60,7 @@ impl Setup {
             // Alone first, so that what is wrong with the file has its line.
             let calibration = Calibration::parse_for(&given, &taxels).map_err(|e| e.at(path.display()))?;
             calibration.check_body(&body.name).map_err(|e| e.at(path.display()))?;
-            let text = self.over_own(path, given)?;
+            let text = self.over_own(path, given, &taxels)?;
             Calibration::parse_for(&text, &taxels)
                 .map_err(|e| e.at("laid over the calibration of what is read").at(path.display()))
         };

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::Tell;
+use crate::body::{Body, Modality};
 use crate::error::Result;
 use crate::signal::{Calibration, LaidOver};
 
@@ -15,12 +16,23 @@ pub enum How {
     Replaced,
 }
 
-/// The text of the calibration `given`, at `path`, laid over `own`, which comes with `of`. Tells once what of
-/// `own` stays, or that its unit does not.
-pub fn overlaid(of: &Path, own: &str, path: &Path, given: &str, how: How, tell: &Tell) -> Result<String> {
-    let laid = Calibration::lay_over(own, given).map_err(|e| e.at(path.display()))?;
+/// The text of the calibration `given`, at a path, laid over `own`, which comes with a file, for `taxels`, ids and what they measure,
+/// ascending. Tells once what of `own` stays, or that its unit does not.
+pub fn overlaid(
+    (of, own): (&Path, &str),
+    (path, given): (&Path, &str),
+    taxels: &[(u32, Modality)],
+    how: How,
+    tell: &Tell,
+) -> Result<String> {
+    let laid = Calibration::lay_over_for(own, given, taxels).map_err(|e| e.at(path.display()))?;
     words(&laid, how).iter().for_each(|what| tell.once(&format!("{}: {what}", of.display())));
     Ok(laid.text)
+}
+
+/// The taxels of `body`, ids and what they measure, ascending.
+pub fn kinds_in(body: &Body) -> Vec<(u32, Modality)> {
+    body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect()
 }
 
 fn words(laid: &LaidOver, how: How) -> Vec<String> {

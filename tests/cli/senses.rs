@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use somatic::internal::colours::{distance_colours, pressure_colours, temperature_colours};
 use somatic_testing::skip;
 
-use super::{done, fails, output, stderr, text_of};
+use super::{done, fails, frames, output, stderr, text_of};
 
 /// A skin with two taxels of each kind, its calibration and a recording: pressed and pulled along y, warmer from second to second,
 /// with something that comes nearer to the first proximity taxel, and nothing near the second.
@@ -368,4 +368,38 @@ fn the_bundled_meeting_is_read_in_its_own_units() {
     assert_eq!(header(&[]), header(&["--calibration", CALIBRATION]));
     // From its file it is a table like any other.
     assert!(header(&["--source", MEETING]).contains("total [count]"));
+}
+
+#[test]
+fn a_calibration_is_laid_over_what_single_taxels_of_its_kinds_have() {
+    let skin = Skin::new();
+    let at = |name: &str| text_of(&skin.at(name)).to_owned();
+    let (recording, given, laid) = (at("pad.mcap"), at("given.toml"), at("laid.mcap"));
+    std::fs::write(skin.at("own.toml"), "[taxel.10]\ngain = 0.1\nbaseline = 5\n").unwrap();
+    done(&["convert", &at("touch.csv"), &recording, "--body", &at("pad.glb"), "--calibration", &at("own.toml")]);
+    let found = |recording: &str, calibration: &[&str]| {
+        let asked = ["run", "--source", recording, "--outputs", "temperature", "--backend", "cpu", "--sink", "-"];
+        let output = output(&[&asked[..], calibration].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let first = frames(&String::from_utf8_lossy(&output.stdout))[0].clone();
+        let fields = first["fields"].as_array().unwrap();
+        let celsius = fields.iter().find_map(|field| field["temperature"].as_f64()).unwrap();
+        (celsius, stderr(&output))
+    };
+    // Taxels 10 and 11 read 20 and 30 in the first frame.
+    for (text, celsius, stays) in [
+        ("[all]\ngain = 2\nbaseline = 1\nraw_range = [0, 255]\n", (1.5 + 30.0) / 2.0, Some("[taxel.10]")),
+        ("[temperature]\ngain = 2\nbaseline = 10\n", (20.0 + 40.0) / 2.0, None),
+    ] {
+        std::fs::write(&given, text).unwrap();
+        let (as_read, said) = found(&recording, &["--calibration", &given]);
+        let told = said.split_once("this stays under --calibration: ").and_then(|(_, after)| after.lines().next());
+        assert_eq!(told, stays, "{said}");
+        done(&["convert", &recording, &laid, "--calibration", &given, "--force"]);
+        let converted = found(&laid, &[]).0;
+        assert!(
+            [as_read, converted].iter().all(|found| (found - celsius).abs() < 1e-9),
+            "{text}: {as_read} {converted}"
+        );
+    }
 }

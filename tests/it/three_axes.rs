@@ -174,6 +174,72 @@ fn a_tangential_value_out_of_its_range_is_not_believed_and_said() {
 }
 
 #[test]
+fn a_normal_value_is_corrected_by_what_is_known_and_flagged_for_the_rest() {
+    let body = skin(1);
+    let text = "[all]\nunit = \"N\"\nraw_range = [0, 1023]\n[shear]\nraw_range = [-500, 500]\n\
+                cross_axis = [[2, 0.5, 0], [0, 1, 0], [0, 0, 1]]\n";
+    let raw = RawValue::new;
+    let (none, faulty, off) = (Flags::INCOMPLETE, Flags::FAULTY_INPUT, Flags::OUT_OF_RANGE);
+    for kind in backends() {
+        for (name, value, total, flags) in [
+            ("12.u", raw(0.0), 200.0, Flags::empty()),
+            ("12.u", raw(-40.0), 180.0, Flags::empty()),
+            ("12.u", RawValue::MISSING, 200.0, none),
+            ("12.u", RawValue::STALE, 200.0, none | Flags::STALE),
+            ("12.u", RawValue::FAULTY, 200.0, faulty),
+            ("12.u", raw(501.0), 200.0, off),
+            // Nothing of it is in P.
+            ("12.v", RawValue::MISSING, 200.0, Flags::empty()),
+            // The range is of what is measured.
+            ("12", raw(700.0), 1400.0, Flags::empty()),
+            ("12", raw(1024.0), 2048.0, off),
+        ] {
+            let mut engine = engine(&body, kind, text, false);
+            engine.track_stale();
+            let mut pressed = engine.frame(0.0);
+            pressed.values.fill(raw(0.0));
+            for (name, value) in [("12", raw(100.0)), (name, value)] {
+                pressed.values[engine.index_of(name).unwrap()] = value;
+            }
+            let [pressure, shear] = percepts(&mut engine, &pressed)[..] else { panic!("two letters") };
+            let touch = &engine.percepts().touches(0).unwrap().touches[0];
+            let of_values = none | faulty | off | Flags::STALE;
+            assert_eq!((pressure.total, pressure.flags & of_values), (Some(total), flags), "{name} {value}");
+            assert!(shear.flags.contains(flags), "{name} {value}: {shear:?}");
+            assert_eq!(touch.total, total, "{name} {value}");
+            for (of_touch, flag) in [
+                (TouchFlags::INCOMPLETE, none),
+                (TouchFlags::FAULTY_INPUT, faulty),
+                (TouchFlags::OUT_OF_RANGE, off),
+                (TouchFlags::STALE, Flags::STALE),
+            ] {
+                // A touch says also that its tangential force is not known.
+                let is_right = touch.flags.contains(of_touch) == flags.contains(flag) || name == "12.v";
+                assert!(is_right, "{name} {value}: {:?}", touch.flags);
+            }
+        }
+    }
+}
+
+#[test]
+fn pressures_of_a_frame_that_is_too_short_are_those_of_its_values() {
+    let body = skin(1);
+    let text = "[shear]\ncross_axis = [[2, 0.5, 1], [0, 1, 0], [0, 0, 1]]\n";
+    let engine = engine(&body, BackendKind::Reference, text, false);
+    let mut short = engine.frame(0.0);
+    let [normal, u, v] = ["12", "12.u", "12.v"].map(|name| engine.index_of(name).unwrap());
+    for (place, value) in [(normal, 100.0), (u, 10.0), (v, 7.0)] {
+        short.values[place] = RawValue::new(value);
+    }
+    let mut felt = Vec::new();
+    for (length, right) in [(v + 1, Some(212.0)), (v, Some(205.0)), (u, Some(200.0)), (normal, None)] {
+        short.values.truncate(length);
+        engine.pressures(&short, &mut felt);
+        assert_eq!(felt.iter().find(|(id, _)| *id == 12).map(|(_, pressure)| *pressure), right);
+    }
+}
+
+#[test]
 fn a_scale_of_all_gains_leaves_the_friction() {
     let body = skin(1);
     let of = |scale: &str, own: &str| {
@@ -200,7 +266,8 @@ fn normal_forces_by_a_curve_are_not_corrected_and_that_is_said() {
         Engine::new(&body, Options::default().calibration(Some(calibration))).map(drop).map_err(|e| e.to_string())
     };
     let why = made("curve = \"a\"").unwrap_err();
-    assert!(why.contains("`cross_axis` in [shear] corrects normal forces, which taxel 12 has by a curve"), "{why}");
+    let right = format!("{}: `cross_axis` in [shear] corrects normal forces, which taxel 12 has by a curve", body.name);
+    assert!(why.starts_with(&right), "{why}");
     made("curve = \"a\"\nmask = true").unwrap();
     made("gain = 2").unwrap();
 }

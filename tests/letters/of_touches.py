@@ -90,12 +90,14 @@ class TouchesOf:
         for place, axis in enumerate(("u", "v")):
             side, missing = read(recording, [taxel for taxel in self.taxels if body.kind[taxel] == "force3"], axis)
             self.sides[place][:, self.has_axes] = np.where(missing, np.nan, side)
-        self.known = (np.isfinite(self.sides) & (self.sides >= low) & (self.sides <= high)).all(axis=0)
+        known = np.isfinite(self.sides) & (self.sides >= low) & (self.sides <= high)
+        self.known = known.all(axis=0)
         self.lateral = self.side_gain[:, None] * (self.sides - self.rest)
         self.large = self.side_gain[:, None] * (np.abs(self.sides) + np.abs(self.rest))
-        # What is along the skin is taken out of raw values, which are singles, where it is known.
-        leak = (self.cross[0, 0] - 1) * (raw - self.baseline) + np.tensordot(self.cross[0, 1:], self.lateral / self.gain, 1)
-        is_leaky = self.known & np.isfinite(leak) & np.any(self.cross[0] != [1, 0, 0])
+        # What is along the skin is taken out of raw values, which are singles, as far as it is known.
+        leak = (self.cross[0, 0] - 1) * (raw - self.baseline)
+        leak += np.tensordot(self.cross[0, 1:], np.where(known, self.lateral / self.gain, 0), 1)
+        is_leaky = self.has_axes & np.isfinite(leak) & np.any(self.cross[0] != [1, 0, 0])
         self.raw = np.where(is_leaky, raw + np.where(is_leaky, leak, 0), raw).astype(np.float32).astype(float)
 
     def find_warm(self, recording):

@@ -209,13 +209,22 @@ def shears(recording, field, frames):
         side = np.stack([sides[axis][0][frame] for axis in (0, 1)])
         no_side = sides[0][1][frame] | sides[1][1][frame]
         with np.errstate(invalid="ignore"):
-            off_side = ((side < side_range[:, 0]) | (side > side_range[:, 1])).any(axis=0)
+            off_range = (side < side_range[:, 0]) | (side > side_range[:, 1])
+            off_side = off_range.any(axis=0)
             lateral = side_gain * (side - rest.T)
-            # What is along the skin is taken out of raw values, which are singles, where it is known.
-            leak = (cross[0, 0] - 1) * (raw[frame] - baseline) + cross[0, 1:] @ (lateral / gain)
-            is_leaky = np.isfinite(leak) & ~gone & ~no_side & ~off_side & np.any(cross[0] != [1, 0, 0])
+            # What is along the skin is taken out of raw values, which are singles, as far as it is known.
+            absent = np.stack([sides[axis][1][frame] for axis in (0, 1)])
+            no_number = ~absent & ~np.isfinite(side)
+            off_range &= ~absent & ~no_number
+            in_part = usable & (cross[0, 1:, None] != 0)
+            shares = np.where(absent | no_number | off_range, 0, cross[0, 1:, None] * lateral / gain)
+            leak = (cross[0, 0] - 1) * (raw[frame] - baseline) + shares.sum(axis=0)
+            is_leaky = usable & np.any(cross[0] != [1, 0, 0])
             normal_raw = np.where(is_leaky, (raw[frame] + leak).astype(np.float32), raw[frame])
-            outside = usable & ((normal_raw < ranges[:, 0]) | (normal_raw > ranges[:, 1]))
+            outside = usable & ((raw[frame] < ranges[:, 0]) | (raw[frame] > ranges[:, 1]))
+            flags |= {"incomplete"} if (in_part & absent).any() else set()
+            flags |= {"faulty_input"} if (in_part & no_number).any() else set()
+            flags |= {"out_of_range"} if (in_part & off_range).any() else set()
             pressure = gain * (normal_raw - baseline)
             pressed = usable & (pressure > dead_band) & (pressure > 0)
             flags |= {"saturated"} if (pressed & (pressure > most)).any() else set()

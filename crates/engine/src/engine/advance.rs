@@ -10,7 +10,7 @@ use super::check::Check;
 use super::dominated::orient_again;
 use super::input::{GoOn, Input};
 use super::letters::SensedValues;
-use super::post::{Post, flag_stale, flag_stale_poses};
+use super::post::{Post, flag_noted, flag_stale_poses};
 use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
@@ -37,7 +37,8 @@ impl Engine {
         to.clear();
         if !sensed.channels().is_empty() {
             let value = |(at, &channel): (&Option<u32>, &usize)| {
-                at.map_or(RawValue::MISSING, |at| self.intake.read(channel, frame.values[at as usize]))
+                let value = at.and_then(|at| frame.values.get(at as usize));
+                value.map_or(RawValue::MISSING, |&value| self.intake.read(channel, value))
             };
             let own: Vec<RawValue> = self.sensed_at.iter().zip(&self.plan.senses.channels).map(value).collect();
             to.extend(sensed.read(&self.plan, &self.raw_in(frame), &own));
@@ -114,7 +115,7 @@ impl Engine {
             return Ok(false);
         }
         for percepts in [Some(&mut self.percepts), check.map(|check| &mut check.right)].into_iter().flatten() {
-            flag_stale(&self.plan, self.intake.stale(), percepts);
+            flag_noted(&self.plan, &self.intake, percepts);
             flag_stale_poses(&self.plan, &self.links, frames, percepts);
         }
         self.frames_done += frames.len() as u64;
@@ -142,7 +143,7 @@ impl Engine {
         }
         self.raw.clear();
         self.sensed.clear();
-        self.intake.forget_stale();
+        self.intake.forget_notes();
         for (index, frame) in frames.iter().enumerate() {
             let row = values.row(index);
             if self.picks.is_none() {
@@ -258,7 +259,7 @@ impl Engine {
         if let Some(on_skin) = &mut self.on_skin {
             let of_touches = check.as_deref_mut().and_then(|check| check.touches.as_mut());
             let about = (&self.plan, &self.links);
-            let beside = (self.intake.stale(), sensed);
+            let beside = (&self.intake, sensed);
             on_skin.find(about, frames, &raw, beside, &mut self.percepts, of_touches);
             if let Some(check) = &mut check {
                 check.take_several(&raw, &self.percepts);

@@ -18,7 +18,7 @@ use crate::body::Body;
 use crate::field::TaxelGraph;
 use crate::percept::{Flags, LinkShare, Percepts, TouchFlags, TouchFrame, TouchOutputs};
 use crate::scene::{Plan, PlanField, Scene};
-use crate::signal::{Frame, LayerResponse, Quantity, RawValue, Response, TaxelCalibration};
+use crate::signal::{self, Frame, Intake, LayerResponse, Quantity, RawValue, Response, TaxelCalibration};
 use crate::stage::fit::STEPS;
 use crate::stage::self_contacts::Memory;
 use crate::stage::{calibrate, force};
@@ -153,21 +153,22 @@ impl OnSkin {
         }
     }
 
-    /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `stale` has the taxels of the
-    /// body that are stale, by frame of the call, and `sensed` what is read beside pressures. With `check`, touches are compared with their definition.
+    /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `intake` has noted
+    /// what is stale, by frame of the call, and what is corrected in part; `sensed` has what is read beside pressures. With `check`, touches are compared with their definition.
     pub(super) fn find(
         &mut self,
         (plan, links): (&Plan, &Links),
         frames: &[Frame],
         raw: &RawBatch<'_>,
-        (stale, sensed): (&[Vec<usize>], SensedValues<'_>),
+        (intake, sensed): (&Intake, SensedValues<'_>),
         percepts: &mut Percepts,
         mut check: Option<&mut TouchCheck>,
     ) {
         for (offset, frame) in frames.iter().enumerate() {
             let index = raw.first + offset;
-            let stale = stale.get(index).map_or(&[][..], Vec::as_slice);
+            let stale = intake.stale().get(index).map_or(&[][..], Vec::as_slice);
             self.look_at_values(plan, raw, offset, stale, percepts);
+            self.look_at_corrected(plan, intake.notes().get(index).map_or(&[][..], Vec::as_slice));
             if let Some(senses) = self.senses.as_ref().filter(|_| !stale.is_empty()) {
                 self.notes.extend(senses.stale_nodes(plan, stale).map(|node| (node, TouchFlags::STALE)));
             }
@@ -255,6 +256,24 @@ impl OnSkin {
         }
         let channels = stale.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok());
         self.notes.extend(channels.map(|channel| (channel as u32, TouchFlags::STALE)));
+    }
+
+    /// Notes which taxels are corrected in part, or were out of range before: touches that hold them say so.
+    fn look_at_corrected(&mut self, plan: &Plan, noted: &[(usize, signal::Reading)]) {
+        let on_skin = |&(taxel, reading): &(usize, signal::Reading)| {
+            let channel = plan.body_taxels.binary_search(&taxel).ok()?;
+            Some((channel as u32, flag_of(reading)))
+        };
+        self.notes.extend(noted.iter().filter_map(on_skin));
+    }
+}
+
+/// What a touch is flagged with for a reading that is out of range or none.
+fn flag_of(reading: signal::Reading) -> TouchFlags {
+    match reading {
+        signal::Reading::Missing => TouchFlags::INCOMPLETE,
+        signal::Reading::Faulty => TouchFlags::FAULTY_INPUT,
+        signal::Reading::Value(..) => TouchFlags::OUT_OF_RANGE,
     }
 }
 

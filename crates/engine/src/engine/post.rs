@@ -10,7 +10,7 @@ use super::spread::{Frames, Now};
 use crate::backend::{RawBatch, Step, sigma};
 use crate::percept::{Flags, Host, Outputs, Percepts, Values};
 use crate::scene::{Plan, PlanField, SensedMember};
-use crate::signal::{Frame, Quantity, RawValue, Receptor};
+use crate::signal::{Frame, Intake, Quantity, RawValue, Reading, Receptor};
 use crate::stage::layout::Member;
 use crate::stage::window::Trend;
 use crate::stage::{difference, filter, force, motion, world_motion};
@@ -65,23 +65,48 @@ pub(super) struct Post<'a> {
     pub(super) sensed: SensedValues<'a>,
 }
 
-/// Flags every field that holds a taxel that is stale. `stale` has the channels of the body that are, frame by frame.
-pub(super) fn flag_stale(plan: &Plan, stale: &[Vec<usize>], percepts: &mut Percepts) {
-    let fields = plan.fields.len();
-    for (frame, stale) in stale.iter().enumerate().filter(|(_, stale)| !stale.is_empty()) {
-        let mut channels = vec![false; plan.channels()];
-        for channel in stale.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok()) {
-            channels[channel] = true;
+/// Flags every field that holds a taxel that `intake` has noted: stale, corrected in part, or out of range before it was corrected.
+pub(super) fn flag_noted(plan: &Plan, intake: &Intake, percepts: &mut Percepts) {
+    for (frame, stale) in intake.stale().iter().enumerate() {
+        flag_fields_of(plan, stale, (frame, Flags::STALE), percepts);
+    }
+    for (frame, notes) in intake.notes().iter().enumerate().filter(|(_, notes)| !notes.is_empty()) {
+        for flag in [Flags::INCOMPLETE, Flags::FAULTY_INPUT, Flags::OUT_OF_RANGE] {
+            // As they are noted: ascending.
+            let taxels: Vec<usize> =
+                notes.iter().filter(|(_, reading)| flag_of(*reading) == flag).map(|(taxel, _)| *taxel).collect();
+            flag_fields_of(plan, &taxels, (frame, flag), percepts);
         }
-        for (flags, field) in percepts.flags[frame * fields..][..fields].iter_mut().zip(plan.fields.iter()) {
-            let is_pressed_one = |member: &Member| channels[plan.channel_of(member.slot as usize)];
-            let is_stale = |channel: usize| stale.binary_search(&channel).is_ok();
-            let is_sensed_one = |member: &SensedMember| {
-                is_stale(member.taxel) || member.values.iter().any(|&value| is_stale(plan.senses.channels[value]))
-            };
-            if plan.members_of(field).iter().any(is_pressed_one) || field.sensed.iter().any(is_sensed_one) {
-                *flags |= Flags::STALE;
-            }
+    }
+}
+
+/// What a field is flagged with for a reading that is out of range or none.
+fn flag_of(reading: Reading) -> Flags {
+    match reading {
+        Reading::Missing => Flags::INCOMPLETE,
+        Reading::Faulty => Flags::FAULTY_INPUT,
+        Reading::Value(..) => Flags::OUT_OF_RANGE,
+    }
+}
+
+/// Flags every field that holds one of `noted` in a frame: channels of the body, ascending.
+fn flag_fields_of(plan: &Plan, noted: &[usize], (frame, flag): (usize, Flags), percepts: &mut Percepts) {
+    if noted.is_empty() {
+        return;
+    }
+    let fields = plan.fields.len();
+    let mut channels = vec![false; plan.channels()];
+    for channel in noted.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok()) {
+        channels[channel] = true;
+    }
+    for (flags, field) in percepts.flags[frame * fields..][..fields].iter_mut().zip(plan.fields.iter()) {
+        let is_pressed_one = |member: &Member| channels[plan.channel_of(member.slot as usize)];
+        let is_noted = |channel: usize| noted.binary_search(&channel).is_ok();
+        let is_sensed_one = |member: &SensedMember| {
+            is_noted(member.taxel) || member.values.iter().any(|&value| is_noted(plan.senses.channels[value]))
+        };
+        if plan.members_of(field).iter().any(is_pressed_one) || field.sensed.iter().any(is_sensed_one) {
+            *flags |= flag;
         }
     }
 }

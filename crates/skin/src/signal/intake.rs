@@ -3,10 +3,8 @@
 //!
 //! It runs on the host, frame by frame, so that all backends get the same input for any batch size.
 
-use std::collections::BTreeMap;
-
-use super::leak::Leak;
-use super::{Calibration, RawValue};
+use super::leak::{Corrected, corrected};
+use super::{Calibration, RawValue, Reading};
 
 /// What selects values.
 #[derive(Clone, Debug)]
@@ -28,18 +26,10 @@ pub struct Intake {
     now: Vec<RawValue>,
     /// Per taxel its distance from rest, raw units, for the check of isolated values.
     rise: Vec<f64>,
-    /// Per frame since [`Intake::forget_stale`] its stale taxels; `None` if they are not tracked.
+    /// Per frame since [`Intake::forget_notes`] its stale taxels; `None` if they are not tracked.
     stale: Option<Vec<Vec<usize>>>,
-}
-
-/// A taxel whose normal value is corrected.
-#[derive(Clone, Debug)]
-struct Corrected {
-    leak: Leak,
-    /// Its channels: its own, and those along t and n × t.
-    channels: [usize; 3],
-    /// Where the last two are in a frame.
-    places: [Option<usize>; 2],
+    /// Per frame since then what is wrong with values that corrected ones are made of; empty if none are corrected.
+    notes: Vec<Vec<(usize, Reading)>>,
 }
 
 /// What it knows of the frames so far.
@@ -78,6 +68,7 @@ impl Intake {
             now: vec![RawValue::MISSING; channels],
             rise: vec![0.0; taxels],
             stale: None,
+            notes: Vec::new(),
         };
         made.set_channels((0..channels).collect());
         made
@@ -85,11 +76,21 @@ impl Intake {
 
     /// From now on, value i of a frame belongs to channel `taxel_of_value[i]`.
     pub fn set_channels(&mut self, taxel_of_value: Vec<usize>) {
-        for own in &mut self.corrected {
-            let place = |of: usize| taxel_of_value.iter().position(|&channel| channel == own.channels[of]);
-            own.places = [place(1), place(2)];
-        }
         self.taxel_of_value = taxel_of_value;
+        let place_of = self.place_of_channel();
+        for own in &mut self.corrected {
+            let [_, u, v] = own.channels;
+            own.places = [u, v].map(|channel| place_of[channel]);
+        }
+    }
+
+    /// Per channel where it is in a frame.
+    fn place_of_channel(&self) -> Vec<Option<usize>> {
+        let mut place_of = vec![None; self.now.len()];
+        for (place, &channel) in self.taxel_of_value.iter().enumerate() {
+            place_of[channel] = Some(place);
+        }
+        place_of
     }
 
     /// Per value of a frame the channel that it belongs to.
@@ -112,14 +113,22 @@ impl Intake {
         self.stale = Some(Vec::new());
     }
 
-    /// Per frame since [`Intake::forget_stale`] its stale taxels; empty if they are not tracked.
+    /// Per frame since [`Intake::forget_notes`] its stale channels, ascending; empty if they are not tracked. A taxel whose value is corrected
+    /// is stale with each of those that correct it.
     pub fn stale(&self) -> &[Vec<usize>] {
         self.stale.as_deref().unwrap_or_default()
     }
 
-    /// Forgets the stale taxels of the frames so far.
-    pub fn forget_stale(&mut self) {
+    /// Per frame since [`Intake::forget_notes`] the taxels whose values are corrected in part, or are out of range as they are measured, and
+    /// with what reading; empty if none are corrected. The values count.
+    pub fn notes(&self) -> &[Vec<(usize, Reading)>] {
+        &self.notes
+    }
+
+    /// Forgets what was noted of the frames so far.
+    pub fn forget_notes(&mut self) {
         self.stale.iter_mut().for_each(Vec::clear);
+        self.notes.clear();
     }
 
     /// The number of values of a frame.
@@ -141,11 +150,8 @@ impl Intake {
 
     /// The indices in a frame of the channels `slots`, of those that the source delivers.
     pub fn places(&self, slots: &[usize]) -> Vec<Option<u32>> {
-        let mut value_of = vec![None; self.now.len()];
-        for (value, &channel) in self.taxel_of_value.iter().enumerate() {
-            value_of[channel] = u32::try_from(value).ok();
-        }
-        slots.iter().map(|&slot| value_of[slot]).collect()
+        let place_of = self.place_of_channel();
+        slots.iter().map(|&slot| place_of[slot].and_then(|place| u32::try_from(place).ok())).collect()
     }
 
     /// Appends to `out` the values of the taxels `slots` in the frame at `t_s` with `values`.
@@ -162,6 +168,7 @@ impl Intake {
         self.state.frames_seen += 1;
         self.is_rejected = settling || self.is_broken();
         if self.is_rejected {
+            self.notes.extend((!self.corrected.is_empty()).then(Vec::new));
             out.extend(
                 slots
                     .iter()
@@ -169,13 +176,27 @@ impl Intake {
             );
             return;
         }
-        for Corrected { leak, channels: [normal, u, v], .. } in &self.corrected {
-            self.now[*normal] = leak.corrected(self.now[*normal], [self.now[*u], self.now[*v]]);
-        }
+        self.correct();
         if let Some(ratio) = self.calibration.checks.isolated_ratio {
             self.reject_isolated(ratio);
         }
+        if let Some(noted) = self.notes.last_mut() {
+            noted.retain(|(taxel, _)| self.now[*taxel].number().is_some());
+        }
         out.extend(slots.iter().map(|&slot| self.now[slot]));
+    }
+
+    /// Corrects values, and notes what is wrong with what they are made of.
+    fn correct(&mut self) {
+        if self.corrected.is_empty() {
+            return;
+        }
+        let mut noted = Vec::new();
+        for Corrected { leak, channels: [normal, u, v], .. } in &self.corrected {
+            let note = |reading| noted.push((*normal, reading));
+            self.now[*normal] = leak.corrected(self.now[*normal], [self.now[*u], self.now[*v]], note);
+        }
+        self.notes.push(noted);
     }
 
     /// Appends to `out` the values of the channels `slots` in the last frame taken.
@@ -193,13 +214,22 @@ impl Intake {
     }
 
     /// What value `place` of a frame of `values` is by itself, without what the frames before tell: missing as [`Intake::read`] has it, and
-    /// corrected.
+    /// corrected. Values that `values` is too short for are missing.
     pub fn read_alone(&self, place: usize, values: &[RawValue]) -> RawValue {
-        let read = |place: usize| self.read(self.taxel_of_value[place], values[place]);
-        let own = self.corrected.binary_search_by_key(&self.taxel_of_value[place], |own| own.channels[0]);
-        match own.map(|at| (&self.corrected[at].leak, self.corrected[at].places)) {
-            Ok((leak, [Some(u), Some(v)])) => leak.corrected(read(place), [read(u), read(v)]),
-            _ => read(place),
+        let read = |place: usize| {
+            let value = values.get(place).copied().unwrap_or_default();
+            self.taxel_of_value.get(place).map_or(RawValue::MISSING, |&channel| self.read(channel, value))
+        };
+        let own = self.taxel_of_value.get(place).and_then(|channel| {
+            let at = self.corrected.binary_search_by_key(channel, |own| own.channels[0]).ok()?;
+            self.corrected.get(at)
+        });
+        match own {
+            Some(own) => {
+                let sides = own.places.map(|place| place.map_or(RawValue::MISSING, read));
+                own.leak.corrected(read(place), sides, |_| {})
+            }
+            None => read(place),
         }
     }
 
@@ -212,6 +242,14 @@ impl Intake {
                 *value = RawValue::MISSING;
                 noted.push(taxel);
             }
+        }
+        if !noted.is_empty() {
+            let is_noted = |channel: &usize| noted.binary_search(channel).is_ok();
+            let with_sides = self.corrected.iter().filter(|own| own.channels[1..].iter().any(is_noted));
+            let mut normals: Vec<usize> = with_sides.map(|own| own.channels[0]).collect();
+            noted.append(&mut normals);
+            noted.sort_unstable();
+            noted.dedup();
         }
         stale.push(noted);
     }
@@ -257,22 +295,6 @@ impl Intake {
     }
 }
 
-/// The taxels whose channels are of all three axes and whose normal values have something of the others in them.
-fn corrected(calibration: &Calibration, taxel_of_channel: &[usize]) -> Vec<Corrected> {
-    if !calibration.shear.leaks_into_normal() {
-        return Vec::new();
-    }
-    let mut sides_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (channel, &taxel) in taxel_of_channel.iter().enumerate().skip(calibration.taxels.len()) {
-        sides_of.entry(taxel).or_default().push(channel);
-    }
-    let made = sides_of.into_iter().filter_map(|(taxel, sides)| match sides[..] {
-        [u, v] => Some(Corrected { leak: calibration.leak_of(taxel)?, channels: [taxel, u, v], places: [None; 2] }),
-        _ => None,
-    });
-    made.collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,7 +336,7 @@ mod tests {
         seen.values[2] = RawValue::STALE;
         assert_eq!(take(&mut intake, &seen)[1..], [RawValue::MISSING; 2]);
         assert_eq!(intake.stale(), [vec![2]]);
-        intake.forget_stale();
+        intake.forget_notes();
         take(&mut intake, &frame(0.0, &[None, None, Some(1.0)]));
         assert_eq!(intake.stale(), [Vec::<usize>::new()]);
     }
@@ -374,12 +396,24 @@ mod tests {
             (0..frame.values.len()).map(|place| intake.read_alone(place, &frame.values).number()).collect::<Vec<_>>()
         };
         assert_eq!(alone(&intake, &seen)[..3], expected);
-        // What is not known is not taken out, and what is out of range is not believed.
-        for (place, value) in [(5, None), (3, Some(51.0)), (5, Some(f64::NAN))] {
+        // What is not known is not taken out, and what is out of range is not believed; the rest is.
+        let [missing, off, faulty] = [Reading::Missing, Reading::Value(51.0, false), Reading::Faulty];
+        for (place, value, taxel, left, note) in [
+            (5, RawValue::MISSING, 0, 111.0, missing),
+            (3, RawValue::new(51.0), 0, 107.0, off),
+            (5, RawValue::FAULTY, 0, 111.0, faulty),
+            (4, RawValue::STALE, 1, 96.0, missing),
+        ] {
             let mut seen = seen.clone();
-            seen.values[place] = value.map_or(RawValue::MISSING, RawValue::new);
-            assert_eq!(numbers(&take(&mut intake, &seen))[..2], [Some(110.0), expected[1]]);
-            assert_eq!(alone(&intake, &seen)[..2], [Some(110.0), expected[1]]);
+            seen.values[place] = value;
+            let mut right = expected;
+            right[taxel] = Some(left);
+            intake.forget_notes();
+            assert_eq!(numbers(&take(&mut intake, &seen)), right);
+            assert_eq!(intake.notes(), [[(taxel, note)]]);
+            assert_eq!(alone(&intake, &seen)[..3], right);
+            assert_eq!(intake.read_alone(taxel, &seen.values[..3]).number(), seen.values[taxel].number());
+            assert!(intake.read_alone(5, &seen.values[..3]).is_missing());
         }
         let mut rest = seen.clone();
         rest.values[0] = RawValue::MISSING;
@@ -387,7 +421,44 @@ mod tests {
         // In another order, without one of the axes.
         intake.set_channels(vec![6, 4, 1, 0, 3]);
         let other = frame(0.0, &[26.0, 14.0, 90.0, 110.0, 14.0].map(Some));
-        assert_eq!(numbers(&take(&mut intake, &other)), [Some(110.0), expected[1], None]);
-        assert_eq!(alone(&intake, &other)[2..4], [expected[1], Some(110.0)]);
+        assert_eq!(numbers(&take(&mut intake, &other)), [Some(111.0), expected[1], None]);
+        assert_eq!(alone(&intake, &other)[2..4], [expected[1], Some(111.0)]);
+        // A frame that ends before its tangential values.
+        assert_eq!(intake.read_alone(3, &other.values[..4]).number(), Some(110.0));
+    }
+
+    #[test]
+    fn a_corrected_value_is_in_range_as_it_is_measured_and_stale_with_what_corrects_it() {
+        let text = "[all]\nraw_range = [0, 100]\n[checks]\nisolated_ratio = 5\nisolated_above = 1000\n[shear]\n\
+                    cross_axis = [[2, 0, 1], [0, 1, 0], [0, 0, 1]]\n[taxel.2]\nmask = true\n";
+        let calibration = Calibration::parse(text, &[1, 2, 3]).unwrap();
+        let neighbours = vec![vec![1], vec![0, 2], vec![1]];
+        let mut intake = Intake::new(calibration, neighbours, 0.0, vec![0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        intake.track_stale();
+        // 2 · 60 is inside, 2 · 101 is not, and a taxel that is masked has nothing to note. No share of u is in P.
+        let mut seen = frame(0.0, &[60.0, 200.0, 101.0, 0.0, 0.0, 0.0, -30.0, 0.0, 5.0].map(Some));
+        seen.values[3] = RawValue::MISSING;
+        assert_eq!(numbers(&take(&mut intake, &seen)), [Some(90.0), Some(200.0), Some(207.0)]);
+        assert_eq!(intake.notes(), [[(2, Reading::Value(101.0, false))]]);
+        assert_eq!(intake.stale(), [[0_usize; 0]]);
+        seen.values[6] = RawValue::STALE;
+        seen.values[2] = RawValue::new(900.0);
+        intake.forget_notes();
+        // Taxel 3 is not believed alone: nothing more is to be said of it.
+        assert_eq!(numbers(&take(&mut intake, &seen)), [Some(120.0), Some(200.0), None]);
+        assert_eq!((intake.stale(), intake.notes()), (&[vec![0, 6]][..], &[vec![(0, Reading::Missing)]][..]));
+    }
+    #[test]
+    fn the_channels_of_a_large_skin_are_found_at_once() {
+        let ids: Vec<u32> = (0..60_000).collect();
+        let leak = "[shear]\ncross_axis = [[1, 1, 2], [0, 1, 0], [0, 0, 1]]\n";
+        let calibration = Calibration::parse(leak, &ids).unwrap();
+        let (began, taxels) = (std::time::Instant::now(), ids.len());
+        let mut intake = Intake::new(calibration, Vec::new(), 0.0, (0..3 * taxels).map(|at| at % taxels).collect());
+        intake.set_channels((0..3 * taxels).rev().collect());
+        assert!(began.elapsed().as_secs_f64() < 1.0, "{:?}", began.elapsed());
+        let values: Vec<RawValue> =
+            (0..3 * taxels).rev().map(|channel| RawValue::new((channel / taxels) as f64)).collect();
+        assert_eq!(intake.read_alone(3 * taxels - 1, &values).number(), Some(5.0));
     }
 }

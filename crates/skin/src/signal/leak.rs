@@ -5,11 +5,12 @@
 //! raw′ = raw + (a − 1)(raw − rest) + (b·u + c·v)/gₙ.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use super::calibration::{Calibration, TaxelCalibration};
 use super::frame::RawValue;
 use super::response::Response;
-use super::sense::UNBELIEVABLE;
+use super::sense::{Reading, UNBELIEVABLE};
 use crate::body::{Body, Modality};
 use crate::error::{Result, failed};
 
@@ -18,6 +19,8 @@ use crate::error::{Result, failed};
 pub(super) struct Leak {
     /// Raw values at rest, along n, t and n × t.
     rest: [f64; 3],
+    /// The range of raw normal values; others count, too, but are noted.
+    range: [f64; 2],
     /// Of raw tangential values that are believed.
     side_range: [f64; 2],
     /// For a raw unit of each from rest, raw units of the normal value.
@@ -25,15 +28,26 @@ pub(super) struct Leak {
 }
 
 impl Leak {
-    /// The raw normal value `raw` as it is without what `sides`, those along t and n × t, have put into it; unchanged where one of the
-    /// three is not known.
-    pub(super) fn corrected(&self, raw: RawValue, sides: [RawValue; 2]) -> RawValue {
-        let believed = |raw: RawValue| raw.number().filter(|number| number.abs() <= UNBELIEVABLE);
-        let [low, high] = self.side_range;
-        let of_side = |raw| believed(raw).filter(|number| (low..=high).contains(number));
-        let (Some(normal), [Some(u), Some(v)]) = (believed(raw), sides.map(of_side)) else { return raw };
-        let away = [normal - self.rest[0], u - self.rest[1], v - self.rest[2]];
-        RawValue::new(normal + self.shares[0] * away[0] + self.shares[1] * away[1] + self.shares[2] * away[2])
+    /// The raw normal value `raw` as it is without what `sides`, those along t and n × t, have put into it, as far as these are known.
+    /// Reports what is wrong with values that count in it to `note`.
+    pub(super) fn corrected(&self, raw: RawValue, sides: [RawValue; 2], mut note: impl FnMut(Reading)) -> RawValue {
+        let Some(normal) = believed(raw) else { return raw };
+        let is_within = |[low, high]: [f64; 2], number: f64| (low..=high).contains(&number);
+        if !is_within(self.range, normal) {
+            note(Reading::Value(normal, false));
+        }
+        let mut sum = normal + self.shares[0] * (normal - self.rest[0]);
+        for (side, axis) in sides.into_iter().zip(1..).filter(|&(_, axis)| self.shares[axis] != 0.0) {
+            match believed(side) {
+                Some(number) if is_within(self.side_range, number) => {
+                    sum += self.shares[axis] * (number - self.rest[axis]);
+                }
+                Some(number) => note(Reading::Value(number, false)),
+                None if side.is_missing() => note(Reading::Missing),
+                None => note(Reading::Faulty),
+            }
+        }
+        RawValue::new(sum)
     }
 
     /// The standard deviation of a corrected value, where that of a normal one is `noise` and of a tangential one `of_sides`, raw units.
@@ -43,17 +57,33 @@ impl Leak {
     }
 }
 
+/// A taxel whose normal value is corrected.
+#[derive(Clone, Debug)]
+pub(super) struct Corrected {
+    pub(super) leak: Leak,
+    /// Its channels: its own, and those along t and n × t.
+    pub(super) channels: [usize; 3],
+    /// Where the last two are in a frame.
+    pub(super) places: [Option<usize>; 2],
+}
+
+/// The number of `raw`, unless it is too large for one.
+fn believed(raw: RawValue) -> Option<f64> {
+    raw.number().filter(|number| number.abs() <= UNBELIEVABLE)
+}
+
 impl Calibration {
     /// What is added to the raw normal value of the taxel at `index`, if it has three axes.
     pub(super) fn leak_of(&self, index: usize) -> Option<Leak> {
         let own: &TaxelCalibration = &self.taxels[index];
-        if !self.shear.leaks_into_normal() || own.response != Response::Linear {
+        if !self.shear.leaks_into_normal() || own.mask || own.response != Response::Linear {
             return None;
         }
         let ([of_normal, of_u, of_v], rest) = (self.shear.into_normal, self.shear.rest_of(index));
         let [gain_u, gain_v] = self.shear.gains_of(index, own.gain, own.unit_factor);
         Some(Leak {
             rest: [own.baseline, rest[0], rest[1]],
+            range: own.raw_range.map(f64::from),
             side_range: self.shear.range_of(index),
             shares: [of_normal - 1.0, of_u * gain_u / own.gain, of_v * gain_v / own.gain],
         })
@@ -74,15 +104,18 @@ impl Calibration {
         ))
     }
 
-    /// The same with the noise that raw normal values of taxels with three axes have once they are corrected.
+    /// The same for raw normal values of taxels with three axes once they are corrected: with the noise that they then have, and without
+    /// their `raw_range`, which is of what is measured: [`Intake`](super::Intake) compares values with it.
     #[must_use]
-    pub fn with_noise_of_leaks(&self, body: &Body) -> Cow<'_, Self> {
+    pub fn of_corrected(&self, body: &Body) -> Cow<'_, Self> {
         if !self.shear.leaks_into_normal() {
             return Cow::Borrowed(self);
         }
         let mut all = self.clone();
         for index in (0..self.taxels.len()).filter(|&index| body.taxels[index].modality == Modality::Force3) {
-            if let (Some(leak), Some(noise)) = (self.leak_of(index), self.taxels[index].noise) {
+            let Some(leak) = self.leak_of(index) else { continue };
+            all.taxels[index].raw_range = TaxelCalibration::default().raw_range;
+            if let Some(noise) = self.taxels[index].noise {
                 let of_sides = self.shear.noise_of(index).unwrap_or(noise);
                 all.taxels[index].noise = Some(leak.noise(noise, of_sides));
                 all.shear.own_noises.insert(index, of_sides);
@@ -90,6 +123,22 @@ impl Calibration {
         }
         Cow::Owned(all)
     }
+}
+
+/// The taxels whose channels are of all three axes and whose normal values have something of the others in them.
+pub(super) fn corrected(calibration: &Calibration, taxel_of_channel: &[usize]) -> Vec<Corrected> {
+    if !calibration.shear.leaks_into_normal() {
+        return Vec::new();
+    }
+    let mut sides_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (channel, &taxel) in taxel_of_channel.iter().enumerate().skip(calibration.taxels.len()) {
+        sides_of.entry(taxel).or_default().push(channel);
+    }
+    let made = sides_of.into_iter().filter_map(|(taxel, sides)| match sides[..] {
+        [u, v] => Some(Corrected { leak: calibration.leak_of(taxel)?, channels: [taxel, u, v], places: [None; 2] }),
+        _ => None,
+    });
+    made.collect()
 }
 
 #[cfg(test)]
@@ -105,16 +154,18 @@ mod tests {
         let body = Body::from_bytes("pad", &bytes).unwrap();
         let read = |row: &str| {
             let text = format!(
-                "[all]\ngain = 2\nnoise = 3\n[shear]\ngain = [4, 1]\ncross_axis = [{row}[0, 1, 0], [0, 0, 1]]\n"
+                "[all]\ngain = 2\nnoise = 3\nraw_range = [0, 9]\n[shear]\ngain = [4, 1]\ncross_axis = [{row}[0, 1, 0], [0, 0, 1]]\n"
             );
             Calibration::parse(&text, &[1, 2]).unwrap()
         };
         let leaking = read("[2, 1, -1], ");
-        let with = leaking.with_noise_of_leaks(&body);
+        let with = leaking.of_corrected(&body);
         // P = 2·2·raw + 4u − v: of a normal value (2·3)² + (2·3)² + (0.5·3)².
         assert!((with.taxels[0].noise.unwrap() - 74.25_f64.sqrt()).abs() < 1e-12, "{:?}", with.taxels[0].noise);
         assert_eq!((with.taxels[1].noise, with.shear.noise_of(0)), (Some(3.0), Some(3.0)));
+        let all = TaxelCalibration::default().raw_range;
+        assert_eq!([0, 1].map(|taxel| with.taxels[taxel].raw_range), [all, [0.0, 9.0]]);
         let alone = read("");
-        assert!(matches!(alone.with_noise_of_leaks(&body), Cow::Borrowed(_)));
+        assert!(matches!(alone.of_corrected(&body), Cow::Borrowed(_)));
     }
 }

@@ -30,7 +30,7 @@ impl Plan {
     /// twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         check(body, fields, scene, calibration)?;
-        let calibration = &*calibration.with_noise_of_leaks(body);
+        let calibration = &*calibration.of_corrected(body);
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs);
         let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, outputs)?;
@@ -157,7 +157,7 @@ fn check(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibratio
     }
     calibration.check_body(&body.name)?;
     for (index, taxel) in body.taxels.iter().enumerate().filter(|(_, taxel)| taxel.modality == Modality::Force3) {
-        calibration.check_leak(index, taxel.id)?;
+        calibration.check_leak(index, taxel.id).map_err(|e| e.at(&body.name))?;
     }
     Letter::check(&scene.letters)?;
     let has_changes = scene.letters.iter().any(|letter| letter.receptor == Receptor::Change);

@@ -3,6 +3,7 @@
 use toml::{Table, Value};
 
 use super::Calibration;
+use crate::body::Modality;
 use crate::error::{Error, Result, parse_toml};
 
 /// A calibration laid over another one.
@@ -21,24 +22,50 @@ const OF_CIRCUIT: [&str; 3] = ["wiper", "signal", "full_scale_newton"];
 
 impl Calibration {
     /// Lays the calibration `given` over `own`, both TOML. A key of `given` under `[all]` also replaces those under the
-    /// `[taxel.N]` of `own`, as it holds for every taxel; so does one under `[shear]`.
+    /// `[taxel.N]` of `own`, as it holds for every taxel; so does one under `[shear]`. As every taxel were one of pressure:
+    /// [`Calibration::lay_over_for`] is told what they measure.
     ///
     /// # Errors
     /// One of them is not TOML. Whether the result makes sense is for [`Calibration::parse`].
     pub fn lay_over(own: &str, given: &str) -> Result<LaidOver> {
+        Self::laid_over(own, given, |_| Modality::Pressure)
+    }
+
+    /// Lays `given` over `own` for `taxels`, ids and what they measure, ascending by id. Under the `[taxel.N]` of `own` a key of `[all]`
+    /// replaces those of taxels that feel pressure, `missing` of all; one of `[temperature]` or `[proximity]` those of taxels that measure
+    /// that; one of `[shear]` those of tangential forces.
+    ///
+    /// # Errors
+    /// As [`Calibration::lay_over`].
+    pub fn lay_over_for(own: &str, given: &str, taxels: &[(u32, Modality)]) -> Result<LaidOver> {
+        Self::laid_over(own, given, |id| {
+            let at = taxels.binary_search_by_key(&id, |(id, _)| *id);
+            at.map_or(Modality::default(), |at| taxels[at].1)
+        })
+    }
+
+    fn laid_over(own: &str, given: &str, kind_of: impl Fn(u32) -> Modality) -> Result<LaidOver> {
         let (mut own, given): (Table, Table) = (parse_toml(own)?, parse_toml(given)?);
         let unit_before = unit_of(&own);
         let mut given_names: Vec<[String; 2]> = Vec::new();
         for (name, value) in &given {
             match (name.as_str(), value) {
                 ("all", Value::Table(keys)) => {
-                    for taxel in tables_in(&mut own, "taxel") {
-                        keys.iter().for_each(|(key, value)| without_rivals(taxel, key, value));
+                    for (id, taxel) in taxels_in(&mut own) {
+                        let is_pressed = kind_of(id).is_pressed();
+                        let holds = keys.iter().filter(|(key, _)| is_pressed || *key == "missing");
+                        holds.for_each(|(key, value)| without_rivals(taxel, key, value));
                     }
                     lay_keys(table(&mut own, "all"), keys);
                 }
+                ("temperature" | "proximity", Value::Table(keys)) => {
+                    for (_, taxel) in taxels_in(&mut own).filter(|(id, _)| kind_of(*id).name() == *name) {
+                        keys.iter().for_each(|(key, value)| without_rivals(taxel, key, value));
+                    }
+                    lay_keys(table(&mut own, name), keys);
+                }
                 ("shear", Value::Table(keys)) => {
-                    for taxel in tables_in(&mut own, "taxel") {
+                    for (_, taxel) in taxels_in(&mut own) {
                         keys.keys().for_each(|key| drop(taxel.remove(&format!("shear_{key}"))));
                     }
                     lay_keys(table(&mut own, "shear"), keys);
@@ -59,6 +86,7 @@ impl Calibration {
                 given_names.extend(keys.keys().map(|key| [name.clone(), plain_id(key)]));
             }
         }
+        drop_emptied(&mut own);
         let replaced_unit = match (unit_before, unit_of(&own)) {
             (Some(before), Some(after)) if before != after => Some([before, after]),
             _ => None,
@@ -107,9 +135,19 @@ fn table<'t>(of: &'t mut Table, name: &str) -> &'t mut Table {
     }
 }
 
-fn tables_in<'t>(of: &'t mut Table, name: &str) -> Vec<&'t mut Table> {
-    let Some(Value::Table(all)) = of.get_mut(name) else { return Vec::new() };
-    all.iter_mut().filter_map(|(_, value)| value.as_table_mut()).collect()
+/// The tables of single taxels in `of`, and whose they are.
+fn taxels_in(of: &mut Table) -> impl Iterator<Item = (u32, &mut Table)> {
+    let all = of.get_mut("taxel").and_then(Value::as_table_mut);
+    all.into_iter().flatten().filter_map(|(id, keys)| Some((id.parse().ok()?, keys.as_table_mut()?)))
+}
+
+/// Removes the tables of single taxels that nothing is left in.
+fn drop_emptied(of: &mut Table) {
+    let Some(Value::Table(taxels)) = of.get_mut("taxel") else { return };
+    taxels.retain(|_, keys| keys.as_table().is_none_or(|keys| !keys.is_empty()));
+    if taxels.is_empty() {
+        of.remove("taxel");
+    }
 }
 
 /// Puts `keys` into `to`, in place of what they replace there.
@@ -122,9 +160,8 @@ fn lay_keys(to: &mut Table, keys: &Table) {
 fn without_rivals(table: &mut Table, key: &str, value: &Value) {
     table.remove(key);
     match key {
-        "curve" | "sensor" => {
-            table.remove("curve");
-            table.remove("sensor");
+        "curve" | "sensor" | "ntc" => {
+            ["curve", "sensor", "ntc"].iter().for_each(|key| drop(table.remove(*key)));
             if value.as_str() != Some("fsr") {
                 OF_CIRCUIT.iter().for_each(|key| drop(table.remove(*key)));
             }
@@ -166,6 +203,40 @@ mod tests {
         assert_eq!([0, 1].map(|taxel| read.shear.gains_of(taxel, 1.0, 1.0)), [[2.0, 3.0], [5.0, 5.0]]);
         assert_eq!((read.shear.rest_of(0), read.shear.range_of(0)), ([1.0, 2.0], [0.0, 9.0]));
         assert_eq!(read.shear.slips_at, Some(0.5));
+    }
+
+    #[test]
+    fn what_is_given_of_a_kind_replaces_what_single_taxels_of_that_kind_have() {
+        use crate::signal::{RawValue, Reading};
+        let taxels = [(1, Modality::Pressure), (2, Modality::Temperature), (3, Modality::Proximity)];
+        let laid = |own: &str, given: &str| {
+            let laid = Calibration::lay_over_for(own, given, &taxels).unwrap();
+            let read = Calibration::parse_for(&laid.text, &taxels).unwrap_or_else(|e| panic!("{e}: {}", laid.text));
+            (laid.stays, read)
+        };
+        let own =
+            "[taxel.1]\ngain = 3\n[taxel.002]\ngain = 0.1\nbaseline = 5\nmissing = [7]\n[taxel.3]\nbaseline = 9\n";
+        let celsius = |read: &Calibration| read.temperature.of_taxel(1).read(RawValue::new(255.0));
+        let (stays, read) = laid(own, "[all]\ngain = 2\nbaseline = 1\nraw_range = [0, 255]\n");
+        assert_eq!((celsius(&read), read.taxels[0].gain), (Reading::Value(25.0, true), 2.0));
+        assert_eq!((stays, read.proximity.of_taxel(2).baseline), (vec!["[taxel] of 2 taxels".to_owned()], 9.0));
+        // The others are as they were.
+        let given = "[curve.a]\nraw = [0, 300]\np = [0, 30]\n[temperature]\ngain = 2\nbaseline = 155\ncurve = \"a\"\n";
+        let (stays, read) = laid(own, given);
+        assert_eq!((celsius(&read), read.taxels[0].gain), (Reading::Value(20.0, true), 3.0));
+        assert_eq!((stays, read.proximity.of_taxel(2).baseline), (vec!["[taxel] of 3 taxels".to_owned()], 9.0));
+        let (stays, read) = laid(own, "[proximity]\nbaseline = 4\n[all]\nmissing = [8]\n[taxel.1]\ngain = 6\n");
+        assert_eq!((celsius(&read), read.taxels[0].gain), (Reading::Value(25.0, true), 6.0));
+        assert_eq!((&stays[..], read.proximity.of_taxel(2).baseline), (&["[taxel.002]".to_owned()][..], 4.0));
+        assert_eq!(read.missing, vec![vec![8.0]; 3]);
+        // One response for another, and tables that are emptied.
+        let ntc = "ntc = { ohm_at_25 = 1e4, b_k = 3950, series_ohm = 1e4, full_raw = 1023 }\n";
+        let own = "[curve.a]\nraw = [0, 300]\np = [0, 30]\n[taxel.2]\ncurve = \"a\"\n";
+        let (stays, read) = laid(own, &format!("[temperature]\n{ntc}"));
+        assert!(stays == ["[curve]"] && read.temperature.own.is_empty(), "{stays:?}");
+        let laid_back =
+            Calibration::lay_over_for(&format!("[temperature]\n{ntc}"), "[temperature]\ngain = 2\n", &taxels);
+        assert!(laid_back.unwrap().text.contains("ohm_at_25"));
     }
 
     #[test]
