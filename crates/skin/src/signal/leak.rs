@@ -2,7 +2,7 @@
 //!
 //! The row [a, b, c] says that P is a·N + b·u + c·v, with N, u and v what is measured along the three axes, in the unit of P. Raw values
 //! are corrected for that before any backend reads them, so that all compute of the same bits: with g the gains,
-//! raw′ = raw + (a − 1)(raw − rest) + (b·u + c·v)/gₙ.
+//! raw′ = raw + (a − 1)(raw − rest) + (b·u + c·v)/gₙ. A term whose value is not known is left out, which is noted.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

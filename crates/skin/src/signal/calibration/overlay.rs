@@ -22,8 +22,8 @@ const OF_CIRCUIT: [&str; 3] = ["wiper", "signal", "full_scale_newton"];
 
 impl Calibration {
     /// Lays the calibration `given` over `own`, both TOML. A key of `given` under `[all]` also replaces those under the
-    /// `[taxel.N]` of `own`, as it holds for every taxel; so does one under `[shear]`. As every taxel were one of pressure:
-    /// [`Calibration::lay_over_for`] is told what they measure.
+    /// `[taxel.N]` of `own`, as it holds for every taxel; so does one under `[shear]`. For bodies whose taxels
+    /// all feel pressure; for others there is [`Calibration::lay_over_for`].
     ///
     /// # Errors
     /// One of them is not TOML. Whether the result makes sense is for [`Calibration::parse`].
