@@ -204,7 +204,7 @@ fn charts_have_arrows_of_tangential_forces_that_point_where_they_pull() {
     assert!(wide(bottom - 12, bottom + 1) > wide(*top, top + 13), "{top} to {bottom}");
     let line =
         done(&["run", "--body", "sensing-hand", "--outputs", "shear", "--fields", "hand/midhand/index", "--sink", "-"]);
-    let frame = super::frames(&line).into_iter().find(|frame| frame["t"] == 4.8).unwrap();
+    let frame = frames(&line).into_iter().find(|frame| frame["t"] == 4.8).unwrap();
     let shear = frame["fields"].as_array().unwrap().iter().find_map(|field| field["shear"].as_array()).unwrap();
     let [u, v] = [0, 1].map(|axis| shear[axis].as_f64().unwrap());
     assert!(v < -0.5 && u.abs() < 0.1 * -v, "({u}, {v}) N");

@@ -367,7 +367,7 @@ fn a_state_in_the_middle_of_a_window_goes_on_with_the_same_bits() {
                 engine.restore(&state).unwrap();
                 let got = engine.process(&frames[at..]).unwrap();
                 for frame in at..60 {
-                    let pair = [got.frame(frame - at), right.frame(frame)].map(|all| all.collect::<Vec<_>>());
+                    let pair = [got.frame(frame - at), right.frame(frame)].map(Iterator::collect::<Vec<_>>);
                     assert_eq!(pair[0], pair[1], "{kind:?} from {at}: frame {frame}");
                     assert_eq!(got.touches(frame - at), right.touches(frame));
                 }

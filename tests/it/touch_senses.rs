@@ -120,7 +120,7 @@ fn values_as_at_rest_have_no_direction_however_large_they_are() {
 /// The ids of the taxels of temperature under a touch, and what each has there.
 fn under(frame: &Frame, engine: &Engine) -> Vec<(u32, f64)> {
     let number = |id: u32| frame.values[engine.index_of(&id.to_string()).unwrap()].number().unwrap();
-    grid().filter(|&(id, _)| number(id) > 0.0).map(|(id, _)| (WARM + id, f64::from(number(WARM + id)))).collect()
+    grid().filter(|&(id, _)| number(id) > 0.0).map(|(id, _)| (WARM + id, number(WARM + id))).collect()
 }
 
 #[test]

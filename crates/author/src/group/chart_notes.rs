@@ -23,6 +23,8 @@ pub(super) struct ChartNotes {
     /// Fields without a chart, why, and whether others are below them.
     pub(super) bare: Vec<(String, NoChart, bool)>,
     pub(super) poor: Vec<(String, f64)>,
+    /// Parts without a chart that are not split further.
+    pub(super) few: Vec<String>,
 }
 
 impl ChartNotes {
@@ -32,6 +34,10 @@ impl ChartNotes {
             let names = fields(self.split.iter().map(|(name, ..)| name));
             let parts: usize = self.split.iter().map(|(_, parts, _)| parts).sum();
             lines.push(format!("{names} split into {parts} parts: {why}"));
+        }
+        if !self.few.is_empty() {
+            let names = fields(self.few.iter());
+            lines.push(format!("{names} without a chart, so without orientation: too few taxels to split"));
         }
         let mut rest: Vec<&(String, NoChart, bool)> = self.bare.iter().collect();
         while let Some(&(_, why, is_parent)) = rest.first() {
@@ -131,11 +137,13 @@ mod tests {
         let around = NoChart::CutLocus { taxel: 12, distance_m: 0.035 };
         let bare = [("limb", around.clone(), false), ("arm", around, false), ("all", NoChart::SeveralLinks(3), true)];
         let bare = bare.map(|(name, why, is_parent)| (name.to_owned(), why, is_parent)).to_vec();
+        let few = vec!["leg/front_1".to_owned()];
         let poor = vec![("palm".to_owned(), 0.3), ("back".to_owned(), 0.4)];
         assert_eq!(
-            ChartNotes { split: vec![("leg".to_owned(), 2, "it wraps".to_owned())], bare, poor }.lines(),
+            ChartNotes { split: vec![("leg".to_owned(), 2, "it wraps".to_owned())], bare, poor, few }.lines(),
             [
                 "field `leg`: split into 2 parts: it wraps",
+                "field `leg/front_1`: without a chart, so without orientation: too few taxels to split",
                 "fields `limb`, `arm`: without a chart, so without orientation: it goes all the way around: two paths of 35.0 \
                  mm lead to taxel 12; to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]",
                 "field `all`: without a chart, so without orientation: its taxels sit on 3 links that move against each \

@@ -128,6 +128,7 @@ impl Grouper<'_> {
         if let Some(parts) = image_parts.filter(|parts| !parts.is_empty()) {
             let parts = self.parts_like(&made, whole, bare, parts);
             notes.split.push((name, parts.len(), "its mirror image is".to_owned()));
+            notes.few.extend(bare_of(&parts));
             fields.push(uncharted);
             fields.extend(parts);
             return Ok(());
@@ -158,6 +159,7 @@ impl Grouper<'_> {
                         let of_left = parts.iter().filter_map(|part| self.on_left(part)).collect();
                         parts_on_left.extend(on_left.map(|taxels| (taxels, of_left)));
                         notes.split.push((name, parts.len(), chart_notes::plain(&why)));
+                        notes.few.extend(bare_of(&parts));
                         fields.extend(parts);
                     }
                     None => self.notes.push(format!(
@@ -414,6 +416,12 @@ impl Grouper<'_> {
         sectors.retain(|sector| !sector.is_empty());
         sectors
     }
+}
+
+/// The names of `parts` without a chart.
+fn bare_of(parts: &[FieldSpec]) -> impl Iterator<Item = String> {
+    let is_bare = |part: &&FieldSpec| part.chart.is_some_and(|chart| chart.kind == ChartKind::None);
+    parts.iter().filter(is_bare).map(|part| part.name.clone())
 }
 
 /// `spec` with a plane chart, and +u along `u` if that is given.
