@@ -19,7 +19,7 @@ def gradient_within(gradient, celsius, weights, least, most):
     and A's right side by a share of sqrt(most * Σw) |T|; both come into the gradient divided by `least`."""
     size = np.abs(celsius).max() + 300
     moved = np.sqrt(most * weights.sum()) * size / least + most / least * np.linalg.norm(gradient)
-    return Value(gradient, 10 * moved)
+    return Value(gradient, moved)
 
 
 def interpolated(curve, x):
