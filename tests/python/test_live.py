@@ -27,30 +27,39 @@ TEXT = {"columns": "1-3"}
 """Also the one that never changes."""
 
 
-class Printer:
-    """A board that prints three numbers a line, about a hundred times a second, to whoever has its line open."""
+class Board:
+    """A board at the end of a pseudo-terminal, which plays in a thread of its own until it is closed."""
 
     def __init__(self) -> None:
-        self.end, line = os.openpty()
-        self.name = os.ttyname(line)
-        self.line = line
+        self.end, self.line = os.openpty()
+        self.name = os.ttyname(self.line)
+        os.set_blocking(self.end, False)
         self.over = threading.Event()
-        self.sent = 0
-        self.thread = threading.Thread(target=self.write, daemon=True)
+        self.thread = threading.Thread(target=self.play, daemon=True)
         self.thread.start()
 
-    def write(self) -> None:
-        os.set_blocking(self.end, False)
-        while not self.over.wait(0.01):
-            self.sent += 1
-            with contextlib.suppress(BlockingIOError):
-                os.write(self.end, f"{self.sent % 100} {self.sent % 7} 500\n".encode())
+    def play(self) -> None:
+        raise NotImplementedError
 
     def close(self) -> None:
         self.over.set()
         self.thread.join()
         os.close(self.line)
         os.close(self.end)
+
+
+class Printer(Board):
+    """A board that prints three numbers a line, about a hundred times a second, to whoever has its line open."""
+
+    def __init__(self) -> None:
+        self.sent = 0
+        super().__init__()
+
+    def play(self) -> None:
+        while not self.over.wait(0.01):
+            self.sent += 1
+            with contextlib.suppress(BlockingIOError):
+                os.write(self.end, f"{self.sent % 100} {self.sent % 7} 500\n".encode())
 
 
 @pytest.fixture
@@ -178,23 +187,20 @@ def test_what_makes_no_sense_is_one_line(tmp_path: pathlib.Path) -> None:
         st.live(tmp_path / "a.toml", body="hand")
 
 
-class Paxini:
+class Paxini(Board):
     """A board of PaXini with the tip of an index finger of two taxels: it sends frames until it is silent, or is never heard of at all."""
 
     def __init__(self) -> None:
-        self.end, self.line = os.openpty()
+        self.is_silent, self.is_pressed = threading.Event(), threading.Event()
+        super().__init__()
         tty.setraw(self.line)
-        self.name = f"paxini:{os.ttyname(self.line)}"
-        self.over, self.is_silent, self.is_pressed = threading.Event(), threading.Event(), threading.Event()
-        self.thread = threading.Thread(target=self.play, daemon=True)
-        self.thread.start()
+        self.name = f"paxini:{self.name}"
 
     @staticmethod
     def summed(*parts: int) -> bytes:
         return bytes([*parts, -sum(parts) % 256])
 
     def play(self) -> None:
-        os.set_blocking(self.end, False)
         request, sends = b"", False
         while not self.over.wait(0.005):
             with contextlib.suppress(BlockingIOError):
@@ -215,12 +221,6 @@ class Paxini:
                 harder = 100 if self.is_pressed.is_set() else 0
                 with contextlib.suppress(BlockingIOError):
                     os.write(self.end, self.summed(0xAA, 0x56, 0, 13, 0, 0, *[0] * 6, 10, 246, 50 + harder, 20, 0, 30 + harder))
-
-    def close(self) -> None:
-        self.over.set()
-        self.thread.join()
-        os.close(self.line)
-        os.close(self.end)
 
 
 @pytest.fixture

@@ -9,6 +9,8 @@
 //! crease it is as long as the way over it where both sides are equally long. It needs no surface, so that holes, gaps and
 //! shells that do not meet make no difference.
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
 
 use super::chart::NoChart;
@@ -42,22 +44,27 @@ pub fn place_by_normals(offset: DVec3, normal: DVec3, other: DVec3) -> DVec3 {
     flat + towards * (chord * arc_by_chord(half_sine) - flat.dot(towards))
 }
 
+/// The link that all own members of `spec` are on, and their taxels.
+///
+/// # Errors
+/// There are none, or they are on several links.
+pub(super) fn taxels_on_one_link(body: &Body, spec: &FieldSpec) -> Result<(usize, Vec<usize>), NoChart> {
+    let taxels: Vec<usize> = spec.members.keys().filter_map(|&id| body.taxel_index(id)).collect();
+    let links: BTreeSet<usize> = taxels.iter().map(|&taxel| body.taxels[taxel].link).collect();
+    match links.first() {
+        None => Err(NoChart::NoTaxels),
+        Some(&link) if links.len() == 1 => Ok((link, taxels)),
+        Some(_) => Err(NoChart::SeveralLinks(links.len())),
+    }
+}
+
 /// `spec` with a chart by normals and its own members' (u, v). The base is the member nearest to the origin of `spec`'s chart, else to the
 /// middle; the direction of +u is that of `spec`'s chart, else the default of a plane chart.
 ///
 /// # Errors
 /// Why there is no such chart.
 pub(super) fn unroll(body: &Body, spec: &FieldSpec) -> Result<FieldSpec, NoChart> {
-    let taxels: Vec<usize> = spec.members.keys().filter_map(|&id| body.taxel_index(id)).collect();
-    if taxels.is_empty() {
-        return Err(NoChart::NoTaxels);
-    }
-    let mut links: Vec<usize> = taxels.iter().map(|&taxel| body.taxels[taxel].link).collect();
-    links.sort_unstable();
-    links.dedup();
-    if links.len() > 1 {
-        return Err(NoChart::SeveralLinks(links.len()));
-    }
+    let (_, taxels) = taxels_on_one_link(body, spec)?;
     let members: Vec<(DVec3, DVec3)> = taxels
         .iter()
         .map(|&taxel| (body.taxels[taxel].position_in_link, body.taxels[taxel].normal_in_link.normalize()))

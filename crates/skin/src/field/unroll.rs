@@ -61,14 +61,7 @@ impl<'a> Unroller<'a> {
         if spec.chart.is_some_and(|chart| chart.kind == ChartKind::Normals) {
             return by_normals::unroll(body, spec);
         }
-        let taxels: Vec<usize> = spec.members.keys().filter_map(|&id| body.taxel_index(id)).collect();
-        if taxels.is_empty() {
-            return Err(NoChart::NoTaxels);
-        }
-        let mut links: Vec<usize> = taxels.iter().map(|&taxel| body.taxels[taxel].link).collect();
-        links.sort_unstable();
-        links.dedup();
-        let &[link] = &links[..] else { return Err(NoChart::SeveralLinks(links.len())) };
+        let (link, taxels) = by_normals::taxels_on_one_link(body, spec)?;
         let point = |&taxel: &usize| (body.taxels[taxel].position_in_link, body.taxels[taxel].normal_in_link);
         let members: Vec<(DVec3, DVec3)> = taxels.iter().map(point).collect();
         let surface = self.surfaces.in_link(link);
