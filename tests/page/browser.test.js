@@ -5,7 +5,19 @@ import { createServer } from "node:http";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
-import { bare, browser, coloursAt, folder, open, picture, seek, serve, SOMATIC, view } from "./program.js";
+import {
+  bare,
+  browser,
+  coloursAt,
+  folder,
+  open,
+  pause,
+  picture,
+  seek,
+  serve,
+  SOMATIC,
+  view,
+} from "./program.js";
 
 test("the first picture comes soon, and a taxel has the legend's colour of its pressure", async () => {
   const server = await view();
@@ -13,8 +25,7 @@ test("the first picture comes soon, and a taxel has the legend's colour of its p
   const first = await page.evaluate(() => window.somatic.firstPictureMs);
   console.log(`first picture after ${Math.round(first)} ms`);
   assert.ok(!(await page.url()).includes("token"), "the token stays in the address");
-  await page.keyboard.press(" ");
-  await page.waitForFunction(() => !window.somatic.model.status.playing);
+  await pause(page);
   let compared = 0;
   for (const [key, t] of [
     ["5", 2.9],
@@ -60,7 +71,7 @@ test("percepts at any time are those of an uninterrupted run, to the bit", async
     .map((line) => JSON.parse(line));
   const server = await view();
   const { page } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   for (const index of [149, 20, 208, 3, 150, 60]) {
     const frame = frames[index];
     await seek(page, frame.t);
@@ -100,7 +111,7 @@ test("percepts at any time are those of an uninterrupted run, to the bit", async
 test("keys act without an error, and a percept is explained", async () => {
   const server = await view();
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, 2.9);
   await page.waitForTimeout(1000);
   await picture(page, "view.png");

@@ -10,6 +10,7 @@ import {
   coloursAt,
   folder,
   open,
+  pause,
   picture,
   seek,
   serve,
@@ -44,7 +45,7 @@ test("a taxel under the pointer is described, and a field is looked at", async (
   const [ids, row] = hand((id, n) => (id === 4 ? n : 0));
   const server = await view(writeRecording("ramp.csv", ids, 101, 0.1, row), "--body", "hand");
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, 7.5);
   const taxel = await page.evaluate(() => Array.from(window.somatic.model.mesh.taxelId).indexOf(4));
   for (const key of ["1", "2", "3", "4", "5", "6"]) {
@@ -95,31 +96,36 @@ test("no peak of a plot is lost", async () => {
   const [ids, row] = hand((id, n) => (id === 4 ? (n === 3000 ? 1000 : 100 + (n % 7)) : 0));
   const server = await view(writeRecording("spike.csv", ids, 4001, 0.01, row), "--body", "hand");
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
-  await page.waitForFunction(() => !window.somatic.model.status.playing);
+  await pause(page);
   await page.waitForFunction(() => window.somatic.model.timeline.until >= 40, null, { timeout: 60000 });
   // The line of the moment that is shown is at the left end.
   await seek(page, 0);
   await page.waitForFunction(() => document.querySelector("#plots canvas"), null, { timeout: 20000 });
-  await page.waitForTimeout(1500);
   await page.locator("#plots canvas").first().scrollIntoViewIfNeeded();
-  const bright = await page.evaluate(() => {
-    // The columns of the plot whose upper fifth has a line.
-    const canvas = document.querySelector("#plots canvas");
-    const { width, height } = canvas;
-    const { data } = canvas.getContext("2d").getImageData(0, 0, width, height);
-    const columns = [];
-    for (let x = Math.round(0.3 * width); x < width; x++) {
-      let count = 0;
-      for (let y = Math.round(0.1 * height); y < 0.5 * height; y++) {
-        const at = 4 * (y * width + x);
-        const [r, g, b] = data.subarray(at, at + 3);
-        if (data[at + 3] > 100 && Math.max(r, g, b) - Math.min(r, g, b) > 60) count++;
+  // The columns of the plot whose upper half has a line, as parts of its width.
+  const peaks = () =>
+    page.evaluate(() => {
+      const canvas = document.querySelector("#plots canvas");
+      const { width, height } = canvas;
+      const { data } = canvas.getContext("2d").getImageData(0, 0, width, height);
+      const columns = [];
+      for (let x = Math.round(0.3 * width); x < width; x++) {
+        let count = 0;
+        for (let y = Math.round(0.1 * height); y < 0.5 * height; y++) {
+          const at = 4 * (y * width + x);
+          const [r, g, b] = data.subarray(at, at + 3);
+          if (data[at + 3] > 100 && Math.max(r, g, b) - Math.min(r, g, b) > 60) count++;
+        }
+        if (count > 0.2 * height) columns.push(x / width);
       }
-      if (count > 0.2 * height) columns.push(x / width);
-    }
-    return columns;
-  });
+      return columns;
+    });
+  // A plot asks for its past again as more of it is computed; on a busy machine the whole of it takes a while.
+  let bright = await peaks();
+  for (let tries = 0; tries < 200 && bright.length === 0; tries++) {
+    await page.waitForTimeout(100);
+    bright = await peaks();
+  }
   assert.ok(bright.length >= 1 && bright.length < 12, `columns with a peak: ${bright}`);
   assert.ok(Math.max(...bright) - Math.min(...bright) < 0.03, `one peak: ${bright}`);
   assert.ok(Math.abs(bright[0] - 0.75) < 0.12, `at three quarters: ${bright}`);
@@ -172,7 +178,7 @@ test("other percepts in a recording are marked", async () => {
   const mark = async (...calibration) => {
     const server = await view("touch.mcap", ...calibration);
     const { page, problems } = await open(server.url);
-    await page.keyboard.press(" ");
+    await pause(page);
     await page.waitForFunction(
       () => window.somatic.model.timeline.until >= window.somatic.model.welcome.time.end_s,
       null,
@@ -248,7 +254,7 @@ test("ten thousand taxels are drawn, each in its colour", async () => {
   console.log(`${ids.length} taxels at 250 Hz: ${rate.toFixed(1)} frames/s`);
   // Other tests run beside.
   assert.ok(rate > 0.3, `${rate} frames/s`);
-  (await page.evaluate(() => window.somatic.model.status.playing)) && (await page.keyboard.press(" "));
+  await pause(page);
   await seek(page, 1);
   await page.keyboard.press("5");
   await bare(page);

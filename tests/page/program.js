@@ -82,7 +82,7 @@ export async function serve(...parts) {
 
 export const view = (...parts) => serve("view", "--listen", "127.0.0.1:0", "--backend", "cpu", ...parts);
 
-/** Opens an address and waits for the first picture. */
+/** Opens an address and waits for the first picture, and of a recording for whether it plays: what Space does depends on it. */
 export async function open(url) {
   const page = await browser.newPage();
   const problems = [];
@@ -90,7 +90,18 @@ export async function open(url) {
   page.on("console", (line) => line.type() === "error" && problems.push(line.text()));
   await page.goto(url);
   await page.waitForFunction(() => window.somatic?.firstPictureMs > 0, null, { timeout: 60000 });
+  await page.waitForFunction(
+    () => !window.somatic.model.welcome.time || "type" in window.somatic.model.status,
+    null,
+    { timeout: 60000 },
+  );
   return { page, problems };
+}
+
+/** Pauses what plays. */
+export async function pause(page) {
+  if (await page.evaluate(() => window.somatic.model.status.playing)) await page.keyboard.press(" ");
+  await page.waitForFunction(() => !window.somatic.model.status.playing, null, { timeout: 60000 });
 }
 
 /** Pauses and goes to a time; waits until it is shown. */

@@ -6,7 +6,7 @@ import { join } from "node:path";
 import { before, test } from "node:test";
 import { ticksBetween } from "../../crates/page/src/web/legend.js";
 import { letterName, Senses } from "../../crates/page/src/web/senses.js";
-import { coloursAt, folder, open, picture, seek, SOMATIC, view } from "./program.js";
+import { coloursAt, folder, open, pause, picture, seek, SOMATIC, view } from "./program.js";
 
 const about = {
   shear: [1],
@@ -146,7 +146,7 @@ const near = (a, b) => a.every((part, k) => Math.abs(part - b[k]) <= 3);
 
 test("a letter colours its taxels as its legend says, and no others", async () => {
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await page.keyboard.press("0");
   await seek(page, 0.5);
   await page.keyboard.press("n");
@@ -200,7 +200,7 @@ test("a letter colours its taxels as its legend says, and no others", async () =
 
 test("fields and percepts have the quantities of the letter, with their units", async () => {
   const { page } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, 0.5);
   const said = async (letter) => {
     await coloured(page, letter);
@@ -239,7 +239,7 @@ test("fields and percepts have the quantities of the letter, with their units", 
 
 test("arrows of tangential forces point where they pull", async () => {
   const { page } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, 0.5);
   const arrows = await page.evaluate(async () => {
     const { arrowOf } = await import("./arrows.js");

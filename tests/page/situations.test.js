@@ -12,6 +12,7 @@ import {
   LAUNCH,
   open,
   overlay,
+  pause,
   picture,
   seek,
   serve,
@@ -32,7 +33,7 @@ test("a run without totals is plotted and coloured by what it has", async () => 
   for (const outputs of ["centroid,touches", "peak", "orientation"]) {
     const server = await view("--outputs", outputs);
     const { page, problems } = await open(server.url);
-    await page.keyboard.press(" ");
+    await pause(page);
     await seek(page, 2.9);
     await page.waitForFunction(() => document.querySelectorAll(".plot .chip").length > 0, null, {
       timeout: 20000,
@@ -69,7 +70,7 @@ test("a run without totals is plotted and coloured by what it has", async () => 
 test("a link in a new tab opens by the token of a tab that is open, and elsewhere by the address", async () => {
   const server = await view();
   const { page } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, 2.9);
   await page.keyboard.press("l");
   const link = await page.evaluate(() => location.href);
@@ -259,7 +260,7 @@ test("taxels that a source lacks have no rings, and those that it should have se
   const name = writeRecording("half.csv", half, 50, 0.02, () => half.map((_, i) => (i === 0 ? "" : 5)));
   const server = await view(name, "--body", "hand");
   const { page } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, 0.5);
   const counts = await page.evaluate(() => {
     const counts = {};
@@ -277,7 +278,7 @@ test("taxels that a source lacks have no rings, and those that it should have se
 test("the next touch is a key away, events of a recording are listed once, and the view is a PNG", async () => {
   const server = await view();
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await page.waitForFunction(
     () => window.somatic.model.timeline.until >= window.somatic.model.welcome.time.end_s,
     null,
@@ -307,8 +308,7 @@ test("the next touch is a key away, events of a recording are listed once, and t
     await seek(page, 0.3 + 0.02 * i);
     await page.keyboard.press(" ");
     await page.waitForFunction(() => window.somatic.model.frame.t > 1, null, { timeout: 30000 });
-    await page.keyboard.press(" ");
-    await page.waitForFunction(() => !window.somatic.model.status.playing);
+    await pause(page);
   }
   const events = await page.evaluate(() => window.somatic.model.events);
   const ids = frames.map((frame) => frame.touches.map((touch) => touch.id));

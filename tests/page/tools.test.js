@@ -9,6 +9,7 @@ import {
   coloursAt,
   folder,
   open,
+  pause,
   picture,
   seek,
   serve,
@@ -17,15 +18,10 @@ import {
   writeRecording,
 } from "./program.js";
 
-const paused = async (page) => {
-  await page.keyboard.press(" ");
-  await page.waitForFunction(() => !window.somatic.model.status.playing);
-};
-
 test("an address shows the same view again, without the token", async () => {
   const server = await view();
   const { page, problems } = await open(server.url);
-  await paused(page);
+  await pause(page);
   await seek(page, 2.9);
   await page.keyboard.press("3");
   await page.keyboard.press("+");
@@ -83,7 +79,7 @@ test("the timeline is zoomed and repeats a part, by keys, buttons, wheel and dra
   const name = writeRecording("long.csv", ids, 2001, 0.01, (n) => ids.map((id) => (id === 4 ? n % 100 : 0)));
   const server = await view(name, "--body", "hand", "--speed", "4");
   const { page, problems } = await open(server.url);
-  await paused(page);
+  await pause(page);
   await page.waitForFunction(() => window.somatic.model.timeline.until >= 20, null, { timeout: 60000 });
   await seek(page, 10);
   const span = () =>
@@ -124,7 +120,7 @@ test("the timeline is zoomed and repeats a part, by keys, buttons, wheel and dra
   await page.waitForFunction(() => window.seen.filter((t, i) => t < window.seen[i - 1]).length >= 2, null, {
     timeout: 60000,
   });
-  await paused(page);
+  await pause(page);
   await picture(page, "repeat.png");
   const seen = await page.evaluate(() => window.seen);
   assert.ok(Math.min(...seen) > loop.from - 0.02, "it begins where the part begins");
@@ -139,7 +135,7 @@ test("the timeline is zoomed and repeats a part, by keys, buttons, wheel and dra
   await page.waitForFunction(() => window.seen.some((t, i) => t < window.seen[i - 1]), null, {
     timeout: 60000,
   });
-  await paused(page);
+  await pause(page);
   await seek(page, 19);
   await page.keyboard.press("]");
   assert.deepEqual((await span()).loop, { from: 18.5, to: 19 });
@@ -328,7 +324,7 @@ test("a part is saved as a video, and its highest pressures are shown", async ()
   const server = await view(name, "--body", "hand");
   const { page, problems } = await open(server.url);
   await page.waitForFunction(() => document.querySelector(".touch"));
-  await paused(page);
+  await pause(page);
   await seek(page, 3);
   await bare(page);
   await page.evaluate(() => window.somatic.span.setLoop(1, 2));

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { test } from "node:test";
-import { bare, coloursAt, open, picture, seek, SOMATIC, view } from "./program.js";
+import { bare, coloursAt, open, pause, picture, seek, SOMATIC, view } from "./program.js";
 
 /** The first colour of the palette: the only touch of a frame has it. */
 const FIRST = [0x56, 0xb4, 0xe9];
@@ -55,7 +55,7 @@ test("touches are those of an uninterrupted run, with the way that they came", a
   const frames = lines();
   const server = await view("--outputs", "total,touches,touches.place");
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   const same = (a, b, what) => assert.deepEqual(a.map(Math.fround), b.map(Math.fround), what);
   for (const index of [149, 20, 208, 3, 150, 60]) {
     const frame = frames[index];
@@ -122,7 +122,7 @@ test("a touch is marked, listed and chosen, its taxels have rims, and it is gone
   const before = frames.findLast((frame) => frame.t < during.t && !frame.touches.length);
   const server = await view("--outputs", "total,position,centroid,touches");
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, during.t);
   await page.waitForTimeout(800);
   await picture(page, "touches.png");
@@ -198,7 +198,7 @@ test("a touch is marked, listed and chosen, its taxels have rims, and it is gone
 test("without touches the page shows fields", async () => {
   const server = await view("--outputs", "total,position,centroid,principal_axis,anisotropy,area");
   const { page, problems } = await open(server.url);
-  await page.keyboard.press(" ");
+  await pause(page);
   await seek(page, 2.9);
   assert.equal(await page.locator("#touches-panel").isVisible(), false);
   assert.equal(await page.locator("#marks-choice").inputValue(), "whole fields");
