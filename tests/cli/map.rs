@@ -506,7 +506,7 @@ fn sensors_with_three_axes_come_from_bags_by_their_names() {
     write_db3(&path("xela.db3"), &sent);
     for (bag, map, says, taxels, last) in [
         ("pillars.mcap", "contactile", "3 × 3 sensors", 9, ["-8", "0.5", "8"]),
-        ("xela.db3", "xela-ros2", "1 pad (sensor_1)", 16, ["15", "1", "30"]),
+        ("xela.db3", "xela-ros2", "a grid of 4 × 4 sensors", 16, ["15", "1", "30"]),
     ] {
         let (table, bag) = (path(&format!("{map}.csv")), path(bag));
         let source = format!("ros2-mcap:{}", bag.display());

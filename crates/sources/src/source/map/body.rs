@@ -8,11 +8,47 @@ use crate::body::{Sheet, SheetCell, sheets};
 use crate::error::{Result, failed};
 use crate::signal::Channel;
 
+/// How many of the map's grids `count` taxels are, if they are more than one.
+fn grids(map: &ArrayMap, count: usize) -> Option<(usize, [u32; 2])> {
+    let [rows, columns] = map.grid?;
+    let cells = rows as usize * columns as usize;
+    let is_grid = rows > 1 && columns > 1;
+    (is_grid && count > cells && count.is_multiple_of(cells)).then_some((count / cells, [rows, columns]))
+}
+
+/// Whether `count` taxels are pads: those that the map names, or several of its grids.
+pub(in crate::source) fn has_pads(map: &ArrayMap, count: usize) -> bool {
+    !map.pads.is_empty() || grids(map, count).is_some()
+}
+
+/// Pads of one grid side by side, with an empty column between them.
+fn in_a_row(count: usize, grid: [u32; 2], pitch_m: [f64; 2]) -> Vec<Pad> {
+    let step_m = f64::from(grid[1] + 1) * pitch_m[1];
+    let from_middle = |index: usize| index as f64 - (count as f64 - 1.0) / 2.0;
+    let pad = |index: usize| Pad {
+        name: format!("pad_{}", index + 1),
+        grid,
+        pitch_m,
+        at_m: [from_middle(index) * step_m, 0.0],
+    };
+    (0..count).map(pad).collect()
+}
+
 /// The pads of `count` taxels, and what is to be said of them.
 fn pads(map: &ArrayMap, count: usize) -> Result<(Vec<Pad>, String)> {
     if map.pads.is_empty() {
         let grid = map.grid.unwrap_or([1, u32::try_from(count).unwrap_or(u32::MAX)]);
         let pitch_m = map.pitch_m.unwrap_or([USUAL_PITCH_M; 2]);
+        let guess =
+            "10 mm apart. This distance is a guess: `pitch` in the map sets it, and `body` names a body of yours";
+        let apart = map.pitch_m.map_or(guess.to_owned(), |[rows, columns]| match rows == columns {
+            true => format!("{} mm apart", rows * 1e3),
+            false => format!("{} mm and {} mm apart", rows * 1e3, columns * 1e3),
+        });
+        if let Some((pads, [rows, columns])) = grids(map, count) {
+            let what = format!("{pads} pads (pad_1 to pad_{pads}), side by side, of {rows} × {columns} sensors each");
+            return Ok((in_a_row(pads, grid, pitch_m), format!("{what}, {apart}")));
+        }
         let (name, what) = match grid {
             [1, _] => ("row", format!("a row of {count} sensors")),
             [rows, columns] => ("grid", format!("a grid of {rows} × {columns} sensors")),
@@ -26,12 +62,6 @@ fn pads(map: &ArrayMap, count: usize) -> Result<(Vec<Pad>, String)> {
                 pad.cells()
             ));
         }
-        let guess =
-            "10 mm apart. This distance is a guess: `pitch` in the map sets it, and `body` names a body of yours";
-        let apart = map.pitch_m.map_or(guess.to_owned(), |[rows, columns]| match rows == columns {
-            true => format!("{} mm apart", rows * 1e3),
-            false => format!("{} mm and {} mm apart", rows * 1e3, columns * 1e3),
-        });
         return Ok((vec![pad], format!("{what}, {apart}")));
     }
     // Hands are sold with some of their pads.
@@ -122,5 +152,10 @@ mod tests {
         let [first, last] = [0, 5].map(|at: usize| body.taxels[at].position_in_link);
         assert!((first - last).abs().abs_diff_eq(DVec3::new(0.008, 0.0, 0.004), 1e-6), "{first} {last}");
         assert!(glb(&grid, &ids[..5]).unwrap_err().to_string().contains("grid: 2 × 3 are 6 sensors"));
+        let three: Vec<u32> = (0..18).collect();
+        let words = "a body is made: 3 pads (pad_1 to pad_3), side by side, of 2 × 3 sensors each, 4 mm apart";
+        assert_eq!(about(&grid, &three), words);
+        let body = Body::from_bytes("pads", &glb(&grid, &three).unwrap()).unwrap();
+        assert_eq!(body.fields.iter().filter(|field| field.name.starts_with("pad_")).count(), 3);
     }
 }

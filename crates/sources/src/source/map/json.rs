@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::decoder::Decoder;
-use super::path::{ArrayPath, Step};
+use super::path::{ArrayPath, Step, number_of};
 use crate::error::{Result, failed, suggestion};
 
 /// What `value` is, in a word.
@@ -51,6 +51,22 @@ fn walk<'a>(
             for (index, item) in wanted.iter().enumerate() {
                 here.push_str(&format!("[{}]", first + index));
                 walk(item, rest, here, each)?;
+                here.truncate(length);
+            }
+        }
+        (Step::All, Value::Object(fields)) => {
+            let mut numbered: Vec<_> =
+                fields.iter().filter_map(|(name, next)| Some((number_of(name)?, name, next))).collect();
+            if numbered.is_empty() {
+                return Err(failed!("{} has no fields called by whole numbers", place(here)));
+            }
+            numbered.sort_unstable_by_key(|&(number, ..)| number);
+            for (_, name, next) in numbered {
+                if length > 0 {
+                    here.push('.');
+                }
+                here.push_str(name);
+                walk(next, rest, here, each)?;
                 here.truncate(length);
             }
         }
@@ -169,6 +185,9 @@ mod tests {
         assert_eq!(read(json, "hex", Some("hex16")).unwrap(), [Some(255.0)]);
         assert_eq!(read(json, "bytes", Some("i16le")).unwrap(), [Some(1.0), Some(-1.0)]);
         assert_eq!(read("[[1],[2]]", "[*][0]", None).unwrap(), [Some(1.0), Some(2.0)]);
+        // Fields called by numbers are items, whatever else there is.
+        let numbered = r#"{"message":8,"10":{"p":[5]},"9":{"p":[3,4]},"1x":0}"#;
+        assert_eq!(read(numbered, "[*].p", None).unwrap(), [Some(3.0), Some(4.0), Some(5.0)]);
     }
 
     #[test]
@@ -180,6 +199,7 @@ mod tests {
             ("pads[1].pressure", "`pads` has 1 items, and [1] is asked for"),
             ("pads.pressure", "`pads` is an array and has no `pressure`"),
             ("word[*]", "`word` is text, not an array"),
+            ("[*].p", "the line has no fields called by whole numbers"),
             ("word", "`word` is text; say how"),
             ("yes", "`yes` is true or false, not a number"),
             ("pads", "`pads` is an object; go on with one of its fields"),

@@ -15,11 +15,12 @@ pub enum Step {
     Field(String),
     /// The items of an array from the first number to before the second one: `[2:5]`; `[2]` is one of them.
     Items(usize, usize),
-    /// All items of an array: `[*]`.
+    /// All items of an array, or of an object whose fields are called by whole numbers: `[*]`.
     All,
 }
 
-/// Where values are in a message: fields with `.` between them, `[*]` for all items of an array, `[3]` for one, `[2:5]` for some.
+/// Where values are in a message: fields with `.` between them, `[*]` for all items of an array, `[3]` for one, `[2:5]` for some. `[*]` is
+/// also for the fields of an object that are called by whole numbers, in the order of these.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ArrayPath(Vec<Step>);
 
@@ -40,18 +41,28 @@ impl ArrayPath {
 
     /// Whether `name`, such as `a.b[0].c[3]`, is a value at this path or within it.
     pub(in crate::source) fn leads_to(&self, name: &str) -> bool {
-        let Ok(own) = name.parse::<Self>() else { return false };
-        let fits = |(wanted, step): (&Step, &Step)| match (wanted, step) {
-            (Step::Field(wanted), Step::Field(name)) => wanted == name,
-            (Step::All, Step::Items(..)) => true,
-            (Step::Items(first, end), Step::Items(at, _)) => (*first..*end).contains(at),
-            _ => false,
-        };
-        let rest = own.0.get(self.0.len()..).unwrap_or_default();
-        own.0.len() >= self.0.len()
-            && self.0.iter().zip(&own.0).all(fits)
-            && rest.iter().all(|step| matches!(step, Step::Items(..)))
+        self.place_of(name).is_some()
     }
+
+    /// The numbers in `name` that `[*]` and ranges stand for, if it is a value at this path or within it: values are in their order.
+    pub(in crate::source) fn place_of(&self, name: &str) -> Option<Vec<usize>> {
+        let own: Self = name.parse().ok()?;
+        let fits = |(wanted, step): (&Step, &Step)| match (wanted, step) {
+            (Step::Field(wanted), Step::Field(name)) => (wanted == name).then_some(None),
+            (Step::All, Step::Field(name)) => number_of(name).map(Some),
+            (Step::All, Step::Items(at, _)) => Some(Some(*at)),
+            (Step::Items(first, end), Step::Items(at, _)) => (*first..*end).contains(at).then_some(Some(*at)),
+            _ => None,
+        };
+        let rest = own.0.get(self.0.len()..)?;
+        let numbers: Vec<Option<usize>> = self.0.iter().zip(&own.0).map(fits).collect::<Option<_>>()?;
+        rest.iter().all(|step| matches!(step, Step::Items(..))).then(|| numbers.into_iter().flatten().collect())
+    }
+}
+
+/// The whole number that a field is called by, such as 2 of `2`.
+pub(in crate::source) fn number_of(name: &str) -> Option<usize> {
+    name.bytes().all(|byte| byte.is_ascii_digit()).then(|| name.parse().ok()).flatten()
 }
 
 /// The items that `text`, within brackets, names.
@@ -138,5 +149,8 @@ mod tests {
         }
         let some: ArrayPath = "a[1:3]".parse().unwrap();
         assert!(some.leads_to("a[2]") && !some.leads_to("a[3]") && !some.leads_to("a[0]"));
+        let numbered: ArrayPath = "[*].force[*]".parse().unwrap();
+        assert_eq!(numbered.place_of("12.force[3]"), Some(vec![12, 3]));
+        assert!(["force[3]", "x.force[3]", "1x.force[3]", "12.count[3]"].iter().all(|name| !numbered.leads_to(name)));
     }
 }

@@ -134,7 +134,7 @@ palm_touch = [4900, 112]
 
 /// As the reader of the maker, `xela_server_ros2`, takes the lines of its server apart: by sensor, three numbers for each taxel.
 const XELA: &str = r#"
-values = "1.calibrated"
+values = "[*].calibrated"
 axes = "uvn"
 grid = "4x4"
 pitch = "4.7mm"
@@ -144,12 +144,8 @@ const XELA_ROS2: &str = r#"
 type = "xela_server_ros2/msg/SensStream"
 values = ["sensors[*].forces[*].x", "sensors[*].forces[*].y", "sensors[*].forces[*].z"]
 axes = "u,v,n"
-pads = [
-  { name = "sensor_1", grid = "4x4", pitch = "4.7mm", at_mm = [0, 0] },
-  { name = "sensor_2", grid = "4x4", pitch = "4.7mm", at_mm = [30, 0] },
-  { name = "sensor_3", grid = "4x4", pitch = "4.7mm", at_mm = [60, 0] },
-  { name = "sensor_4", grid = "4x4", pitch = "4.7mm", at_mm = [90, 0] },
-]
+grid = "4x4"
+pitch = "4.7mm"
 "#;
 
 /// As the documentation of `xela_server_ros2` has it; counts go up to 65535 there, so that they are unsigned.
@@ -194,6 +190,9 @@ pitch = "2mm"
 const UNMEASURED_AXES: &str =
     "x is taken for right and y for up on the pad, as drawn; drag over it, and correct `axes` in a map of your own";
 
+const XELA_GRIDS: &str =
+    "sensors of XELA are taken to have 4 × 4 taxels each, drawn 4.7 mm apart; others need a map of your own";
+
 const PRESETS: [Preset; 8] = [
     Preset {
         name: "dex3",
@@ -228,8 +227,8 @@ const PRESETS: [Preset; 8] = [
         map: XELA,
         definition: None,
         notes: &[
-            "sensor 1 of a XELA server, 4 × 4 taxels, drawn 4.7 mm apart; more sensors, or others, need a map of your own",
-            "values are the calibrated forces; counts are at 1.data, with decoder = \"hex16\"",
+            XELA_GRIDS,
+            "values are the calibrated forces; counts are at [*].data, with decoder = \"hex16\"",
             UNMEASURED_AXES,
         ],
         is_untested: true,
@@ -238,10 +237,7 @@ const PRESETS: [Preset; 8] = [
         name: "xela-ros2",
         map: XELA_ROS2,
         definition: Some(XELA_DEFINITION),
-        notes: &[
-            "sensors of XELA are taken to have 4 × 4 taxels each, drawn 4.7 mm apart, side by side",
-            UNMEASURED_AXES,
-        ],
+        notes: &[XELA_GRIDS, UNMEASURED_AXES],
         is_untested: true,
     },
     Preset {

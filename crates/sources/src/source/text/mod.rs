@@ -112,6 +112,7 @@ impl TextSource {
         let known = Known {
             options: by_map.as_ref().unwrap_or(&options.text),
             grid,
+            may_have_grids: options.grid.is_none(),
             is_joined,
             has_rate: options.rate_hz.is_some(),
             decoder: options.map.as_ref().and_then(|map| map.decoder),
@@ -175,12 +176,17 @@ impl TextSource {
         self.form.grid.unwrap_or([1, Channel::taxels_of(&self.ids).len()])
     }
 
-    /// A body for it, a `.glb`: a grid, or a row of sensors, as far apart as the options say, else 10 mm.
+    /// The map, if it says that the sensors are pads.
+    fn with_pads(&self) -> Option<&ArrayMap> {
+        self.map.as_ref().filter(|map| map::body::has_pads(map, self.form.taxels()))
+    }
+
+    /// A body for it, a `.glb`: pads, a grid, or a row of sensors, as far apart as the options say, else 10 mm.
     ///
     /// # Errors
     /// Two of its sensors have the same id, or it has too many.
     pub fn body(&self) -> Result<Vec<u8>> {
-        let made = match self.map.as_ref().filter(|map| !map.pads.is_empty()) {
+        let made = match self.with_pads() {
             Some(map) => map::body::glb(map, &self.ids),
             None => body::glb(&self.ids, self.size(), self.pitch_m.unwrap_or([USUAL_PITCH_M; 2])),
         };
@@ -190,7 +196,7 @@ impl TextSource {
     /// What is to be said of [`TextSource::body`], whose places nobody has measured.
     #[must_use]
     pub fn about_body(&self) -> String {
-        if let Some(map) = self.map.as_ref().filter(|map| !map.pads.is_empty()) {
+        if let Some(map) = self.with_pads() {
             return map::body::about(map, &self.ids);
         }
         let [rows, columns] = self.size();

@@ -63,30 +63,42 @@ mod tests {
     use crate::signal::{Channel, Frame};
     use crate::source::{ArrayMap, Source as _, TextPlace, VendorOptions};
 
-    /// What a server of XELA sends: a welcome, then sixteen taxels with three numbers each, as counts and as forces; of taxel `at` these are
-    /// `at`, −`at` and 2·`at`.
-    fn xela_line(message: usize) -> String {
-        let counts: Vec<String> = (0..16)
-            .flat_map(|at: u16| [32_768 + at, 32_768 - at, 32_768 + 2 * at])
-            .map(|raw| format!("{raw:04X}"))
-            .collect();
-        let forces: Vec<String> = (0..16).flat_map(|at| [at, -at, 2 * at]).map(|force| format!("{force}.5")).collect();
+    /// What a server of XELA sends of a number of sensors: of each sixteen taxels with three numbers each, as counts and as forces; of taxel
+    /// `at` these are `at`, −`at` and 2·`at`, 100 more for each sensor before, and half of one more as forces. Its sensors stand in the order of their names as texts.
+    fn xela_line(message: usize, sensors: u16) -> String {
+        let sensor = |number: u16| {
+            let more = 100 * (number - 1);
+            let counts: Vec<String> = (0..16)
+                .flat_map(|at: u16| [32_768 + at, 32_768 - at, 32_768 + 2 * at])
+                .map(|raw| format!("{:04X}", raw + more))
+                .collect();
+            let force = |own: i32| (f64::from(own + i32::from(more)) + 0.5).to_string();
+            let forces = (0..16).flat_map(|at| [at, -at, 2 * at]).map(force);
+            format!(
+                "\"{number}\":{{\"time\":{message}.25,\"model\":\"uSPa44\",\"sensor\":\"{number}\",\"taxels\":16,\"data\":\"{}\",\
+                 \"calibrated\":[{}]}}",
+                counts.join(","),
+                forces.collect::<Vec<_>>().join(",")
+            )
+        };
+        let mut all: Vec<String> = (1..=sensors).map(sensor).collect();
+        all.sort();
         format!(
-            "{{\"type\":\"routine\",\"message\":{message},\"time\":{}.25,\"sensors\":1,\"1\":{{\"time\":{message}.25,\"model\":\"uSPa44\",\
-             \"sensor\":\"1\",\"taxels\":16,\"data\":\"{}\",\"calibrated\":[{}]}}}}",
+            "{{\"type\":\"routine\",\"message\":{message},\"time\":{}.25,\"sensors\":{sensors},{}}}",
             1_695_690_788 + message,
-            counts.join(","),
-            forces.join(",")
+            all.join(",")
         )
     }
 
-    fn xela_server() -> (TextPlace, thread::JoinHandle<()>) {
+    /// A server that welcomes whoever comes, and then sends such lines.
+    fn xela_server(sensors: u16) -> (TextPlace, thread::JoinHandle<()>) {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let place = format!("ws://{}", listener.local_addr().unwrap()).parse().unwrap();
         let server = thread::spawn(move || {
             let mut socket = tungstenite::accept(listener.accept().unwrap().0).unwrap();
             let welcome = "{\"ip\":\"127.0.0.1\",\"port\":5000,\"connections\":0,\"sensors\":[\"uSPa44\"],\"message\":\"Welcome\"}";
-            let mut lines = std::iter::once(welcome.to_owned()).chain((1..).map(xela_line));
+            let lines = (1..).map(|message| xela_line(message, sensors));
+            let mut lines = std::iter::once(welcome.to_owned()).chain(lines);
             while lines.next().is_some_and(|line| socket.send(line.into()).is_ok()) {
                 thread::sleep(Duration::from_millis(20));
             }
@@ -96,30 +108,38 @@ mod tests {
 
     #[test]
     fn a_server_of_three_axis_sensors_is_read_by_name_as_forces_and_by_a_map_as_counts() {
-        let counts = "values = '1.data'\ndecoder = 'hex16'\naxes = 'uvn'\ngrid = '4x4'\npitch = '4.7mm'";
-        for (map, zero) in [(ArrayMap::named("xela").unwrap(), 0.0), (ArrayMap::parse(counts).unwrap(), 32_768.0)] {
-            let (place, server) = xela_server();
+        let counts = "values = '[*].data'\ndecoder = 'hex16'\naxes = 'uvn'\ngrid = '4x4'\npitch = '4.7mm'";
+        let named = || ArrayMap::named("xela").unwrap();
+        for (map, zero, sensors) in
+            [(named(), 0.5, 1), (named(), 0.5, 11), (ArrayMap::parse(counts).unwrap(), 32_768.0, 11)]
+        {
+            let (place, server) = xela_server(sensors);
+            let taxels = 16 * usize::from(sensors);
             let options = VendorOptions { map: Some(map), ..VendorOptions::default() };
             let mut source = TextSource::open(&place, &options, &mut |_| {}).unwrap();
             let names: Vec<String> = source.taxels().iter().map(|&id| Channel(id).to_string()).collect();
-            assert_eq!((names.len(), names[..4].join(" ").as_str()), (48, "0.u 0.v 0 1.u"));
+            assert_eq!((names.len(), names[..4].join(" ").as_str()), (3 * taxels, "0.u 0.v 0 1.u"));
             let body = Body::from_bytes("pad", &source.body().unwrap()).unwrap();
-            assert!(body.taxels.len() == 16 && body.taxels.iter().all(|taxel| taxel.modality == Modality::Force3));
+            assert!(body.taxels.len() == taxels && body.taxels.iter().all(|taxel| taxel.modality == Modality::Force3));
             let mut frame = Frame::default();
             for _ in 0..3 {
                 assert!(source.next_frame(&mut frame).unwrap());
-                let value = |at: usize| frame.values[at].number().unwrap() - zero;
-                let at = |taxel: usize| [value(3 * taxel), value(3 * taxel + 1), value(3 * taxel + 2)].map(f64::round);
-                if zero > 0.0 {
-                    assert_eq!(at(7), [7.0, -7.0, 14.0]);
-                } else {
-                    assert_eq!([value(21), value(22), value(23)], [7.5, -7.5, 14.5]);
+                // Sensor 10 comes after sensor 9.
+                for sensor in [0, 9].into_iter().take(usize::from(sensors)) {
+                    let own = [0, 1, 2].map(|axis| frame.values[3 * (16 * sensor + 7) + axis].number().unwrap());
+                    assert_eq!(own, [7.0, -7.0, 14.0].map(|value| zero + 100.0 * sensor as f64 + value));
                 }
             }
             let said = source.notices().join("\n");
             assert!(
-                said.contains("are a 4 × 4 grid") && said.contains("a message has nothing that the map names"),
+                said.contains("a message has nothing that the map names")
+                    && (sensors > 1 || said.contains("are a 4 × 4 grid")),
                 "{said}"
+            );
+            let about = source.about_body();
+            assert!(
+                sensors == 1 || about.contains("11 pads (pad_1 to pad_11), side by side, of 4 × 4 sensors each"),
+                "{about}"
             );
             assert!(source.losses().is_empty(), "{:?}", source.losses());
             drop(source);

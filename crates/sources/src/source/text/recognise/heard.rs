@@ -48,6 +48,8 @@ pub(in crate::source::text) fn kind(line: &str) -> Kind {
 pub(in crate::source::text) struct Known<'a> {
     pub(in crate::source::text) options: &'a TextOptions,
     pub(in crate::source::text) grid: Option<[usize; 2]>,
+    /// Whether there may be several of that grid.
+    pub(in crate::source::text) may_have_grids: bool,
     /// Whether the first line may be the end of a longer one.
     pub(in crate::source::text) is_joined: bool,
     /// Whether frames are stamped by a rate.

@@ -224,15 +224,15 @@ pub(super) fn by_options(columns: &mut Columns, known: Known<'_>) -> Result<()> 
         let what = "lines have their own times; leave out --rate, or add --time arrival";
         return Err(failed!("{what}").into_usage());
     }
-    // Those of one path follow those of the one before.
+    // Those of one path follow those of the one before, and the items of arrays each other.
     let paths = known.paths();
-    let path_of = |index: usize| {
-        let name = columns.names.get(index).filter(|_| paths.len() > 1);
-        name.and_then(|name| paths.iter().position(|path| path.leads_to(name)))
+    let place_of = |index: usize| {
+        let name = columns.names.get(index)?;
+        paths.iter().enumerate().find_map(|(number, path)| Some((number, path.place_of(name)?)))
     };
     let mut sensors: Vec<usize> =
         (0..columns.uses.len()).filter(|&index| matches!(columns.uses[index], Use::Sensor(_))).collect();
-    sensors.sort_by_cached_key(|&index| path_of(index));
+    sensors.sort_by_cached_key(|&index| place_of(index));
     for (place, &index) in sensors.iter().enumerate() {
         columns.uses[index] = Use::Sensor(place);
     }
@@ -270,6 +270,9 @@ pub(super) fn ids(columns: &Columns, count: usize, known: Known<'_>) -> Result<O
 pub(super) fn sized(mut form: Form, matrix: Option<[usize; 2]>, known: Known<'_>) -> Result<Form> {
     let count = form.taxels();
     if let Some([rows, columns]) = known.grid {
+        if known.may_have_grids && count > rows * columns && count.is_multiple_of(rows * columns) {
+            return Ok(form);
+        }
         if rows * columns != count {
             return Err(failed!(
                 "--grid {rows}x{columns} is {} sensors, and a frame has {count}; --columns says which columns are sensors",
