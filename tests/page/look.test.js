@@ -14,6 +14,7 @@ import {
   picture,
   seek,
   serve,
+  settled,
   SOMATIC,
   taxelIds,
   view,
@@ -50,7 +51,7 @@ test("a taxel under the pointer is described, and a field is looked at", async (
   const taxel = await page.evaluate(() => Array.from(window.somatic.model.mesh.taxelId).indexOf(4));
   for (const key of ["1", "2", "3", "4", "5", "6"]) {
     await page.keyboard.press(key);
-    await page.waitForTimeout(400);
+    await settled(page);
     if (await page.evaluate((taxel) => window.somatic.pixelOfTaxel(taxel), taxel)) break;
   }
   const at = await page.evaluate((taxel) => window.somatic.pixelOfTaxel(taxel), taxel);
@@ -68,7 +69,7 @@ test("a taxel under the pointer is described, and a field is looked at", async (
   await page.mouse.click(at[0], at[1]);
   const chosen = await page.locator("#percept-title").innerText();
   await page.keyboard.press("f");
-  await page.waitForTimeout(600);
+  await settled(page);
   const { inside, members, middle } = await page.evaluate((label) => {
     const { model, pixelOfTaxel } = window.somatic;
     const field = model.welcome.fields.find((field) => field.label === label);
@@ -151,7 +152,7 @@ test("link poses in frames move the body", async () => {
   const placeAfter = async (t, pose) => {
     send(t, pose);
     await page.waitForFunction((t) => window.somatic.model.frame?.t === t, t, { timeout: 20000 });
-    await page.waitForTimeout(600);
+    await settled(page);
     return page.evaluate(() => {
       const { model, pixelOfTaxel } = window.somatic;
       return Array.from(model.mesh.taxelId, (_, taxel) => pixelOfTaxel(taxel));
@@ -187,7 +188,7 @@ test("other percepts in a recording are marked", async () => {
     await seek(page, 2.9);
     await page.keyboard.press("e");
     await page.waitForFunction(() => window.somatic.model.explanation, null, { timeout: 60000 });
-    await page.waitForTimeout(400);
+    await settled(page);
     if (calibration.length) await picture(page, "recorded.png");
     const colour = await page.evaluate(() => {
       const probe = document.createElement("span");
@@ -258,7 +259,7 @@ test("ten thousand taxels are drawn, each in its colour", async () => {
   await seek(page, 1);
   await page.keyboard.press("5");
   await bare(page);
-  await page.waitForTimeout(2000);
+  await settled(page);
   await picture(page, "sheet.png");
   const expected = await page.evaluate(() => {
     const { model, pixelOfTaxel } = window.somatic;

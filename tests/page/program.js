@@ -110,7 +110,20 @@ export async function seek(page, t) {
   await page.waitForFunction((t) => Math.abs(window.somatic.model.frame?.t - t) < 1e-9, t, {
     timeout: 60000,
   });
-  await page.waitForTimeout(300);
+  await settled(page);
+}
+
+/** Waits until nothing is drawn any more: a camera has come to rest, and what was asked for is shown. For pages that do not play. */
+export async function settled(page) {
+  await page.evaluate(async () => {
+    const next = () => new Promise((done) => requestAnimationFrame(done));
+    let [drawn, still] = [-1, 0];
+    for (let all = 0; still < 30 && all < 1200; all++) {
+      await next();
+      still = window.somatic.framesDrawn === drawn ? still + 1 : 0;
+      drawn = window.somatic.framesDrawn;
+    }
+  });
 }
 
 /** Takes off what lies on top of the discs: labels and marks. */

@@ -6,7 +6,7 @@ import { join } from "node:path";
 import { before, test } from "node:test";
 import { ticksBetween } from "../../crates/page/src/web/legend.js";
 import { letterName, Senses } from "../../crates/page/src/web/senses.js";
-import { coloursAt, folder, open, pause, picture, seek, SOMATIC, view } from "./program.js";
+import { coloursAt, folder, open, pause, picture, seek, settled, SOMATIC, view } from "./program.js";
 
 const about = {
   shear: [1],
@@ -130,7 +130,7 @@ before(async () => {
 /** Colours of taxels by their ids, with the letter of a button of the legend. */
 async function coloured(page, letter) {
   await page.locator(".legend-letters button", { hasText: new RegExp(`^${letter}$`) }).click();
-  await page.waitForTimeout(400);
+  await settled(page);
   const places = await page.evaluate(() =>
     Array.from(window.somatic.model.mesh.taxelId, (_, taxel) => window.somatic.pixelOfTaxel(taxel)),
   );
@@ -205,7 +205,7 @@ test("fields and percepts have the quantities of the letter, with their units", 
   const said = async (letter) => {
     await coloured(page, letter);
     await page.locator("#tree .field").first().click();
-    await page.waitForTimeout(300);
+    await settled(page);
     const rows = await page
       .locator("#percept-values .output:visible")
       .evaluateAll((rows) =>
@@ -232,8 +232,7 @@ test("fields and percepts have the quantities of the letter, with their units", 
   assert.ok(!pressure.rows.has("friction") && !pressure.rows.has("temperature"));
   // What is shown is in the address.
   await coloured(page, "temperature");
-  await page.waitForTimeout(600);
-  assert.match(page.url(), /letter=temperature/);
+  await page.waitForFunction(() => /letter=temperature/.test(location.href), null, { timeout: 20000 });
   await page.close();
 });
 

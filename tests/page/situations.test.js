@@ -16,6 +16,7 @@ import {
   picture,
   seek,
   serve,
+  settled,
   SOMATIC,
   taxelIds,
   view,
@@ -126,7 +127,7 @@ test("on a phone nothing overlaps, two fingers zoom and pan, and a tap describes
   await page.tap("#play");
   await page.waitForFunction(() => !window.somatic.model.status.playing);
   await seek(page, 2.9);
-  await page.waitForTimeout(600);
+  await settled(page);
   await picture(page, "phone.png");
   const boxes = await page.evaluate(
     (parts) =>
@@ -221,7 +222,7 @@ test("a body at rest has the colours of its fields, and says its spacing and wha
     const server = await view(body);
     const { page, problems } = await open(server.url);
     await page.waitForFunction(() => window.somatic.model.isAtRest);
-    await page.waitForTimeout(800);
+    await settled(page);
     await picture(page, `rest-${body === "hand" ? "hand" : "sheet"}.png`);
     assert.equal(await page.locator("#legend").isVisible(), false, "it has no pressures");
     assert.doesNotMatch(await page.locator("body").innerText(), /missing/);

@@ -13,6 +13,7 @@ import {
   picture,
   seek,
   serve,
+  settled,
   taxelIds,
   view,
   writeRecording,
@@ -210,7 +211,7 @@ test("the distance of two clicks is that of the taxels, and Escape ends it", asy
   const server = await view("hand");
   const { page, problems } = await open(server.url);
   await page.waitForFunction(() => window.somatic.model.isAtRest);
-  await page.waitForTimeout(600);
+  await settled(page);
   await page.click("#measure");
   assert.match(await page.locator("#hint").innerText(), /click two places/);
   const ends = await page.evaluate(() => {
@@ -236,7 +237,7 @@ test("the distance of two clicks is that of the taxels, and Escape ends it", asy
     said,
   );
   await page.mouse.move(5, 5);
-  await page.waitForTimeout(300);
+  await settled(page);
   await picture(page, "distance.png");
   const chosen = await page.evaluate(() => document.querySelectorAll(".field.chosen").length);
   assert.equal(chosen, 0, "a click that measures chooses nothing");

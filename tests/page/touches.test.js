@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { test } from "node:test";
-import { bare, coloursAt, open, pause, picture, seek, SOMATIC, view } from "./program.js";
+import { bare, coloursAt, open, pause, picture, seek, settled, SOMATIC, view } from "./program.js";
 
 /** The first colour of the palette: the only touch of a frame has it. */
 const FIRST = [0x56, 0xb4, 0xe9];
@@ -124,7 +124,7 @@ test("a touch is marked, listed and chosen, its taxels have rims, and it is gone
   const { page, problems } = await open(server.url);
   await pause(page);
   await seek(page, during.t);
-  await page.waitForTimeout(800);
+  await settled(page);
   await picture(page, "touches.png");
   // Pixels of its colour beside the taxel, outside the disc.
   const rim = async () => {
@@ -174,7 +174,7 @@ test("a touch is marked, listed and chosen, its taxels have rims, and it is gone
   }, label);
   await page.keyboard.press("Escape");
   await bare(page);
-  await page.waitForTimeout(600);
+  await settled(page);
   assert.equal(await rim(), 0, "without marks there are no rims");
   // Before its onset there is neither touch nor row.
   await seek(page, before.t);
@@ -210,7 +210,7 @@ test("without touches the page shows fields", async () => {
     });
   assert.equal(await inked(), true);
   await bare(page);
-  await page.waitForTimeout(300);
+  await settled(page);
   assert.equal(await inked(), false);
   assert.deepEqual(problems, []);
   await page.close();
