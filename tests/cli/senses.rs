@@ -347,12 +347,12 @@ fn what_runs_has_a_plan_also_if_touches_have_shear_and_no_field_has() {
     let scenes: [&[&str]; 4] = [
         &["--outputs", "touches"],
         &["--outputs", "touches.wrench,touches.total"],
-        &["--fields", "hand/palm"],
+        &["--fields", "hand/back"],
         &["--letters", "sustained,shear", "--outputs", "total,touches.friction_sigma"],
     ];
     for asked in scenes {
         let flags = [&["--body", "sensing-hand", "--backend", "cpu"][..], asked].concat();
-        let run = done(&[&["run", "--quiet", "--sink", "csv:-"][..], &flags].concat());
+        let run = done(&[&["run", "--quiet", "--all-fields", "--sink", "csv:-"][..], &flags].concat());
         assert!(run.lines().count() > 1, "{asked:?}");
         let bill: serde_json::Value = serde_json::from_str(&done(&[&["plan", "--json"][..], &flags].concat())).unwrap();
         let stages = bill["stages"].as_array().unwrap();
