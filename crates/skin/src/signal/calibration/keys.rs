@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use serde::Deserialize;
-use toml::Spanned;
+use toml::{Spanned, Value};
 
 use super::senses::{Curves, curve_called, curve_index, range_of};
 use super::shear_keys::{Gains, OwnShear, scaled};
@@ -48,7 +48,7 @@ pub(super) struct Keys {
     shear_gain: Option<Spanned<Gains>>,
     #[serde(default, deserialize_with = "whole")]
     shear_raw_range: Option<Spanned<[f64; 2]>>,
-    shear_noise: Option<Spanned<f64>>,
+    shear_noise: Option<Spanned<Value>>,
 }
 
 impl Keys {
