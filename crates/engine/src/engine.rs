@@ -10,6 +10,7 @@ mod ids;
 mod input;
 mod letters;
 mod links;
+mod made;
 mod on_skin;
 mod options;
 mod place;
