@@ -125,6 +125,11 @@ fn a_temperature_beyond_a_curve_is_that_of_its_end_and_one_under_absolute_zero_i
         assert_eq!(of("", [-400.0, 20.0]), (Some(20.0), Some(20.0), Flags::FAULTY_INPUT));
         assert_eq!(of("[temperature]\nunit = \"K\"\n", [-5.0, 273.25]).2, Flags::FAULTY_INPUT);
         assert_eq!(of("", [-400.0, -300.0]), (None, None, Flags::FAULTY_INPUT));
+        // So is what a masked one reads, a code that is no reading, too.
+        assert_eq!(
+            of("[temperature]\nmissing = [77]\n[taxel.0]\nmask = true\n", [77.0, 20.0]),
+            (Some(20.0), Some(20.0), Flags::FAULTY_INPUT)
+        );
     }
 }
 
