@@ -4,8 +4,8 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::letter_cell::{Made, Readings};
 use super::links::Links;
-use super::made::{Made, Readings};
 use super::pulls::{Pull, Pulls, Sides};
 use super::spread::{Frames, Now};
 use crate::backend::Step;
