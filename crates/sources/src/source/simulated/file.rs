@@ -203,20 +203,22 @@ pub(super) struct TouchKeys {
     pub(super) start_s: Option<Spanned<f64>>,
     pub(super) speed_m_s: Option<Spanned<f64>>,
     #[serde(default, deserialize_with = "over_time")]
-    pub(super) force_newton: Option<Spanned<Vec<[f64; 2]>>>,
+    pub(super) force_newton: Option<OverTime>,
     pub(super) tap: Option<Spanned<TapKeys>>,
     pub(super) press: Option<Spanned<PressKeys>>,
     pub(super) hold: Option<Spanned<HoldKeys>>,
     pub(super) friction: Option<Spanned<f64>>,
     #[serde(default, deserialize_with = "over_time")]
-    pub(super) twist_deg: Option<Spanned<Vec<[f64; 2]>>>,
+    pub(super) twist_deg: Option<OverTime>,
     pub(super) celsius: Option<Spanned<f64>>,
     #[serde(default, deserialize_with = "over_time")]
-    pub(super) gap_m: Option<Spanned<Vec<[f64; 2]>>>,
+    pub(super) gap_m: Option<OverTime>,
 }
 
-/// What changes over time: times in seconds, and values at them.
-fn over_time<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Spanned<Vec<[f64; 2]>>>, D::Error> {
+/// Times in seconds, and values at them.
+type OverTime = Spanned<Vec<[f64; 2]>>;
+
+fn over_time<'de, D: Deserializer<'de>>(from: D) -> Result<Option<OverTime>, D::Error> {
     whole_as(from, || "[[t, value], …], t in seconds".to_owned())
 }
 
