@@ -48,6 +48,7 @@ mod scene_runs;
 // The skins of `somatic bench`.
 mod drift;
 mod senses;
+mod senses_calibrated;
 mod senses_extremes;
 mod simulated;
 mod skipped;

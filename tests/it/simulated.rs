@@ -553,7 +553,7 @@ fn what_is_wrong_is_reported_in_one_line() {
     let cases = [
         ("rate_hz = 50", "rate_hz = 0", "a.toml: line 2: `rate_hz` is 0; it must be over 0"),
         ("rate_hz = 50", "rate_hz = nan", "a.toml: line 2: `rate_hz` is NaN"),
-        ("rate_hz = 50", "rate_hz = \"fast\"", "a.toml: line 2: invalid type"),
+        ("rate_hz = 50", "rate_hz = \"fast\"", "a.toml: line 2: this is the text \"fast\"; it must be a number"),
         ("rate_hz = 50\n", "", "`rate_hz` is missing"),
         ("rate_hz = 50", "rate = 50", "a.toml: line 2: there is no key `rate`; did you mean `rate_hz`?"),
         ("duration_s = 2", "duration_s = -1", "a.toml: line 3: `duration_s` is -1; it must be over 0"),
@@ -611,6 +611,7 @@ fn what_is_wrong_is_reported_in_one_line() {
         ("angle_deg = 20", "angle_deg = [[1, 2], [0, 3]]", "a.toml: line 18: `angle_deg` has the time 0 after 1"),
         ("angle_deg = 20", "angle_deg = \"up\"", "a.toml: line 18: `angle_deg` is a number of degrees, or a list"),
         ("[2, 10]]", "[2, -3]]", "a.toml: line 19: `force_newton` is -3 at 2 s; it must be 0 or more"),
+        ("[2, 10]]", "[2, 10]]\ngap_m = 0.05", "a.toml: line 20: this must be [[t, value], …], t in seconds"),
         ("[2, 10]]", "[0, 10]]", "a.toml: line 19: `force_newton` has the time 0 after 0; times must increase"),
         ("[[0, 10], [2, 10]]", "[]", "a.toml: line 19: `force_newton` is empty"),
         ("[2, 10]]", "[2, 10]]\nhold = { newton = 3 }", "one of `force_newton`, `tap`, `press` and `hold`"),

@@ -1,7 +1,8 @@
 //! Taxels with three axes, each with a gain, a range and shares in the others, by closed forms on every backend.
 
-use glam::{DMat3, DVec3};
-use somatic::internal::signal::Reading;
+use glam::{DMat3, DVec2, DVec3};
+use somatic::internal::scene::SensedTaxels;
+use somatic::internal::signal::{Channel, Reading};
 use somatic::percept::TouchFlags;
 use somatic::signal::Unfit;
 use somatic::{
@@ -94,6 +95,41 @@ fn each_axis_has_its_gain_and_what_others_put_into_it_is_taken_out() {
         engine.pressures(&other, &mut seen);
         near(seen.iter().find(|(id, _)| *id == 12).map(|(_, pressure)| *pressure), 2.0, 1e-5);
         assert!(seen.iter().all(|(id, pressure)| (11..=13).contains(id) || pressure.abs() < 1e-9));
+    }
+}
+
+/// What single taxels feel along t and n × t in `frame`, as pages and pictures show it.
+fn seen(engine: &Engine, body: &Body, frame: &Frame) -> Vec<[f64; 2]> {
+    let taxels = SensedTaxels::new(engine.plan(), body);
+    let value = |name: &str| frame.values[engine.index_of(name).unwrap()];
+    let raw: Vec<RawValue> = grid().map(|(id, _)| value(&id.to_string())).collect();
+    let sensed: Vec<RawValue> = taxels.channels().iter().map(|&id| value(&Channel(id).to_string())).collect();
+    taxels.read(engine.plan(), &raw, &sensed).map(|seen| seen.shear).collect()
+}
+
+#[test]
+fn a_soft_onset_takes_nothing_from_what_is_along_the_skin() {
+    let body = skin(1);
+    let soft = |text: String| text.replace("dead_band = 0.1", "dead_band = 0.5\nonset = \"soft\"");
+    for kind in backends() {
+        for rows in [&CROSS[..], &CROSS[1..]] {
+            let of = |text: &str| {
+                let mut engine = engine(&body, kind, text, false);
+                let felt = FELT.map(|(id, felt)| (id, measured(felt)));
+                let pulled = frame(&engine, 0.0, &felt);
+                let [pressure, shear] = percepts(&mut engine, &pulled)[..] else { panic!("two letters") };
+                let touch = engine.percepts().touches(0).unwrap().touches[0].clone();
+                (pressure.total.unwrap(), DVec2::from_array(shear.shear.unwrap()), touch, seen(&engine, &body, &pulled))
+            };
+            let (hard, soft) = (of(&with_matrix(rows)), of(&soft(with_matrix(rows))));
+            // Each of the three presses by 0.5 N less, and is pulled along by as much as before.
+            near(Some(soft.0), hard.0 - 1.5, 1e-5);
+            assert!((soft.1 - hard.1).length() < 1e-9, "{kind:?}: {} is not {}", soft.1, hard.1);
+            let [softly, hardly] = [&soft.2, &hard.2].map(|touch| touch.shear.unwrap());
+            assert!((softly - hardly).length() < 1e-6, "{kind:?}: {softly} is not {hardly}");
+            let apart = soft.3.iter().flatten().zip(hard.3.iter().flatten()).map(|(a, b)| (a - b).abs());
+            assert!(apart.fold(0.0, f64::max) < 1e-9 && soft.3.iter().filter(|felt| felt[0] != 0.0).count() == 3);
+        }
     }
 }
 

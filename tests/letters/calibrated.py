@@ -43,13 +43,15 @@ def read(recording, taxels, axis=""):
 
 
 def sensed(recording, letter, taxels):
-    """By frame and taxel: the value, whether it is in the sensor's range, which are missing, which are faulty."""
+    """By frame and taxel: the value, whether it is in the sensor's range, which are missing, which are faulty; and -1 where it lies beyond
+    the end of a curve with the least values, 1 beyond that with the greatest."""
     file, body = recording.calibration, recording.body
     raw, missing = read(recording, taxels)
     keys = file.get(letter, {})
     factor, offset = UNITS[letter][keys.get("unit", "°C" if letter == "temperature" else "mm")]
     every = {"baseline": 0.0, "gain": 1.0, "raw_range": [-np.inf, np.inf]} | keys
     values, inside, faulty = np.full(raw.shape, np.nan), np.ones(raw.shape, bool), ~np.isfinite(raw)
+    beyond = np.zeros(raw.shape, int)
     codes = np.isin(raw, np.array(keys.get("missing", []), np.float32).astype(float))
     for column, taxel in enumerate(taxels):
         own = every | file.get("taxel", {}).get(str(body.ids[taxel]), {})
@@ -65,15 +67,25 @@ def sensed(recording, letter, taxels):
                 ohm = ntc["series_ohm"] * above / (ntc["full_raw"] - above)
                 response = 1 / (1 / 298.15 + np.log(ohm / ntc["ohm_at_25"]) / ntc["b_k"]) - 273.15
             faulty[:, column] |= ~((above > 0) & (above < ntc["full_raw"]))
+        elif "curve" in own:
+            curve = file["curve"][own["curve"]]
+            response = interpolated(curve, above)
+            # Raw values are rounded to single precision.
+            off, rises = np.abs(raw[:, column]) * 2.0**-23, 1 if curve["p"][-1] > curve["p"][0] else -1
+            with np.errstate(invalid="ignore"):
+                beyond[:, column] = rises * ((above - off > curve["raw"][-1]).astype(int) - (above + off < curve["raw"][0]))
         else:
-            response = interpolated(file["curve"][own["curve"]], above) if "curve" in own else above
+            response = above
         values[:, column] = own["gain"] * factor * response + offset
         inside[:, column] = (raw[:, column] >= own["raw_range"][0]) & (raw[:, column] <= own["raw_range"][1])
+        if letter == "temperature":
+            with np.errstate(invalid="ignore"):
+                faulty[:, column] |= values[:, column] < -273.15
         if own.get("mask"):
             faulty[:, column] = True
     missing = missing | codes
     faulty &= ~missing
-    return values, inside, missing, faulty
+    return values, inside, missing, faulty, beyond
 
 
 def arc(a, b, x):

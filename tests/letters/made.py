@@ -234,6 +234,9 @@ def random_calibration(rng, body):
             own |= {"shear_noise": number(0.1, 3)} if rng.random() < 0.3 else {}
         elif kind != "pressure" and rng.random() < 0.3:
             own |= {"curve": "warm" if kind == "temperature" else "far"}
+        if kind == "temperature" and "ntc" in warm and "curve" not in own:
+            # A thermistor has neither.
+            own = {key: value for key, value in own.items() if key not in ("baseline", "gain")}
         if kind in ("temperature", "proximity") and rng.random() < 0.3:
             own |= {"invert": bool(rng.random() < 0.7)}
         file["taxel"][str(taxel)] = own

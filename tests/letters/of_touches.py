@@ -105,7 +105,7 @@ class TouchesOf:
         warm = [taxel for taxel, kind in enumerate(self.body.kind) if kind == "temperature"]
         self.warm_of, self.warm_at, self.warm_node = {}, self.in_body(warm)[0], {}
         self.warm_ids = [self.body.ids[taxel] for taxel in warm]
-        self.celsius, _, missing, faulty = sensed(recording, "temperature", warm)
+        self.celsius, _, missing, faulty, _ = sensed(recording, "temperature", warm)
         self.reads = ~missing & ~faulty
         for place, (taxel, at) in enumerate(zip(warm, self.warm_at)):
             on_link = [node for node, own in enumerate(self.taxels) if self.body.link[own] == self.body.link[taxel]]

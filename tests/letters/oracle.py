@@ -101,7 +101,7 @@ class Field:
 
 def temperatures(recording, field, frames):
     """What is right of a field's temperatures, by frame: quantities, flags."""
-    values, inside, missing, faulty = sensed(recording, "temperature", field.members)
+    values, inside, missing, faulty, _ = sensed(recording, "temperature", field.members)
     slope = Slope(recording.calibration.get("temperature", {}).get("window_s", 1.0))
     for frame, t in enumerate(frames.t):
         if frames.restarts[frame]:
@@ -143,7 +143,7 @@ def temperatures(recording, field, frames):
 
 def distances(recording, field, frames):
     keys = recording.calibration.get("proximity", {})
-    values, inside, missing, faulty = sensed(recording, "proximity", field.members)
+    values, inside, missing, faulty, beyond = sensed(recording, "proximity", field.members)
     slope = Slope(keys.get("window_s", 0.1))
     reach = keys["range"] * UNITS["proximity"][keys.get("unit", "mm")][0] if "range" in keys else np.inf
     for frame, t in enumerate(frames.t):
@@ -155,13 +155,15 @@ def distances(recording, field, frames):
             yield {}, flags | {"no_contact"}, False
             continue
         with np.errstate(invalid="ignore"):
-            there = np.flatnonzero(reads & inside[frame] & (values[frame] <= reach))
+            # Beyond the far end of a curve nothing is near.
+            there = np.flatnonzero(reads & (beyond[frame] != 1) & (values[frame] <= reach))
+        flags |= {"out_of_range"} if (reads & ~inside[frame]).any() else set()
         found = {"covered": Value(len(there))}
         if len(there) == 0:
             slope.clear()
             yield found, flags | {"out_of_range", "no_contact"}, False
             continue
-        flags |= {"saturated"} if (values[frame, there] < LEAST_M).any() else set()
+        flags |= {"saturated"} if ((values[frame, there] < LEAST_M) | (beyond[frame, there] == -1)).any() else set()
         metres = np.maximum(values[frame, there], LEAST_M)
         nearest = there[metres.argmin()]
         found["nearest"] = Value(metres.min(), 1)

@@ -8,6 +8,7 @@ mod dominated;
 mod drift_state;
 mod ids;
 mod input;
+mod letter_cell;
 mod letters;
 mod links;
 mod on_skin;

@@ -247,7 +247,7 @@ fn explain(message: &str) -> String {
     let kind = match message.split('`').next() {
         Some("unknown field ") => "key",
         Some("unknown variant ") => "choice",
-        _ => return message.to_owned(),
+        _ => return wrong_type(message).unwrap_or_else(|| message.to_owned()),
     };
     let Some(word) = quoted.next() else { return message.to_owned() };
     let known: Vec<&str> = quoted.collect();
@@ -258,9 +258,65 @@ fn explain(message: &str) -> String {
     }
 }
 
+/// The message of the TOML parser that a value is of another type, in the words of this crate.
+fn wrong_type(message: &str) -> Option<String> {
+    let (found, wanted) = message.strip_prefix("invalid type: ")?.split_once(", expected ")?;
+    let found = match found.split_once(' ') {
+        Some(("integer", number)) => format!("the number {number}"),
+        Some(("floating", point)) => format!("the number {}", point.trim_start_matches("point ")),
+        Some(("string", text)) => format!("the text {text}"),
+        Some(("boolean", choice)) => choice.to_owned(),
+        None if found == "map" => "a table".to_owned(),
+        None if found == "sequence" => "a list".to_owned(),
+        _ => found.to_owned(),
+    };
+    let wanted = match wanted {
+        "f32" | "f64" => "a number",
+        "a sequence" => "a list",
+        "a string" => "a text",
+        "a boolean" => "true or false",
+        "a map" => "a table of keys",
+        wanted if wanted.starts_with("struct ") => "a table of keys",
+        "i8" | "i16" | "i32" | "i64" | "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number",
+        wanted => wanted,
+    };
+    Some(format!("this is {found}; it must be {wanted}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_value_of_another_type_is_told_without_the_parsers_words() {
+        for (message, right) in [
+            ("invalid type: integer `0`, expected a sequence", "this is the number `0`; it must be a list"),
+            (
+                "invalid type: floating point `0.05`, expected u32",
+                "this is the number `0.05`; it must be a whole number",
+            ),
+            ("invalid type: string \"a\", expected f64", "this is the text \"a\"; it must be a number"),
+            ("invalid type: boolean `true`, expected a string", "this is `true`; it must be a text"),
+            ("invalid type: map, expected a boolean", "this is a table; it must be true or false"),
+            ("invalid type: sequence, expected struct ShearKeys", "this is a list; it must be a table of keys"),
+            ("invalid type: integer `5`, expected { b_k = K }", "this is the number `5`; it must be { b_k = K }"),
+        ] {
+            assert_eq!(explain(message), right);
+        }
+        #[derive(Debug, serde::Deserialize)]
+        struct Inner {
+            _number: f64,
+        }
+        #[derive(Debug, serde::Deserialize)]
+        struct File {
+            _inner: Option<Inner>,
+            _list: Option<Vec<f64>>,
+        }
+        let why = |text: &str| parse_toml::<File>(text).unwrap_err().to_string();
+        assert_eq!(why("_inner = 3"), "line 1, column 10: this is the number `3`; it must be a table of keys");
+        assert_eq!(why("_list = [1,\n\"a\"]"), "line 2, column 1: this is the text \"a\"; it must be a number");
+        assert_eq!(why("[_inner]\n_number = \"1\""), "line 2, column 11: this is the text \"1\"; it must be a number");
+    }
 
     #[test]
     fn an_error_is_one_line_with_its_place() {

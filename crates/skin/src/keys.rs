@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer};
-use toml::Spanned;
+use toml::{Spanned, Value};
 
 use crate::error::{Error, Result, parse_toml, place_in, unknown};
 
@@ -43,6 +43,7 @@ impl Text<'_> {
         if fits(number) && number.abs() <= MAX_CREDIBLE {
             return Ok(number);
         }
+        let number = in_words(number);
         Err(self.wrong(value.span(), format!("`{key}` is {number}; it must be {must}, and no more than 1e9 in size")))
     }
 
@@ -110,6 +111,9 @@ pub trait Whole: Sized {
 
     /// What was read, if its lists are as long as they must be; else what is wrong.
     fn of_read(read: Self::Read) -> Result<Self, String>;
+
+    /// How it is written.
+    fn form() -> String;
 }
 
 impl Whole for f64 {
@@ -118,6 +122,10 @@ impl Whole for f64 {
     fn of_read(read: Self) -> Result<Self, String> {
         Ok(read)
     }
+
+    fn form() -> String {
+        "number".to_owned()
+    }
 }
 
 impl<T: Whole> Whole for Vec<T> {
@@ -125,6 +133,10 @@ impl<T: Whole> Whole for Vec<T> {
 
     fn of_read(read: Self::Read) -> Result<Self, String> {
         read.into_iter().map(T::of_read).collect()
+    }
+
+    fn form() -> String {
+        format!("[{}, …]", T::form())
     }
 }
 
@@ -138,6 +150,10 @@ impl<T: Whole, const N: usize> Whole for [T; N] {
             format!("a list has {} {entries} here; give it {N}", whole.len())
         })
     }
+
+    fn form() -> String {
+        format!("[{}]", vec![T::form(); N].join(", "))
+    }
 }
 
 /// For `deserialize_with`: the value of a key whose lists must have their length, not more.
@@ -145,9 +161,28 @@ impl<T: Whole, const N: usize> Whole for [T; N] {
 /// # Errors
 /// A list is too short or too long, or of something else.
 pub fn whole<'de, D: Deserializer<'de>, T: Whole>(from: D) -> Result<Option<Spanned<T>>, D::Error> {
-    let Some(read) = Option::<Spanned<T::Read>>::deserialize(from)? else { return Ok(None) };
-    let span = read.span();
-    T::of_read(read.into_inner()).map(|value| Some(Spanned::new(span, value))).map_err(D::Error::custom)
+    whole_as(from, T::form)
+}
+
+/// The same of a value that must be as `form` says.
+///
+/// # Errors
+/// As of [`whole`].
+pub fn whole_as<'de, D: Deserializer<'de>, T: Whole>(
+    from: D,
+    form: impl FnOnce() -> String,
+) -> Result<Option<Spanned<T>>, D::Error> {
+    let Some(value) = Option::<Spanned<Value>>::deserialize(from)? else { return Ok(None) };
+    let span = value.span();
+    let read = T::Read::deserialize(value.into_inner());
+    let read = read.map_err(|_| D::Error::custom(format!("this must be {}", form())))?;
+    T::of_read(read).map(|value| Some(Spanned::new(span, value))).map_err(D::Error::custom)
+}
+
+/// `number` as people read it: with a power of ten where it has many digits.
+#[must_use]
+pub fn in_words(number: f64) -> String {
+    if number == 0.0 || (1e-6..1e12).contains(&number.abs()) { number.to_string() } else { format!("{number:e}") }
 }
 
 /// `message` without its column.
@@ -179,6 +214,16 @@ mod tests {
         assert_eq!(read("\npair = [1, 2, 3]").unwrap_err(), "line 2: a list has 3 entries here; give it 2");
         assert_eq!(read("pair = [1]").unwrap_err(), "line 1: a list has 1 entry here; give it 2");
         assert_eq!(read("pairs = [[1, 2], [3, 4, 5]]").unwrap_err(), "line 1: a list has 3 entries here; give it 2");
-        assert!(read("pair = 1").unwrap_err().starts_with("line 1: invalid type"));
+        assert_eq!(read("pair = 1").unwrap_err(), "line 1: this must be [number, number]");
+        assert_eq!(read("\npair = [1, \"a\"]").unwrap_err(), "line 2: this must be [number, number]");
+        assert_eq!(read("pairs = [1, 2]").unwrap_err(), "line 1: this must be [[number, number], …]");
+    }
+
+    #[test]
+    fn numbers_of_many_digits_are_told_as_powers_of_ten() {
+        assert_eq!(
+            [0.0, -0.5, 1e9, 1e300, -1e-12, f64::NAN, f64::INFINITY].map(in_words),
+            ["0", "-0.5", "1000000000", "1e300", "-1e-12", "NaN", "inf"]
+        );
     }
 }

@@ -48,10 +48,11 @@ pub(super) fn with_codes_of_senses(body: &Body, mut calibration: Calibration) ->
             Modality::Proximity => &calibration.proximity,
             _ => continue,
         };
-        let codes = &sense.of_taxel(index).missing;
-        if !codes.is_empty() {
+        let own = sense.of_taxel(index);
+        // What a masked taxel reads is faulty, whatever it is.
+        if !own.mask && !own.missing.is_empty() {
             calibration.missing.resize(body.taxels.len(), Vec::new());
-            calibration.missing[index].extend(codes);
+            calibration.missing[index].extend(&own.missing);
         }
     }
     calibration

@@ -4,6 +4,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::letter_cell::{Made, Readings};
 use super::links::Links;
 use super::pulls::{Pull, Pulls, Sides};
 use super::spread::{Frames, Now};
@@ -48,24 +49,6 @@ enum Frame {
     Anchor,
     /// The links lie apart, and where they are is not known.
     Nowhere,
-}
-
-/// What came of a cell.
-struct Made<'a> {
-    percepts: &'a mut Percepts,
-    cell: usize,
-    flags: Flags,
-    /// Whether something is there to tell of.
-    is_there: bool,
-}
-
-impl Made<'_> {
-    fn give(&mut self, output: Outputs, host: Host, components: &[f64]) {
-        if self.percepts.outputs().contains(output) {
-            self.percepts.add_present(self.cell, output);
-            self.percepts.set_host(host, self.cell, components);
-        }
-    }
 }
 
 impl Cell<'_> {
@@ -140,7 +123,7 @@ impl Cell<'_> {
             }
             Frame::Anchor => (own.position_in_anchor, own.normal_in_anchor),
             Frame::Nowhere => {
-                made.flags |= Flags::NO_POSE;
+                made.lack(normal.map_or(output, |(normal, _)| output | normal), Flags::NO_POSE);
                 return;
             }
         };
@@ -157,27 +140,29 @@ impl Cell<'_> {
         by: &SenseCalibration,
         readings: &mut Readings<T>,
         made: &mut Made<'_>,
-        read: impl Fn(&SensedMember, f64, bool, &mut Flags) -> Option<T>,
+        read: impl Fn(&SensedMember, (RawValue, f64), &mut Flags) -> Option<T>,
     ) {
         let row = self.sensed.row(self.frame);
         readings.members.clear();
         readings.values.clear();
         readings.by_member.clear();
         for (index, member) in self.field.sensed.iter().enumerate() {
-            let reading = by.of_taxel(member.taxel).read(row[member.values[0]]);
+            let raw = row[member.values[0]];
             readings.by_member.push(None);
-            match reading {
+            match by.of_taxel(member.taxel).read(raw) {
                 Reading::Missing => made.flags |= Flags::INCOMPLETE,
                 Reading::Faulty => made.flags |= Flags::FAULTY_INPUT,
-                Reading::Value(number, is_in_range) => match read(member, number, is_in_range, &mut made.flags) {
-                    Some(value) => {
-                        readings.by_member[index] = Some(number);
-                        readings.members.push(index);
-                        readings.values.push(value);
+                Reading::Value(number, is_in_range) => {
+                    // The value counts all the same.
+                    if !is_in_range {
+                        made.flags |= Flags::OUT_OF_RANGE;
                     }
-                    // Of proximity: nothing is near.
-                    None => readings.by_member[index] = Some(f64::INFINITY),
-                },
+                    let read = read(member, (raw, number), &mut made.flags);
+                    // Of proximity: where there is none, nothing is near.
+                    readings.by_member[index] = Some(if read.is_some() { number } else { f64::INFINITY });
+                    readings.members.extend(read.is_some().then_some(index));
+                    readings.values.extend(read);
+                }
             }
         }
     }
@@ -189,8 +174,7 @@ impl Cell<'_> {
         now: &mut Now,
         (made, trend): (&mut Made<'_>, &mut Trend),
     ) {
-        self.read(by, readings, made, |member, celsius, is_in_range, flags| {
-            flags.set(Flags::OUT_OF_RANGE, flags.contains(Flags::OUT_OF_RANGE) || !is_in_range);
+        self.read(by, readings, made, |member, (_, celsius), _| {
             Some(Warm { weight: member.weight, celsius, place_m: member.place_m })
         });
         let Readings { members, values: warm, by_member } = &*readings;
@@ -223,7 +207,7 @@ impl Cell<'_> {
                 Some(gradient) => {
                     made.give(Outputs::TEMPERATURE_GRADIENT, Host::TemperatureGradient, &gradient.to_array());
                 }
-                None => made.flags |= Flags::NO_GRADIENT,
+                None => made.lack(Outputs::TEMPERATURE_GRADIENT, Flags::NO_GRADIENT),
             }
         }
         let sensed = &self.field.sensed;
@@ -232,7 +216,7 @@ impl Cell<'_> {
         };
         match trend.take(self.t_s(), by_member, by.window_s, mean_of) {
             Some(rate) => made.give(Outputs::TEMPERATURE_RATE, Host::TemperatureRate, &[rate]),
-            None => made.flags |= Flags::NO_PREVIOUS,
+            None => made.lack(Outputs::TEMPERATURE_RATE, Flags::NO_PREVIOUS),
         }
     }
 
@@ -247,11 +231,13 @@ impl Cell<'_> {
         now: &mut Now,
         (made, trend): (&mut Made<'_>, &mut Trend),
     ) {
-        self.read(by, readings, made, |member, distance_m, is_in_range, flags| {
-            if !is_in_range || distance_m > by.range_m {
+        self.read(by, readings, made, |member, (raw, distance_m), flags| {
+            let end_beyond = by.of_taxel(member.taxel).end_beyond(raw);
+            if distance_m > by.range_m || end_beyond.is_gt() {
                 return None;
             }
-            if distance_m < LEAST_M {
+            // It is nearer than that.
+            if distance_m < LEAST_M || end_beyond.is_lt() {
                 *flags |= Flags::SATURATED;
             }
             Some(Near { distance_m: distance_m.max(LEAST_M), place_m: member.place_m })
@@ -284,7 +270,7 @@ impl Cell<'_> {
         match trend.take(self.t_s(), by_member, by.window_s, least) {
             // From 0, so that what stays has no sign.
             Some(slope) => made.give(Outputs::APPROACH_SPEED, Host::ApproachSpeed, &[0.0 - slope]),
-            None => made.flags |= Flags::NO_PREVIOUS,
+            None => made.lack(Outputs::APPROACH_SPEED, Flags::NO_PREVIOUS),
         }
     }
 
@@ -332,7 +318,7 @@ impl Cell<'_> {
         }
         made.is_there = true;
         if matches!(frame, Frame::Nowhere) {
-            made.flags |= Flags::NO_POSE;
+            made.lack(Outputs::SHEAR_VECTOR | Outputs::FORCE_VECTOR, Flags::NO_POSE);
         } else {
             made.percepts.in_world[made.cell] = matches!(frame, Frame::World);
             if found.pull > 0.0 {
@@ -340,7 +326,7 @@ impl Cell<'_> {
             }
             match found.force() {
                 Some(newtons) => made.give(Outputs::FORCE_VECTOR, Host::ForceVector, &newtons.to_array()),
-                None => made.flags |= Flags::NO_UNIT,
+                None => made.lack(Outputs::FORCE_VECTOR, Flags::NO_UNIT),
             }
         }
         if found.pull <= 0.0 {
@@ -353,11 +339,12 @@ impl Cell<'_> {
             match found.torsion() {
                 Some(torsion) => made.give(Outputs::TORSION, Host::Torsion, &[torsion]),
                 // Where others are pressed, it is said why theirs is not known.
-                None => made.flags.set(Flags::ONE_TAXEL, found.is_one_taxel()),
+                None if found.is_one_taxel() => made.lack(Outputs::TORSION, Flags::ONE_TAXEL),
+                None => {}
             }
             match found.direction() {
                 Some(direction) => made.give(Outputs::SHEAR_DIRECTION, Host::ShearDirection, &[direction]),
-                None => made.flags |= Flags::STILL,
+                None => made.lack(Outputs::SHEAR_DIRECTION, Flags::STILL),
             }
         }
         let friction = found.friction(self.field.chart.is_some());
@@ -385,7 +372,7 @@ impl Cell<'_> {
             let (noise, raw) = (calibration.noise?, self.frames.raw.rows.value(self.frames.offset, channel));
             let noise = Noise {
                 of_pressure: calibrate::sigma(raw.number()?, noise, calibration, plan.curve_of(channel)),
-                of_sides: Sides::of(by, member.taxel, calibration)
+                of_sides: Sides::of(by, member.taxel, (calibration, plan.onset(channel).threshold))
                     .gains
                     .map(|gain| gain.abs() * by.noise_of(member.taxel).unwrap_or(noise)),
             };
@@ -410,22 +397,6 @@ pub(super) struct Room {
 impl Room {
     pub(super) fn new(plan: &Plan) -> Self {
         Self { pulls: Pulls::new(plan), warm: Readings::none(), near: Readings::none() }
-    }
-}
-
-/// What members read, in their order.
-#[derive(Clone, Debug)]
-struct Readings<T> {
-    /// Those with a value that counts.
-    members: Vec<usize>,
-    values: Vec<T>,
-    /// Of every member, °C or m; infinite where nothing is in range, `None` where it has no reading.
-    by_member: Vec<Option<f64>>,
-}
-
-impl<T> Readings<T> {
-    fn none() -> Self {
-        Self { members: Vec::new(), values: Vec::new(), by_member: Vec::new() }
     }
 }
 

@@ -39,25 +39,27 @@ pub(super) struct Sides {
     rest: [f64; 2],
     /// Of those that are believed.
     range: [f64; 2],
+    /// What a soft onset has taken off P, which the sensor has measured all the same.
+    taken_off: f64,
     /// How much of both forces P makes, and a raw unit of each: sizes added up.
     sizes: [f64; 3],
 }
 
 impl Sides {
-    /// Those of the body's taxel `taxel`.
-    pub(super) fn of(by: &ShearCalibration, taxel: usize, calibration: &TaxelCalibration) -> Self {
+    /// Those of the body's taxel `taxel`, from whose P `taken_off` is taken.
+    pub(super) fn of(by: &ShearCalibration, taxel: usize, (calibration, taken_off): (&TaxelCalibration, f64)) -> Self {
         let gains = by.gains_of(taxel, calibration.gain, calibration.unit_factor);
         let [along, across] = by.cross_axis;
         let shares = [0, 1, 2].map(|of| along[of].abs() + across[of].abs());
         let sizes = [shares[0], shares[1] * gains[0].abs(), shares[2] * gains[1].abs()];
-        Self { gains, rest: by.rest_of(taxel), range: by.range_of(taxel), sizes }
+        Self { gains, rest: by.rest_of(taxel), range: by.range_of(taxel), taken_off, sizes }
     }
 
     /// What the forces are made of at these `raw` values.
     fn size(&self, pressure: f64, raw: [f64; 2]) -> f64 {
         let [of_p, of_u, of_v] = self.sizes;
         let [u, v] = [0, 1].map(|axis| raw[axis].abs() + self.rest[axis].abs());
-        of_p * pressure + of_u * u + of_v * v
+        of_p * (pressure + self.taken_off) + of_u * u + of_v * v
     }
 }
 
@@ -110,7 +112,7 @@ impl Pulls {
             PulledTaxel {
                 channel,
                 values,
-                sides: Sides::of(by, taxel, calibration),
+                sides: Sides::of(by, taxel, (calibration, plan.onset(channel).threshold)),
                 newtons_per_p: force::newtons_per_p(calibration.quantity, plan.areas[channel]),
             }
         });
@@ -187,7 +189,7 @@ pub(super) fn tangential(
     if numbers.iter().any(|number| !(low..=high).contains(number)) {
         return Err(Flags::OUT_OF_RANGE);
     }
-    let forces = by.forces(sides.rest, sides.gains, pressure, numbers);
+    let forces = by.forces(sides.rest, sides.gains, pressure + sides.taken_off, numbers);
     let is_believed = forces.iter().all(|force| force.abs() <= calibrate::HUGE);
     let felt = Tangential { forces, size: sides.size(pressure, numbers) };
     if is_believed { Ok(felt) } else { Err(Flags::FAULTY_INPUT) }

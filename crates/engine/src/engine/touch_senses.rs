@@ -118,10 +118,10 @@ impl TouchSenses {
     fn calibrate(&mut self, plan: &Plan) {
         self.calibration_changes = plan.calibration_changes;
         let Some(by) = &plan.senses.shear else { return };
-        for (own, calibration) in self.pulled.iter_mut().zip(&plan.calibrations) {
+        for (channel, (own, calibration)) in self.pulled.iter_mut().zip(&plan.calibrations).enumerate() {
             let Some(own) = own else { continue };
             let has_gain = by.has_gain(own.taxel, calibration.response);
-            own.sides = has_gain.then(|| Sides::of(by, own.taxel, calibration));
+            own.sides = has_gain.then(|| Sides::of(by, own.taxel, (calibration, plan.onset(channel).threshold)));
         }
     }
 

@@ -1,4 +1,5 @@
-//! How warm touches are: of the taxels of temperature whose nearest pressure taxel on the same link is one of a touch's taxels.
+//! How warm touches are: of the taxels of temperature whose nearest pressure taxel on the same link, within 1.5 widths of its cell, is one
+//! of a touch's taxels.
 //!
 //! All of them count alike. Mean, extremes and gradient are those of stage *temperature*, the gradient in the touch's chart. The rate is
 //! that of a [`Trend`], so that a touch that comes over a taxel, or leaves it, does not seem to warm.

@@ -22,12 +22,13 @@ bitflags! {
         /// The centroid did not move, or its filtered steps cancel each other out: there is no direction of motion. Of letter shear:
         /// nothing pulls along the skin, and there is no direction of shear.
         const STILL = 1 << 5;
-        /// A pressed taxel is above its P_max; its value is kept. Of letter proximity: something is nearer than 0.1 mm.
+        /// A pressed taxel is above its P_max; its value is kept. Of letter proximity: something is nearer than 0.1 mm, or
+        /// than its taxel's curve goes.
         const SATURATED = 1 << 6;
         /// A taxel's value was masked or altered: not finite, unbelievable, or distrusted by the calibration's checks.
         const FAULTY_INPUT = 1 << 7;
-        /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept. Of letter proximity: nothing
-        /// is in range; of letter shear: it is left out.
+        /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept. Of letter proximity also:
+        /// nothing is in range; of letter shear: it is left out.
         const OUT_OF_RANGE = 1 << 8;
         /// A taxel's value is missing and left out of every sum.
         const INCOMPLETE = 1 << 9;

@@ -32,7 +32,7 @@ pub struct SensedValue {
     pub receptor: Receptor,
     /// The raw value that it is made of; of tangential forces the one along t.
     pub raw: RawValue,
-    /// °C, m, or the size of the tangential force in the unit of P; and whether it is in range.
+    /// °C, m, or the size of the tangential force in the unit of P; and whether it is in range: of a distance, whether something is near.
     pub reading: Reading,
     /// The tangential forces along t and n × t, in the unit of P; 0 of other letters, and where nothing presses.
     pub shear: [f64; 2],
@@ -158,15 +158,14 @@ impl SensedTaxels {
                     None => (Reading::Missing, [0.0; 2]),
                 },
                 Receptor::Proximity => {
-                    let found =
-                        senses.proximity.as_ref().map(|by| (by.of_taxel(own.taxel).read(raw_value), by.range_m));
-                    let reading = match found {
-                        Some((Reading::Value(distance_m, is_in_range), range_m)) => {
-                            Reading::Value(distance_m.max(LEAST_M), is_in_range && distance_m <= range_m)
+                    let by = senses.proximity.as_ref().map(|by| (by.of_taxel(own.taxel), by.range_m));
+                    let reading = by.map_or(Reading::Missing, |(sense, range_m)| match sense.read(raw_value) {
+                        Reading::Value(distance_m, _) => {
+                            let is_near = distance_m <= range_m && !sense.end_beyond(raw_value).is_gt();
+                            Reading::Value(distance_m.max(LEAST_M), is_near)
                         }
-                        Some((reading, _)) => reading,
-                        None => Reading::Missing,
-                    };
+                        reading => reading,
+                    });
                     (reading, [0.0; 2])
                 }
                 _ => {
@@ -205,7 +204,9 @@ fn pulled(
         return (Reading::Faulty, [0.0; 2]);
     }
     let gains = by.gains_of(taxel, calibration.gain, calibration.unit_factor);
-    let forces = by.forces(by.rest_of(taxel), gains, own.value, [u, v]);
+    // What a soft onset has taken off, the sensor has measured all the same.
+    let measured = own.value + plan.onset(channel).threshold;
+    let forces = by.forces(by.rest_of(taxel), gains, measured, [u, v]);
     if !forces.iter().all(|force| force.abs() <= calibrate::HUGE) {
         return (Reading::Faulty, [0.0; 2]);
     }

@@ -1,5 +1,7 @@
 //! Curves: non-linear conversions from raw value to pressure.
 
+use std::cmp::Ordering;
+
 use super::fsr::FsrCircuit;
 use super::response::{FsrResponse, FsrSignal, GAIN_RANGE, MAX_MAGNITUDE};
 use crate::error::{Error, Result, failed};
@@ -142,6 +144,17 @@ impl Curve {
         }
     }
 
+    /// Whether `raw`, which may be `off` by so much, lies beyond the end of the curve where the values are least (`Less`) or greatest
+    /// (`Greater`), or neither.
+    pub(super) fn end_beyond(&self, raw: f64, off: f64) -> Ordering {
+        let [first, last] = [self.written[0], self.written[self.written.len() - 1]].map(|[raw, _]| raw);
+        match (raw + off < first, raw - off > last) {
+            (false, false) => Ordering::Equal,
+            (is_before, _) if is_before == self.falls() => Ordering::Greater,
+            _ => Ordering::Less,
+        }
+    }
+
     /// (raw, P) of every knot, raw rising, in single precision.
     #[must_use]
     pub fn knots(&self) -> &[[f32; 2]] {
@@ -210,6 +223,18 @@ mod tests {
         assert!(why(&[0.0, 1.0], &[3.0, 3.0]).contains("no touch"));
         assert!(why(&[0.0, 0.5_f64.powi(20)], &[0.0, 1e7]).contains("1.048576e13 a raw unit after knot 1"));
         assert!(Curve::new(&[-5.0, 0.0, 1.0], &[3.0, 3.0, -1.0]).unwrap().falls());
+    }
+
+    #[test]
+    fn beyond_a_curve_it_is_known_which_end_is_near() {
+        let ends = |p: [f64; 2]| {
+            let curve = Curve::new(&[10.0, 30.0], &p).unwrap();
+            [9.9, 10.0, 20.0, 30.0, 30.1].map(|raw| curve.end_beyond(raw, 0.05))
+        };
+        use Ordering::{Equal, Greater, Less};
+        assert_eq!(ends([1.0, 8.0]), [Less, Equal, Equal, Equal, Greater]);
+        assert_eq!(ends([8.0, 1.0]), [Greater, Equal, Equal, Equal, Less]);
+        assert_eq!(Curve::new(&[10.0, 30.0], &[8.0, 1.0]).unwrap().end_beyond(9.96, 0.05), Equal);
     }
 
     #[test]

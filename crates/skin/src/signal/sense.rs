@@ -3,6 +3,7 @@
 //! Temperature: T = gain · r(raw − baseline) + offset, in °C, or with r(baseline − raw) if it is inverted. Distance: the same in m. r is the raw value itself, a table, or
 //! the temperature of a thermistor in a divider, by its B parameter: 1/T = 1/298.15 K + ln(R/R₂₅)/B.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use super::curve::Curve;
@@ -21,7 +22,7 @@ pub enum Reading {
     Value(f64, bool),
     /// No value arrived.
     Missing,
-    /// It is not a number, or its taxel is masked.
+    /// It is not a number, or one that cannot be; or its taxel is masked.
     Faulty,
 }
 
@@ -34,6 +35,8 @@ pub struct Sense {
     pub gain: f64,
     /// What is added, °C or m.
     pub offset: f64,
+    /// The least that a reading can be: absolute zero, °C; of distances there is none, as the nearest are counted as nearly touching.
+    pub least: f64,
     /// The response before the gain.
     pub response: SenseResponse,
     /// Whether its response is at the baseline less the raw value (`invert`), not at the raw value less the baseline.
@@ -73,6 +76,7 @@ impl Default for Sense {
             baseline: 0.0,
             gain: 1.0,
             offset: 0.0,
+            least: f64::NEG_INFINITY,
             response: SenseResponse::Linear,
             falls: false,
             raw_range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -113,6 +117,21 @@ impl Sense {
         self
     }
 
+    /// Whether `raw` lies beyond the end of a curve where its values are least (`Less`) or greatest (`Greater`), or neither.
+    #[must_use]
+    pub fn end_beyond(&self, raw: RawValue) -> Ordering {
+        let (SenseResponse::Curve(curve), Some(number)) = (&self.response, raw.number()) else {
+            return Ordering::Equal;
+        };
+        // Raw values are rounded to single precision.
+        curve.end_beyond(self.above(number), number.abs() * f64::from(f32::EPSILON))
+    }
+
+    /// The raw value `number` from the baseline, in the direction in which the response has it.
+    fn above(&self, number: f64) -> f64 {
+        if self.falls { self.baseline - number } else { number - self.baseline }
+    }
+
     /// What `raw` is.
     #[must_use]
     pub fn read(&self, raw: RawValue) -> Reading {
@@ -125,9 +144,8 @@ impl Sense {
         if self.missing.contains(&(number as f32)) {
             return Reading::Missing;
         }
-        let above = if self.falls { self.baseline - number } else { number - self.baseline };
-        let value = self.response.at(above).map(|response| self.gain * response + self.offset);
-        match value.filter(|value| value.abs() <= UNBELIEVABLE) {
+        let value = self.response.at(self.above(number)).map(|response| self.gain * response + self.offset);
+        match value.filter(|&value| value.abs() <= UNBELIEVABLE && value >= self.least) {
             Some(value) => Reading::Value(value, (self.raw_range[0]..=self.raw_range[1]).contains(&number)),
             None => Reading::Faulty,
         }
@@ -152,7 +170,8 @@ pub struct SenseCalibration {
 impl SenseCalibration {
     /// Of temperatures: °C, rates over 1 s.
     pub(super) fn of_temperature() -> Self {
-        Self { all: Sense::default(), own: BTreeMap::new(), window_s: 1.0, written_gain: 1.0, range_m: f64::INFINITY }
+        let all = Sense { least: -ZERO_CELSIUS_K, ..Sense::default() };
+        Self { all, own: BTreeMap::new(), window_s: 1.0, written_gain: 1.0, range_m: f64::INFINITY }
     }
 
     /// Of distances: mm, speeds over 0.1 s.
@@ -294,6 +313,11 @@ mod tests {
         let curve = SenseResponse::Curve(Curve::new(&[0.0, 10.0, 20.0], &[100.0, 20.0, 10.0]).unwrap());
         let table = Sense { response: curve, gain: 1e-3, ..Sense::default() };
         assert!((value(&table, 15.0) - 0.015).abs() < 1e-15 && value(&table, 99.0) == 0.01);
+        let ends = |sense: &Sense| [-1.0, 0.0, 20.0, 21.0].map(|raw| sense.end_beyond(RawValue::new(raw)));
+        use Ordering::{Equal, Greater, Less};
+        assert_eq!(ends(&table), [Greater, Equal, Equal, Less]);
+        assert_eq!(ends(&Sense { falls: true, baseline: 20.0, ..table }), [Less, Equal, Equal, Greater]);
+        assert_eq!(ends(&falling), [Equal; 4]);
     }
 
     #[test]

@@ -115,7 +115,7 @@ impl Calibration {
             }
             let kind = kind_of(index);
             if let Some(kind) = kind {
-                kinds::check(&keys, ids[index], kind, text)?;
+                kinds::check(&keys, (ids[index], kind), &temperature, text)?;
             }
             drafts[index].apply(&keys, &names, text)?;
             if kind.is_some_and(|kind| !kind.is_pressed()) {

@@ -5,11 +5,11 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::{Spanned, Value};
 
-use super::senses::{Curves, codes_of, curve_called, curve_index, range_of};
+use super::senses::{Curves, baseline_of, codes_of, curve_called, curve_index, gain_of, range_of};
 use super::shear_keys::{Gains, OwnShear, scaled};
 use super::{Onset, Sensors, TaxelCalibration};
 use crate::error::{Error, Result};
-use crate::keys::{Text, whole};
+use crate::keys::{Text, in_words, whole};
 use crate::signal::curve::{Column, Curve};
 use crate::signal::fsr::FsrCircuit;
 use crate::signal::response::{FsrResponse, GAIN_RANGE, MAX_MAGNITUDE, Response};
@@ -32,7 +32,8 @@ pub(super) struct Keys {
     raw_range: Option<Spanned<[f64; 2]>>,
     noise: Option<Spanned<f64>>,
     gain_spread: Option<Spanned<f64>>,
-    missing: Option<Spanned<Vec<Spanned<f64>>>>,
+    #[serde(default, deserialize_with = "whole")]
+    missing: Option<Spanned<Vec<f64>>>,
     mask: Option<bool>,
     curve: Option<Spanned<String>>,
     sensor: Option<Spanned<String>>,
@@ -69,6 +70,13 @@ impl Keys {
             ("signal", self.signal.as_ref().map(Spanned::span)),
             ("full_scale_newton", self.full_scale_newton.as_ref().map(Spanned::span)),
         ]
+    }
+
+    /// The first of its keys that a taxel whose temperature comes from `ntc` does not have, and where it is.
+    pub(super) fn rival_of_ntc(&self) -> Option<(&'static str, Range<usize>)> {
+        let numbers = [("gain", &self.gain), ("baseline", &self.baseline)];
+        let given = numbers.into_iter().find_map(|(key, value)| Some((key, value.as_ref()?.span())));
+        given.filter(|_| self.curve.is_none())
     }
 
     /// The keys that only a taxel with three axes has, and where they are.
@@ -199,20 +207,13 @@ impl Draft {
                 if fits(*value.get_ref()) {
                     return Ok(Some(*value.get_ref()));
                 }
-                Err(text.wrong(value.span(), format!("`{key}` is {}; it must be {must}", value.get_ref())))
+                Err(text.wrong(value.span(), format!("`{key}` is {}; it must be {must}", in_words(*value.get_ref()))))
             };
-        if let Some(x) =
-            number("baseline", &keys.baseline, &|x| x.abs() <= MAX_MAGNITUDE, "a finite number of raw units")?
-        {
-            taxel.baseline = x;
+        if let Some(baseline) = &keys.baseline {
+            taxel.baseline = baseline_of(baseline, text)?;
         }
-        if let Some(x) = number(
-            "gain",
-            &keys.gain,
-            &|x| GAIN_RANGE.contains(&x),
-            "over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)",
-        )? {
-            taxel.gain = x.copysign(taxel.gain);
+        if let Some(gain) = &keys.gain {
+            taxel.gain = gain_of(gain, text)?.copysign(taxel.gain);
         }
         if let (Some(x), Some(scale)) =
             (number("scale", &keys.scale, &|x| GAIN_RANGE.contains(&x), "between 1e-12 and 1e12")?, &keys.scale)

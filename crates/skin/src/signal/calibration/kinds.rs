@@ -4,9 +4,22 @@ use super::keys::Keys;
 use crate::body::Modality;
 use crate::error::Result;
 use crate::keys::Text;
+use crate::signal::sense::{SenseCalibration, SenseResponse};
 
-/// Refuses `keys` of the taxel `id` that taxels of this `kind` do not have.
-pub(super) fn check(keys: &Keys, id: u32, kind: Modality, text: Text<'_>) -> Result<()> {
+/// Refuses `keys` of the taxel `id` that taxels of this `kind` do not have; `temperature` has what holds for all of its kind.
+pub(super) fn check(
+    keys: &Keys,
+    (id, kind): (u32, Modality),
+    temperature: &SenseCalibration,
+    text: Text<'_>,
+) -> Result<()> {
+    if kind == Modality::Temperature
+        && matches!(temperature.all.response, SenseResponse::Ntc { .. })
+        && let Some((key, at)) = keys.rival_of_ntc()
+    {
+        let what = format!("`{key}` does not go with `ntc` in [temperature]; remove it, or give taxel {id} a `curve`");
+        return Err(text.wrong(at, what));
+    }
     let name = kind.name();
     if matches!(kind, Modality::Temperature | Modality::Proximity) {
         let wrong = keys.of_pressure().into_iter().find_map(|(key, at)| Some((key, at?)));

@@ -165,6 +165,9 @@ fn without_rivals(table: &mut Table, key: &str, value: &Value) {
             if value.as_str() != Some("fsr") {
                 OF_CIRCUIT.iter().for_each(|key| drop(table.remove(*key)));
             }
+            if key == "ntc" {
+                ["unit", "baseline", "gain"].iter().for_each(|key| drop(table.remove(*key)));
+            }
         }
         // Without it, it is `on`.
         "on" => drop(table.remove("off")),

@@ -1,12 +1,12 @@
 //! The tables of senses beside pressure: `[temperature]` and `[proximity]`.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::error::{Result, nearest};
-use crate::keys::{Text, whole};
+use crate::keys::{Text, in_words, whole};
 use crate::signal::curve::Curve;
 use crate::signal::response::{GAIN_RANGE, MAX_MAGNITUDE};
 use crate::signal::sense::{Sense, SenseCalibration, SenseResponse, ZERO_CELSIUS_K};
@@ -40,7 +40,8 @@ pub(super) struct TemperatureKeys {
     ntc: Option<Spanned<NtcKeys>>,
     #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
-    missing: Option<Spanned<Vec<Spanned<f64>>>>,
+    #[serde(default, deserialize_with = "whole")]
+    missing: Option<Spanned<Vec<f64>>>,
     window_s: Option<Spanned<f64>>,
 }
 
@@ -55,7 +56,8 @@ pub(super) struct ProximityKeys {
     curve: Option<Spanned<String>>,
     #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
-    missing: Option<Spanned<Vec<Spanned<f64>>>>,
+    #[serde(default, deserialize_with = "whole")]
+    missing: Option<Spanned<Vec<f64>>>,
     window_s: Option<Spanned<f64>>,
     range: Option<Spanned<f64>>,
 }
@@ -81,6 +83,7 @@ impl NtcKeys {
                 return Ok(number);
             }
             let (least, most) = range.clone().into_inner();
+            let [number, least, most] = [number, least, most].map(in_words);
             let what = format!("`{key}` is {number}; {of} is from {least} to {most}");
             Err(text.wrong(value.span(), what))
         };
@@ -102,7 +105,7 @@ struct Common<'a> {
     invert: Option<bool>,
     curve: Option<&'a Spanned<String>>,
     raw_range: Option<&'a Spanned<[f64; 2]>>,
-    missing: Option<&'a Spanned<Vec<Spanned<f64>>>>,
+    missing: Option<&'a Spanned<Vec<f64>>>,
 }
 
 /// The file's curves and their names.
@@ -124,13 +127,25 @@ pub(super) fn curve_called(name: &Spanned<String>, (curves, names): Curves<'_>, 
     Ok(curves[curve_index(name, names, text)?].clone())
 }
 
-/// A gain, which may be negative.
-pub(super) fn gain_of(key: &str, gain: &Spanned<f64>, text: Text<'_>) -> Result<f64> {
-    let number = *gain.get_ref();
-    if GAIN_RANGE.contains(&number.abs()) {
+/// The baseline of a taxel, or of all that measure the same.
+pub(super) fn baseline_of(baseline: &Spanned<f64>, text: Text<'_>) -> Result<f64> {
+    let number = *baseline.get_ref();
+    if number.abs() <= MAX_MAGNITUDE {
         return Ok(number);
     }
-    Err(text.wrong(gain.span(), format!("`{key}` is {number}; it must be between 1e-12 and 1e12 in size")))
+    let what =
+        format!("`baseline` is {}; it must be a finite number of raw units, at most 1e18 in size", in_words(number));
+    Err(text.wrong(baseline.span(), what))
+}
+
+/// The gain of a taxel, or of all that measure the same.
+pub(super) fn gain_of(gain: &Spanned<f64>, text: Text<'_>) -> Result<f64> {
+    let number = *gain.get_ref();
+    if GAIN_RANGE.contains(&number) {
+        return Ok(number);
+    }
+    let must = "it must be over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)";
+    Err(text.wrong(gain.span(), format!("`gain` is {}; {must}", in_words(number))))
 }
 
 /// A range of raw values.
@@ -139,26 +154,29 @@ pub(super) fn range_of(key: &str, range: &Spanned<[f64; 2]>, text: Text<'_>) -> 
     if low < high && low.abs() <= MAX_MAGNITUDE && high.abs() <= MAX_MAGNITUDE {
         return Ok([low, high]);
     }
+    let [low, high] = [low, high].map(in_words);
     Err(text.wrong(range.span(), format!("`{key}` is [{low}, {high}]; give the lowest and the highest raw value")))
 }
 
 /// What `missing` lists, in single precision.
-pub(super) fn codes_of(codes: &Spanned<Vec<Spanned<f64>>>, text: Text<'_>) -> Result<Vec<f32>> {
+pub(super) fn codes_of(codes: &Spanned<Vec<f64>>, text: Text<'_>) -> Result<Vec<f32>> {
     if codes.get_ref().len() > MAX_MISSING {
         let what = format!("`missing` has {} values; it may have {MAX_MISSING}", codes.get_ref().len());
         return Err(text.wrong(codes.span(), what));
     }
-    let code = |code: &Spanned<f64>| match *code.get_ref() {
-        raw if raw.abs() <= MAX_MAGNITUDE => Ok(raw as f32),
-        raw => Err(text.wrong(code.span(), format!("`missing` has {raw}; its values must be finite raw values"))),
-    };
+    let code =
+        |&raw: &f64| match raw {
+            raw if raw.abs() <= MAX_MAGNITUDE => Ok(raw as f32),
+            raw => Err(text
+                .wrong(codes.span(), format!("`missing` has {}; its values must be finite raw values", in_words(raw)))),
+        };
     codes.get_ref().iter().map(code).collect()
 }
 
 impl Common<'_> {
-    /// The conversion, with units `units`.
-    fn read(&self, units: &[(&str, f64, f64)], curves: Curves<'_>, text: Text<'_>) -> Result<Sense> {
-        let mut sense = Sense::default();
+    /// The conversion, with units `units`; as `usual` where no key is given.
+    fn read(&self, usual: Sense, units: &[(&str, f64, f64)], curves: Curves<'_>, text: Text<'_>) -> Result<Sense> {
+        let mut sense = Sense { gain: 1.0, ..usual };
         let plain = |unit: &str| unit.trim_start_matches('°').to_ascii_lowercase();
         let (_, factor, offset) = match self.unit {
             None => units[0],
@@ -171,10 +189,10 @@ impl Common<'_> {
             }
         };
         if let Some(baseline) = self.baseline {
-            sense.baseline = text.finite("baseline", baseline)?;
+            sense.baseline = baseline_of(baseline, text)?;
         }
         if let Some(gain) = self.gain {
-            sense.gain = gain_of("gain", gain, text)?;
+            sense.gain = gain_of(gain, text)?;
         }
         sense.gain *= factor;
         sense.offset = offset;
@@ -189,6 +207,14 @@ impl Common<'_> {
             sense.missing = codes_of(codes, text)?;
         }
         Ok(sense)
+    }
+
+    /// A key that does not go with `ntc`, and where it is.
+    fn rival_of_ntc(&self) -> Option<(&'static str, Range<usize>)> {
+        let numbers = [("gain", self.gain), ("baseline", self.baseline)];
+        let names = [("unit", self.unit), ("curve", self.curve)];
+        let names = names.into_iter().filter_map(|(key, value)| Some((key, value?.span())));
+        numbers.into_iter().filter_map(|(key, value)| Some((key, value?.span()))).chain(names).next()
     }
 }
 
@@ -216,15 +242,15 @@ impl TemperatureKeys {
             raw_range: self.raw_range.as_ref(),
             missing: self.missing.as_ref(),
         };
-        let mut all = common.read(&TEMPERATURES, curves, text)?;
+        let usual = SenseCalibration::of_temperature();
+        let mut all = common.read(usual.all.clone(), &TEMPERATURES, curves, text)?;
         if let Some(ntc) = &self.ntc {
-            if self.curve.is_some() || self.unit.is_some() {
-                let what = "`ntc` gives °C by itself; leave out `curve` and `unit`";
-                return Err(text.wrong(ntc.span(), what));
+            if let Some((key, at)) = common.rival_of_ntc() {
+                let what = format!("`{key}` and `ntc` both make °C of raw values; remove one of them");
+                return Err(text.wrong(at, what));
             }
             all.response = ntc.get_ref().read(text)?;
         }
-        let usual = SenseCalibration::of_temperature();
         let window_s = window_of(self.window_s.as_ref(), usual.window_s, text)?;
         Ok(SenseCalibration { all, window_s, written_gain: written(self.gain.as_ref()), ..usual })
     }
@@ -241,8 +267,8 @@ impl ProximityKeys {
             raw_range: self.raw_range.as_ref(),
             missing: self.missing.as_ref(),
         };
-        let all = common.read(&DISTANCES, curves, text)?;
         let usual = SenseCalibration::of_proximity();
+        let all = common.read(usual.all.clone(), &DISTANCES, curves, text)?;
         let window_s = window_of(self.window_s.as_ref(), usual.window_s, text)?;
         let mut range_m = usual.range_m;
         if let Some(range) = &self.range {
@@ -256,6 +282,7 @@ impl ProximityKeys {
 
 #[cfg(test)]
 mod tests {
+    use crate::body::Modality;
     use crate::keys::without_column;
     use crate::signal::{Calibration, RawValue, Reading};
 
@@ -298,18 +325,80 @@ mod tests {
     fn what_makes_no_sense_is_said_with_its_line() {
         let why = |text: &str| read(text).unwrap_err();
         assert_eq!(why("[temperature]\nunit = \"hot\""), "line 2: there is no unit `hot` here; choose of °C, K, °F");
-        assert_eq!(why("[temperature]\ngain = 0"), "line 2: `gain` is 0; it must be between 1e-12 and 1e12 in size");
+        let over_0 = "it must be over 0, and between 1e-12 and 1e12 (`invert = true` turns the sign)";
+        for table in ["temperature", "proximity", "taxel.7", "all"] {
+            for wrong in ["0", "-1", "inf", "1e300"] {
+                assert_eq!(why(&format!("[{table}]\ngain = {wrong}")), format!("line 2: `gain` is {wrong}; {over_0}"));
+            }
+            assert_eq!(
+                why(&format!("[{table}]\nbaseline = 1e300")),
+                "line 2: `baseline` is 1e300; it must be a finite number of raw units, at most 1e18 in size"
+            );
+            assert_eq!(why(&format!("[{table}]\nmissing = [\"a\"]")), "line 2: this must be [number, …]");
+        }
+        assert_eq!(why("temperature = 3"), "line 1: this is the number `3`; it must be a table of keys");
         assert!(why("[proximity]\nwindow_s = 0").starts_with("line 2: `window_s` is 0"));
         assert!(why("[proximity]\nrange = -1").starts_with("line 2: `range` is -1; it must be over 0"));
         assert!(why("[proximity]\ncurve = \"far\"").contains("add a table [curve.far]"));
-        let both = "[temperature]\nunit = \"K\"\nntc = { ohm_at_25 = 1, b_k = 1000, series_ohm = 1, full_raw = 1 }";
-        assert!(why(both).starts_with("line 3: `ntc` gives °C by itself"));
         assert!(why("[temprature]\ngain = 1").contains("did you mean `temperature`"));
         let many = format!("[temperature]\nmissing = {:?}", [1; 17]);
         assert_eq!(why(&many), "line 2: `missing` has 17 values; it may have 16");
         assert!(
             why("[proximity]\nmissing = [1, inf]").starts_with("line 2: `missing` has inf; its values must be finite")
         );
+    }
+
+    #[test]
+    fn what_would_count_beside_a_thermistor_is_refused() {
+        let curve = "[curve.a]\nraw = [0, 300]\np = [0, 30]\n";
+        let ntc = "ntc = { ohm_at_25 = 10e3, b_k = 3950, series_ohm = 10e3, full_raw = 1023 }\n";
+        for key in ["gain = 0.1", "gain = 1", "baseline = 5", "unit = \"K\"", "curve = \"a\""] {
+            let name = key.split(' ').next().unwrap();
+            for text in [format!("{key}\n{ntc}"), format!("{ntc}{key}\n")] {
+                let (text, line) = (format!("{curve}[temperature]\n{text}"), if text.starts_with(key) { 5 } else { 6 });
+                let both = format!("line {line}: `{name}` and `ntc` both make °C of raw values; remove one of them");
+                assert_eq!(read(&text).unwrap_err(), both);
+            }
+        }
+        let kinds = [(3, Modality::Pressure), (7, Modality::Temperature)];
+        let own = |keys: &str| {
+            let text = format!("{curve}[temperature]\n{ntc}{keys}");
+            Calibration::parse_for(&text, &kinds).map_err(|e| without_column(&e.to_string()))
+        };
+        for (key, name) in [("gain = 2", "gain"), ("baseline = 0", "baseline")] {
+            assert_eq!(
+                own(&format!("[taxel.7]\n{key}\n")).unwrap_err(),
+                format!(
+                    "line 7: `{name}` does not go with `ntc` in [temperature]; remove it, or give taxel 7 a `curve`"
+                )
+            );
+        }
+        let read = own("[taxel.3]\ngain = 2\nbaseline = 3\n[taxel.7]\ncurve = \"a\"\ngain = 2\nbaseline = 10\n");
+        let read = read.unwrap();
+        assert_eq!((read.taxels[0].gain, value(read.temperature.of_taxel(1).read(RawValue::new(110.0)))), (2.0, 20.0));
+        // What is laid over a gain takes its place.
+        let laid = Calibration::lay_over_for(
+            "[temperature]\ngain = 2\n[taxel.7]\nbaseline = 3\n",
+            &format!("[temperature]\n{ntc}"),
+            &kinds,
+        );
+        let laid = Calibration::parse_for(&laid.unwrap().text, &kinds).unwrap().temperature;
+        assert!((value(laid.of_taxel(1).read(RawValue::new(511.5))) - 25.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_colder_than_absolute_zero_is_no_reading() {
+        for (unit, zero) in [("°C", -273.15), ("K", 0.0), ("°F", -459.67)] {
+            let read =
+                read(&format!("[temperature]\nunit = \"{unit}\"\n[taxel.7]\ninvert = true\n")).unwrap().temperature;
+            let at = |taxel: usize, raw: f64| read.of_taxel(taxel).read(RawValue::new(raw));
+            assert_eq!([at(0, zero - 0.01), at(1, 0.01 - zero)], [Reading::Faulty; 2], "{unit}");
+            assert!(value(at(0, zero + 0.01)) < -273.1 && value(at(1, -zero - 0.01)) < -273.1, "{unit}");
+        }
+        let kelvin = read("[temperature]\nunit = \"K\"\n").unwrap().temperature;
+        assert_eq!(value(kelvin.of_taxel(0).read(RawValue::new(0.0))), -273.15);
+        // Distances have no such end.
+        assert_eq!(value(read("").unwrap().proximity.of_taxel(0).read(RawValue::new(-300.0))), -0.3);
     }
 
     #[test]
@@ -327,7 +416,7 @@ mod tests {
         let why = |keys: &str| read(&format!("[temperature]\nntc = {keys}")).unwrap_err();
         assert_eq!(
             why("5"),
-            "line 2: invalid type: integer `5`, expected { ohm_at_25 = Ω, b_k = K, series_ohm = Ω, full_raw = the raw \
+            "line 2: this is the number `5`; it must be { ohm_at_25 = Ω, b_k = K, series_ohm = Ω, full_raw = the raw \
              value of the reference voltage }"
         );
         let with = |r25: &str, b: &str, above: &str, full: &str| {
@@ -339,7 +428,7 @@ mod tests {
         );
         assert_eq!(
             with("1e30", "3950", "1e4", "1023"),
-            format!("line 2: `ohm_at_25` is {}; a resistance in Ω is from 0.000001 to 1000000000", 1e30)
+            "line 2: `ohm_at_25` is 1e30; a resistance in Ω is from 0.000001 to 1000000000"
         );
         assert!(with("1e4", "3950", "0", "1023").starts_with("line 2: `series_ohm` is 0; a resistance"));
         assert!(with("1e4", "3950", "1e4", "nan").starts_with("line 2: `full_raw` is NaN; it must be over 0"));

@@ -5,9 +5,9 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::{Spanned, Value};
 
-use super::senses::{gain_of, range_of};
+use super::senses::range_of;
 use crate::error::Result;
-use crate::keys::{Text, Whole, whole};
+use crate::keys::{Text, Whole, in_words, whole};
 use crate::signal::response::{GAIN_RANGE, MAX_MAGNITUDE};
 use crate::signal::sense::ShearCalibration;
 
@@ -36,7 +36,7 @@ pub(super) struct Gains([f64; 2]);
 
 /// A number or some.
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a number, or a list of two: of u and of v")]
+#[serde(untagged)]
 pub(super) enum NumberOrList {
     Number(f64),
     List(Vec<f64>),
@@ -50,6 +50,10 @@ impl Whole for Gains {
             NumberOrList::Number(both) => Ok(Self([both; 2])),
             NumberOrList::List(list) => Whole::of_read(list).map(Self),
         }
+    }
+
+    fn form() -> String {
+        "a number, or a list of two: of u and of v".to_owned()
     }
 }
 
@@ -67,6 +71,10 @@ impl Whole for Matrix {
             [n, u, v] => Ok(Self([n, u, v])),
             _ => Err(format!("a list has {} entries here; give it 2, or 3", rows.len())),
         }
+    }
+
+    fn form() -> String {
+        format!("two or three rows {}", <[f64; 3]>::form())
     }
 }
 
@@ -143,8 +151,14 @@ pub(super) fn scaled(gain: f64, (scale, at): (f64, usize), text: Text<'_>) -> Re
 
 fn gains_of(key: &str, gains: &Spanned<Gains>, text: Text<'_>) -> Result<[f64; 2]> {
     let Gains(both) = *gains.get_ref();
-    both.iter().try_for_each(|&gain| gain_of(key, &Spanned::new(gains.span(), gain), text).map(|_| ()))?;
-    Ok(both)
+    // These may be negative.
+    match both.iter().find(|gain| !GAIN_RANGE.contains(&gain.abs())) {
+        None => Ok(both),
+        Some(&gain) => {
+            let what = format!("`{key}` is {}; it must be between 1e-12 and 1e12 in size", in_words(gain));
+            Err(text.wrong(gains.span(), what))
+        }
+    }
 }
 
 /// A standard deviation of raw values, of u and v alike.
@@ -161,7 +175,7 @@ fn noise_of(key: &str, noise: &Spanned<Value>, text: Text<'_>) -> Result<f64> {
     if (0.0..=MAX_MAGNITUDE).contains(&number) {
         return Ok(number);
     }
-    Err(text.wrong(noise.span(), format!("`{key}` is {number}; it must be 0 or more raw units")))
+    Err(text.wrong(noise.span(), format!("`{key}` is {}; it must be 0 or more raw units", in_words(number))))
 }
 
 fn baselines_of(key: &str, baselines: &Spanned<[f64; 2]>, text: Text<'_>) -> Result<[f64; 2]> {
@@ -178,9 +192,9 @@ fn rows_of(matrix: &Spanned<Matrix>, text: Text<'_>) -> Result<([f64; 3], [[f64;
     let sides = [u, v];
     let why = if let Some(share) = [n, u, v].iter().flatten().find(|share| share.is_nan() || share.abs() > MOST_ACROSS)
     {
-        format!("has {share}; its numbers are at most {MOST_ACROSS} in size")
-    } else if sides.iter().flatten().all(|share| *share == 0.0) {
-        "leaves no shear; its rows are all 0".into()
+        format!("has {}; its numbers are at most {MOST_ACROSS} in size", in_words(*share))
+    } else if let Some(side) = sides.iter().position(|row| *row == [0.0; 3]) {
+        format!("has a row of zeros, so that {} is always 0", ["u", "v"][side])
     } else if n[0] < 1.0 / MOST_ACROSS {
         format!("has {} of the normal force in itself; that is about 1, and over 0", n[0])
     } else {
@@ -258,8 +272,9 @@ mod tests {
         for (wrong, why_not) in [
             ("[[1, nan, 0], [0, 0, 1]]", "has NaN; its numbers are at most 1000000 in size"),
             ("[[1e8, 1, 1], [0, 0, 1]]", "has 100000000; its numbers are at most 1000000 in size"),
-            ("[[0, 0, 0], [0, 0, 0]]", "leaves no shear; its rows are all 0"),
-            ("[[1, 0, 0], [0, 0, 0], [0, 0, 0]]", "leaves no shear; its rows are all 0"),
+            ("[[0, 0, 0], [0, 0, 0]]", "has a row of zeros, so that u is always 0"),
+            ("[[1, 0, 0], [0, 0, 0], [0, 0, 1]]", "has a row of zeros, so that u is always 0"),
+            ("[[0, 1, 0], [0, 0, 0]]", "has a row of zeros, so that v is always 0"),
             ("[[0, 1, 0], [0, 1, 0], [0, 0, 1]]", "has 0 of the normal force in itself; that is about 1, and over 0"),
         ] {
             let is = why(&format!("[shear]\ncross_axis = {wrong}"));
@@ -272,7 +287,17 @@ mod tests {
         assert_eq!(why("[taxel.7]\nshear_noise = \"low\""), format!("line 2: `shear_noise` is a string; {one}"));
         assert!(why("[shear]\nslips_at = 0").starts_with("line 2: `slips_at` is 0"));
         assert!(why("[shear]\ngain = [1, 0]").starts_with("line 2: `gain` is 0; it must be between"));
-        assert_eq!(why("[shear]\ngain = \"much\""), "line 2: expected a number, or a list of two: of u and of v");
+        assert_eq!(why("[shear]\ngain = \"much\""), "line 2: this must be a number, or a list of two: of u and of v");
+        for (key, form) in [
+            ("[shear]\nbaseline = 0", "[number, number]"),
+            ("[shear]\nbaseline = [\"a\", 1]", "[number, number]"),
+            ("[shear]\ncross_axis = [1, 0, 0]", "two or three rows [number, number, number]"),
+            ("[taxel.7]\nshear_gain = true", "a number, or a list of two: of u and of v"),
+        ] {
+            assert_eq!(why(key), format!("line 2: this must be {form}"));
+        }
+        assert_eq!(why("shear = 3"), "line 1: this is the number `3`; it must be a table of keys");
+        assert_eq!(why("[shear]\ngain = 1e300"), "line 2: `gain` is 1e300; it must be between 1e-12 and 1e12 in size");
         assert_eq!(
             why("[shear]\nraw_range = [5, 5]"),
             "line 2: `raw_range` is [5, 5]; give the lowest and the highest raw value"

@@ -1,9 +1,9 @@
 //! The simulation's file: its keys.
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
-use crate::keys::whole;
+use crate::keys::{whole, whole_as};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -202,17 +202,24 @@ pub(super) struct TouchKeys {
     pub(super) times_s: Option<Spanned<Vec<f64>>>,
     pub(super) start_s: Option<Spanned<f64>>,
     pub(super) speed_m_s: Option<Spanned<f64>>,
-    #[serde(default, deserialize_with = "whole")]
-    pub(super) force_newton: Option<Spanned<Vec<[f64; 2]>>>,
+    #[serde(default, deserialize_with = "over_time")]
+    pub(super) force_newton: Option<OverTime>,
     pub(super) tap: Option<Spanned<TapKeys>>,
     pub(super) press: Option<Spanned<PressKeys>>,
     pub(super) hold: Option<Spanned<HoldKeys>>,
     pub(super) friction: Option<Spanned<f64>>,
-    #[serde(default, deserialize_with = "whole")]
-    pub(super) twist_deg: Option<Spanned<Vec<[f64; 2]>>>,
+    #[serde(default, deserialize_with = "over_time")]
+    pub(super) twist_deg: Option<OverTime>,
     pub(super) celsius: Option<Spanned<f64>>,
-    #[serde(default, deserialize_with = "whole")]
-    pub(super) gap_m: Option<Spanned<Vec<[f64; 2]>>>,
+    #[serde(default, deserialize_with = "over_time")]
+    pub(super) gap_m: Option<OverTime>,
+}
+
+/// Times in seconds, and values at them.
+type OverTime = Spanned<Vec<[f64; 2]>>;
+
+fn over_time<'de, D: Deserializer<'de>>(from: D) -> Result<Option<OverTime>, D::Error> {
+    whole_as(from, || "[[t, value], …], t in seconds".to_owned())
 }
 
 #[derive(Deserialize)]
@@ -243,4 +250,28 @@ pub(super) struct PressKeys {
 #[serde(deny_unknown_fields)]
 pub(super) struct HoldKeys {
     pub(super) newton: Spanned<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::File;
+    use crate::keys::Text;
+
+    #[test]
+    fn what_changes_over_time_says_how_it_is_written() {
+        let why = |key: &str| {
+            let text = format!(
+                "rate_hz = 50\nduration_s = 2\n[[touch]]\non = \"pad\"\nindenter = \"ball\"\npath = [[0, 0]]\n{key}\n"
+            );
+            Text(&text).parse::<File>().err().map(|e| e.to_string())
+        };
+        for (key, value) in
+            [("gap_m", "0.05"), ("twist_deg", "20"), ("force_newton", "[0, 10]"), ("gap_m", "[[0, \"a\"]]")]
+        {
+            let column = key.len() + 4;
+            let right = format!("line 7, column {column}: this must be [[t, value], …], t in seconds");
+            assert_eq!(why(&format!("{key} = {value}")), Some(right));
+        }
+        assert_eq!(why("gap_m = [[0, 0.05], [1, 0]]"), None);
+    }
 }
