@@ -120,6 +120,9 @@ pub struct ArrayMap {
     pub notes: Vec<String>,
     /// Of taxels with three axes, which of their values is along which.
     pub(in crate::source) axes: Option<Axes>,
+    /// Of a preset for bodies whose ids are the indices of a message's values, how these are along the axes of taxels that have three: all
+    /// values along the first, then along the second, then along the third.
+    pub(in crate::source) skin_axes: Option<Axes>,
     pub(in crate::source) pads: Vec<Pad>,
     pub(in crate::source) grid: Option<[u32; 2]>,
     pub(in crate::source) pitch_m: Option<[f64; 2]>,
@@ -148,6 +151,7 @@ impl ArrayMap {
                 map.notes.push("untested: nobody has run it on this hardware, so check each pad by a press".to_owned());
             }
             map.definition = preset.definition.map(str::to_owned);
+            map.skin_axes = preset.skin_axes.map(str::parse).transpose()?;
             return Ok(Self { name: name.to_owned(), ..map });
         }
         let path = Path::new(name);
@@ -210,6 +214,7 @@ impl ArrayMap {
             message: keys.message,
             kind: keys.r#type.map(whole).transpose()?,
             axes,
+            skin_axes: None,
             values: values.iter().map(|path| path.parse()).collect::<Result<_>>().map_err(at("values"))?,
             names: keys.names.as_deref().map(str::parse).transpose().map_err(at("names"))?,
             ids,
