@@ -387,12 +387,20 @@ mod tests {
             ("values = 'a'\ntype = 'x'", "type: `x` is not a type"),
             ("values = 'a'\ntime = 't:h'", "time: `h` is not a unit"),
             ("values = 'a'\naxes = 'xyz'", "axes: `xyz` does not name"),
-            ("values = ['a', 'b']\naxes = 'u,v,n'", "axes: each path of values has one axis"),
+            (
+                "values = ['a', 'b']\naxes = 'u,v,n'",
+                "axes: with commas each path of values has one axis, so that a pad needs three, and there are 2 paths",
+            ),
+            (
+                "values = 'a'\naxes = 'u,v,n'",
+                "axes: with commas each path of values has one axis, so that a pad needs three, and there is one",
+            ),
             ("values = 'a'\ndecoder = 'x'", "decoder: `x` is not a decoder"),
             ("values = 'a'\n[[pads]]\nname = 'p'\ngrid = 'a'", "pads: "),
         ] {
             let why = ArrayMap::parse(text).unwrap_err().to_string();
             assert!(why.contains(says) && why.lines().count() == 1, "{text:?}: {why}");
+            assert!(why.matches("axes: ").count() < 2, "{why}");
         }
         let why = ArrayMap::named("dex4").unwrap_err();
         assert!(why.is_usage() && why.to_string().contains("did you mean `dex3`?"), "{why}");
