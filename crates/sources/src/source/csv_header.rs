@@ -195,7 +195,7 @@ fn way_out(first: &ByteRecord, below: &[ByteRecord], skipped: usize) -> String {
 /// What to do about a time that is not in column 1 but in `column`; `has_time` is whether column 1 has one, too.
 fn time_elsewhere(column: usize, has_time: bool) -> String {
     match has_time {
-        true => format!("column 1 has the time; remove this one, or say with --time {column} that it is the time"),
+        true => "column 1 has the time already; remove one of the two".to_owned(),
         false => format!("if it is the time, --time {column} says so; else head it with an id"),
     }
 }
