@@ -225,7 +225,7 @@ fn a_skin_of_mujoco_with_three_axes_reads_its_own_data() {
     let (body, source) = (model.with_extension("glb"), folder.path().join("slide.ndjson"));
     let asked = ["--map", "mujoco", "--backend", "reference", "--outputs", "total,shear", "--relative-to", "world"];
     let output =
-        super::somatic(&[&["run", "--body", text_of(&body), "--source", text_of(&source)][..], &asked].concat());
+        super::output(&[&["run", "--body", text_of(&body), "--source", text_of(&source)][..], &asked].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(
         stderr(&output).contains("the body lacks 4 of 81 taxels, which are skipped: 0, 8, 72 …"),

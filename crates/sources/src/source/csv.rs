@@ -670,14 +670,12 @@ mod tests {
         assert!(why("t,4,4\n", None).contains("taxel 4 heads columns 2 and 3"));
         let elsewhere = why("0.v,t,0.u,0\n1,2,3,4\n", None);
         assert!(elsewhere.contains("column 2 is headed `t`") && elsewhere.contains("--time 2 says so"), "{elsewhere}");
-        assert!(
-            why("t,4,time\n0,1,2\n", None).contains("column 1 has the time; remove this one, or say with --time 3")
-        );
+        assert!(why("t,4,time\n0,1,2\n", None).contains("which is not a taxel id; column 1 has the time already"));
         assert!(why("t,4,04\n", None).contains("taxel 4 heads"));
         assert!(why("t,4,\n", None).contains("column 3 is headed ``"));
         assert!(why("t,palm\n", None).contains("`palm`"));
         assert!(why("t,-1\n", None).contains("`-1`"));
-        assert!(why("t,4,t\n", None).contains("first column"));
+        assert!(why("t,4,t\n", None).contains("column 1 has the time already; remove one of the two"));
         assert!(why("t;4;7\n", None).contains("commas"));
         assert!(why("t,4\r0,1\r", None).contains("newline"));
         assert!(
