@@ -96,7 +96,7 @@ fn every_taxel_of_every_sensor_is_accounted_for() {
     let notes = report["notes"].to_string();
     assert!(notes.contains("sensor `obj`: 1 of its 9 taxels are in no triangle"), "{notes}");
     assert!(notes.contains("1 <touch> sensors have no surface"), "{notes}");
-    assert!(notes.contains("a `sensordata` of one sensor with three axes, and this one has 8 more"), "{notes}");
+    assert!(notes.contains("a `sensordata` of one sensor with three axes, and this one has 9 more"), "{notes}");
 }
 
 #[test]
@@ -219,26 +219,26 @@ fn a_skin_of_mujoco_with_three_axes_reads_its_own_data() {
     let truth = slid(&python, folder.path());
     let model = folder.path().join("slide.xml");
     let (report, taxels) = authored(&model);
-    assert_eq!(taxels.len(), 77);
+    assert_eq!(taxels.len(), 71);
     let notes = report["notes"].to_string();
-    assert!(notes.contains("4 of its 81 taxels look past every shape") && !notes.contains("--map mujoco"), "{notes}");
+    assert!(notes.contains("10 of its 81 taxels look past every shape") && !notes.contains("--map mujoco"), "{notes}");
     let (body, source) = (model.with_extension("glb"), folder.path().join("slide.ndjson"));
-    let asked = ["--map", "mujoco", "--backend", "reference", "--outputs", "total,shear", "--relative-to", "world"];
+    let asked = ["--map", "mujoco", "--backend", "reference", "--outputs", "total,shear_vector"];
     let output =
         super::output(&[&["run", "--body", text_of(&body), "--source", text_of(&source)][..], &asked].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(
-        stderr(&output).contains("the body lacks 4 of 81 taxels, which are skipped: 0, 8, 72 …"),
+        stderr(&output).contains("the body lacks 10 of 81 taxels, which are skipped: 0, 1, "),
         "{}",
         stderr(&output)
     );
     let lines = String::from_utf8(output.stdout).unwrap();
-    // MuJoCo's x is forward and its z up, as in the world of a percept.
+    // In the link's frame, which is that of the model's body.
     let found: Vec<[f64; 2]> = super::frames(&lines)
         .iter()
         .map(|frame| {
             let fields = frame["fields"].as_array().unwrap();
-            let shear = fields.iter().find_map(|field| field["shear"].as_array()).expect("something pulls");
+            let shear = fields.iter().find_map(|field| field["shear_vector"].as_array()).expect("something pulls");
             assert!(shear[2].as_f64().unwrap().abs() < 1e-3, "{shear:?}");
             [0, 1].map(|axis| shear[axis].as_f64().unwrap())
         })
@@ -272,10 +272,10 @@ fn a_skin_of_mujoco_with_one_axis_reads_its_own_data() {
         assert!(pad(channels).contains(says));
         let values: Vec<u32> = (0..81 * channels).map(|at| if at == 40 { 7 } else { 0 }).collect();
         std::fs::write(&source, format!("{{\"time\": 0, \"sensordata\": {values:?}}}\n")).unwrap();
-        let asked = ["--map", "mujoco", "--backend", "reference", "--outputs", "total"];
+        let asked = ["--map", "mujoco", "--backend", "reference", "--outputs", "total,active"];
         let lines = done(&[&["run", "--body", text_of(&body), "--source", text_of(&source)][..], &asked].concat());
-        let touch = &super::frames(&lines)[0]["touches"][0];
-        assert_eq!((touch["total"].as_f64(), touch["active"].as_u64()), (Some(7.0), Some(1)), "{channels}: {lines}");
+        let field = &super::frames(&lines)[0]["fields"][0];
+        assert_eq!((field["total"].as_f64(), field["active"].as_u64()), (Some(7.0), Some(1)), "{channels}: {lines}");
     }
 }
 

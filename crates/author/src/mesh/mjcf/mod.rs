@@ -119,10 +119,15 @@ fn about_data(model: &Model) -> Vec<String> {
     let others = model.other_sensors + if has_axes { model.sensors.len() - 1 } else { 0 };
     if others > 0 {
         let of = if has_axes { "one sensor with three axes" } else { "sensors that are skin" };
-        let axes = if has_axes { ", with axes = \"n,u,-v\"" } else { "" };
+        let values = match has_axes {
+            false => "values = \"sensordata[7:88]\"",
+            true => {
+                "values = [\"sensordata[7:88]\", \"sensordata[88:169]\", \"sensordata[169:250]\"], axes = \"n,u,-v\" and ids"
+            }
+        };
         notes.push(format!(
             "--map mujoco is for a `sensordata` of {of}, and this one has {others} more: name the skin's part in a map of your \
-             own, as values = \"sensordata[7:88]\"{axes}"
+             own, as {values}"
         ));
     }
     notes

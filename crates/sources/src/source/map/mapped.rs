@@ -201,7 +201,8 @@ impl MappedSource {
             })?;
         }
         let skipped = self.taxels.skip_absent(taxels, true, "ids in the map names the values' taxels");
-        self.notices.extend(skipped.map_err(|e| e.at(self.messages.name()))?);
+        let skipped = skipped.map_err(|e| e.at(self.messages.name()))?;
+        self.notices.extend(skipped.map(|what| format!("{}: {what}", self.messages.name())));
         Ok(self)
     }
 
@@ -411,7 +412,7 @@ mod tests {
         let values = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
         let (names, numbers, notices) = read_for(&map, &values, &["4", "4.u", "4.v", "9"]).unwrap();
         assert_eq!((names.join(" ").as_str(), &numbers[..]), ("4 4.u 4.v", &[4.0, 5.0, -6.0][..]));
-        assert_eq!(notices, ["the body lacks 2 of 3 taxels, which are skipped: 2, 8"]);
+        assert_eq!(notices, ["given: the body lacks 2 of 3 taxels, which are skipped: 2, 8"]);
         for (body, says) in [(["9", "10"], "no taxel 8;"), (["4", "8"], "no taxel 8.u;")] {
             let why = read_for(&map, &values, &body).unwrap_err().to_string();
             assert!(why.contains(says) && why.lines().count() == 1, "{why}");
@@ -426,7 +427,7 @@ mod tests {
         let (names, numbers, notices) = read_for(&map, &values, &["1", "1.u", "1.v", "2", "2.u", "2.v"]).unwrap();
         assert_eq!(names.join(" "), "1 2 1.u 2.u 1.v 2.v");
         assert_eq!(numbers, [1.0, 2.0, 5.0, 6.0, -9.0, -10.0]);
-        assert_eq!(notices, ["the body lacks 2 of 4 taxels, which are skipped: 0, 3"]);
+        assert_eq!(notices, ["given: the body lacks 2 of 4 taxels, which are skipped: 0, 3"]);
         let (names, numbers, notices) = read_for(&map, &values, &["1", "11"]).unwrap();
         assert_eq!((names.join(" ").as_str(), &numbers[..]), ("1 11", &[1.0, 11.0][..]));
         assert!(notices[0].contains("lacks 10 of 12 taxels, which are skipped: 0, 2, 3 …"), "{notices:?}");
