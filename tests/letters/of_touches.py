@@ -182,7 +182,7 @@ class TouchesOf:
         places = (offsets if is_wrapped else unrolled(offsets, up, self.normal[own])[0]) @ axes.T
         flat, size = turned @ axes.T, weight @ terms
         total = weight @ flat
-        pull = np.linalg.norm(weight @ each) if is_wrapped else np.linalg.norm(total)
+        pull = weight @ np.linalg.norm(each, axis=1) if is_wrapped else np.linalg.norm(total)
         # The sum of P may be off by as much as its terms.
         found["friction"] = Value(pull / load, doubt * (size + pull) / load)
         if self.slips_at is not None:

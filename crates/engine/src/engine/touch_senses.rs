@@ -3,7 +3,7 @@
 //! Sums, direction, torsion and friction are those of stage *shear*, over the taxels of a touch that have three axes and whose tangential
 //! forces are known, in the touch's chart: a taxel counts as in the touch's place, and s and torsion are scaled by ΣP/ΣwP, so that they
 //! are in the unit of the touch's total. The force has the normal part of all other taxels of the touch, too. Around a limb, where there is
-//! no chart, forces are added up in space, and the torsion is that across the plane of the touch's base. Tangential forces are a part
+//! no chart, the torsion is that across the plane of the touch's base. Tangential forces are a part
 //! of wrenches.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -317,7 +317,6 @@ impl TouchSenses {
         let first_slot = plan.touched_from.unwrap_or(0);
         let chart = TouchChart::new(skin, touch);
         let in_chart = found.along_chart.normalize_or(DVec2::X);
-        let in_space = found.in_space().try_normalize();
         self.pulls.iter().filter(|pull| pull.felt.is_some()).try_fold(0.0, |sum, pull| {
             let node = pull.node as usize;
             let (calibration, own) = (&plan.calibrations[node], self.pulled[node].as_ref()?);
@@ -328,11 +327,10 @@ impl TouchSenses {
                 of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
                 of_sides: gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),
             };
-            let along = match in_space {
-                _ if !chart.is_wrapped => chart.tangents(pull).map(|tangent| tangent.dot(in_chart)),
-                Some(in_space) => pull.tangents_in_body.map(|tangent| tangent.dot(in_space)),
-                // Where nothing pulls, every direction is as good.
-                None => [1.0, 0.0],
+            let along = match pull.felt {
+                // Around a limb, each along its own direction; where nothing pulls, every direction is as good.
+                Some(felt) if chart.is_wrapped => DVec2::from_array(felt.forces).normalize_or(DVec2::X).to_array(),
+                _ => chart.tangents(pull).map(|tangent| tangent.dot(in_chart)),
             };
             Some(sum + skin.taxels()[node].weight().powi(2) * noise.variance(by, along, friction))
         })
