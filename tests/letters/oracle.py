@@ -133,9 +133,9 @@ def temperatures(recording, field, frames):
             elif share > 0.999e-6:
                 found["temperature_gradient"] = None
             else:
-                flags |= {"coincident"}
+                flags |= {"no_gradient"}
         elif field.chart:
-            flags |= {"coincident"}
+            flags |= {"no_gradient"}
         weighted = lambda of: sum(field.weights[m] * c for m, c in of.items()) / sum(field.weights[m] for m in of) if of else None
         found["temperature_rate"] = slope.follow(t, dict(zip(there, celsius)), weighted, size)
         yield found, flags | (set() if found["temperature_rate"] else {"no_previous"}), True

@@ -6,7 +6,7 @@
 //! no chart, the torsion is that across the plane of the touch's base. Tangential forces are a part
 //! of wrenches.
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
 use super::pulls::{Sides, Tangential, tangential};
 use super::touch_warmth::{Trends, Warmth};
@@ -65,6 +65,8 @@ pub(super) struct Sensed<'a> {
     pub(super) row: &'a [RawValue],
     /// P by node.
     pub(super) pressures: &'a [f64],
+    /// Where links are in the world, by link; empty if none is posed.
+    pub(super) poses: &'a [Option<DAffine3>],
 }
 
 /// Finds them.
@@ -138,7 +140,7 @@ impl TouchSenses {
         self.warmth.iter_mut().for_each(|warmth| warmth.set_trends(trends));
     }
 
-    /// Puts them into the touches `found` of a frame, in the frames of their links, and what pulls into their wrenches.
+    /// Puts them into the touches `found` of a frame, directions in the frames of their links, and what pulls into their wrenches.
     pub(super) fn add(&mut self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, found: &mut TouchFrame) {
         if self.calibration_changes != plan.calibration_changes {
             self.calibrate(plan);
@@ -151,7 +153,7 @@ impl TouchSenses {
             let [from, to] = touch.taxels.map(|end| end as usize);
             let nodes = &taxels[from..to];
             if let Some(warmth) = &mut self.warmth {
-                warmth.add((plan, skin), (sensed.t_s, sensed.row), nodes, touch);
+                warmth.add((plan, skin), (sensed.t_s, sensed.row, sensed.poses), nodes, touch);
             }
             if self.wanted.intersects(OF_PULLS) && self.look(plan, sensed, nodes, touch) {
                 let [from, to] = touch.links.map(|end| end as usize);
