@@ -9,7 +9,7 @@ use somatic::{Error, bundled};
 use crate::arrays::{array, structured};
 use crate::body::PyBody;
 use crate::calibration::PyCalibration;
-use crate::error::OrRaise;
+use crate::error::{OrRaise, warn};
 use crate::recording::{Frames, PyRecording};
 use crate::threads::free;
 
@@ -180,6 +180,7 @@ pub(crate) fn simulate(
             .and_then(|text| SimulatedSource::on_body(&path.display().to_string(), &text, (*body.inner).clone())),
     };
     let mut source = if is_text { opened.or_raise(py)? } else { opened.or_raise_of(py, &path)? };
+    warn(py, source.notices())?;
     if let Some(seed) = seed {
         source.reseed(seed);
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use somatic::internal::setup::FilesRead;
 use somatic::internal::source::write_recording_with_progress;
-use somatic::source::SimulatedSource;
+use somatic::source::{SimulatedSource, Source as _};
 use somatic::{Error, Result};
 
 use super::bar::Bar;
@@ -85,6 +85,7 @@ pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
     let truth_to = outputs.add(&truth)?;
     let calibration_to = calibration.as_ref().map(|path| outputs.add(path)).transpose()?;
     let mut simulation = SimulatedSource::open(&arguments.simulation)?;
+    simulation.notices().iter().for_each(|notice| say(notice));
     let place = frames_to.name().display().to_string();
     let mut bar = Bar::new("simulating");
     let frames = write_recording_with_progress(&mut simulation, frames_to, truth_to, &mut |share| {

@@ -220,16 +220,15 @@ impl Input {
                 return Ok(source);
             }
             if let (Some(spec), false) = (&spec, is_plain) {
-                let source = match mapped.take() {
-                    Some(source) => *source,
+                return Ok(Box::new(match mapped.take() {
+                    Some(source) => source.for_body(&ids)?,
                     None => {
-                        let mut again = open_mapped(spec, &options)?;
+                        let mut again = open_mapped(spec, &options)?.for_body(&ids)?;
                         // They were said before.
                         again.take_notices();
                         again
                     }
-                };
-                return Ok(Box::new(source.for_body(&ids)?));
+                }));
             }
             if let (Some(spec @ SourceSpec::Ros2Mcap(bag)), Some(body)) = (&spec, &of_bag) {
                 spec.check_options(&options)?;

@@ -122,7 +122,7 @@ fn tangential_values_beside_normal_ones_are_no_doubt_of_these() {
     let (_of_few, few) = file("few.csv", "t,tip_n,tip_u,tip_v\n0,5,1,2\n1,5,1,2\n");
     let source = format!("csv:{}", text_of(&few));
     let why = fails(2, &["run", "--body", text_of(&body), "--source", &source, "--columns", "tip_*"]);
-    assert!(why.contains("3 columns are sensors, for 5 taxels with 15 values; "), "{why}");
+    assert!(why.contains("3 columns are sensors, and the body has 5 taxels with 15 values; "), "{why}");
     let json: Value = serde_json::from_str(&done(&["inspect", text_of(&body), "--json"])).unwrap();
     assert_eq!(json["taxels"][2]["tangent"], json!([0.0, 1.0, 0.0]));
 }

@@ -12,16 +12,16 @@ use somatic_testing::skip;
 
 const MODEL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mujoco/skin.xml");
 
-/// The sensors of the model in their order: name, taxels, those without a place, and the body that has them.
-const SENSORS: [(&str, u64, u64, &str); 8] = [
-    ("palm", 35, 0, "palm"),
-    ("palm grid", 49, 0, "palm"),
-    ("finger", 54, 0, "finger"),
-    ("nail", 4, 0, "nail"),
-    ("tip", 12, 0, "finger"),
-    ("stl", 8, 0, "thumb"),
-    ("obj", 9, 1, "thumb"),
-    ("thumb", 30, 0, "thumb"),
+/// The sensors of the model in their order: name, taxels, those without a place, the body that has them, and values of each taxel.
+const SENSORS: [(&str, u64, u64, &str, u64); 8] = [
+    ("palm", 35, 0, "palm", 3),
+    ("palm grid", 49, 0, "palm", 3),
+    ("finger", 54, 0, "finger", 3),
+    ("nail", 4, 0, "nail", 3),
+    ("tip", 12, 0, "finger", 1),
+    ("stl", 8, 0, "thumb", 3),
+    ("obj", 9, 1, "thumb", 3),
+    ("thumb", 30, 0, "thumb", 1),
 ];
 
 /// A box of 20 × 40 × 60 as MuJoCo reads it: binary STL, and OBJ with a vertex that no face has.
@@ -84,18 +84,19 @@ fn every_taxel_of_every_sensor_is_accounted_for() {
     let (report, taxels) = authored(&model);
     let places = report["places"].as_array().unwrap();
     let mut first = 0;
-    for ((name, count, missing, body), place) in SENSORS.into_iter().zip(places) {
+    for ((name, count, missing, body, channels), place) in SENSORS.into_iter().zip(places) {
         assert_eq!((&place["name"], &place["taxels"]), (&name.into(), &(count - missing).into()), "{place}");
         let own: Vec<u64> = taxels.range(first..first + count).map(|(id, _)| *id).collect();
         assert_eq!(own.len() as u64, count - missing, "{name}");
         assert!(own.iter().all(|id| taxels[id].0 == body), "{name}");
-        first += count;
+        first += count * channels;
     }
     assert_eq!(places.len(), SENSORS.len());
-    assert_eq!(taxels.len() as u64, SENSORS.iter().map(|(_, count, missing, _)| count - missing).sum::<u64>());
+    assert_eq!(taxels.len() as u64, SENSORS.iter().map(|(_, count, missing, ..)| count - missing).sum::<u64>());
     let notes = report["notes"].to_string();
     assert!(notes.contains("sensor `obj`: 1 of its 9 taxels are in no triangle"), "{notes}");
     assert!(notes.contains("1 <touch> sensors have no surface"), "{notes}");
+    assert!(notes.contains("a `sensordata` of one sensor with three axes, and this one has 9 more"), "{notes}");
 }
 
 #[test]
@@ -111,9 +112,10 @@ fn taxels_are_where_mujoco_has_them() {
     let real: Value = serde_json::from_slice(&output.stdout).unwrap();
     let (_, taxels) = authored(&model);
     let (mut id, mut compared, mut farthest_m) = (0, 0, 0.0_f64);
-    for ((name, count, ..), sensor) in SENSORS.into_iter().zip(real["sensors"].as_array().unwrap()) {
+    for ((name, count, .., channels), sensor) in SENSORS.into_iter().zip(real["sensors"].as_array().unwrap()) {
         let of_sensor = sensor["taxels"].as_array().unwrap();
         assert_eq!((&sensor["name"], of_sensor.len() as u64), (&name.into(), count));
+        assert_eq!(sensor["numbers"], count * channels, "{name}");
         for there in of_sensor {
             if let Some((link, place)) = taxels.get(&id) {
                 assert_eq!(&there[0], link, "{name}, {id}");
@@ -123,6 +125,7 @@ fn taxels_are_where_mujoco_has_them() {
             }
             id += 1;
         }
+        id += count * (channels - 1);
     }
     // Both hold vertices in single precision.
     assert!(compared == 200 && farthest_m < 1e-7, "{compared} taxels, at most {farthest_m} m apart");
@@ -144,6 +147,7 @@ fn what_is_wrong_with_a_model_is_one_line_with_its_place() {
     assert!(why("geom=\"palm skin\" mesh=\"plate\"", "geom=\"palm skin\" mesh=\"wedge\"").contains("another shape"));
     assert!(why("objname=\"inside\"", "objname=\"insid\"").contains("the site `insid`"));
     assert!(why("value=\"45 45\"", "value=\"45 95\"").contains("at most 180 and 90"));
+    assert!(why("key=\"nchannel\" value=\"3\"", "key=\"nchannel\" value=\"7\"").contains("`nchannel` is `7`"));
     assert!(why("file=\"box.stl\"", "file=\"bix.stl\"").contains("no such file"));
     assert!(why("<frame pos", "<replicate count=\"3\"/><frame pos").contains("to_xml()"));
     assert!(why("<worldbody>", "<worldbdy>").contains("not valid XML"));
@@ -194,6 +198,85 @@ fn a_ball_that_slides_in_mujoco_pulls_where_it_slides() {
     let turned = super::frames(&done(&[&["run", "--source", &source][..], &asked].concat()));
     let first = turned[0]["fields"].as_array().unwrap().iter().find_map(|field| field["shear_direction"].as_f64());
     assert!((first.unwrap() - directions[0]).abs() > 0.3);
+}
+
+/// The frames of a ball that slides over a touch grid, their model, whose site is turned, and in which directions it pulls.
+fn slid(python: &Path, folder: &Path) -> Vec<[f64; 2]> {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mujoco/slide.py");
+    let files = ["slide.ndjson", "slide.xml"].map(|name| folder.join(name));
+    let output = Command::new(python).arg(script).args(&files).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_skin_of_mujoco_with_three_axes_reads_its_own_data() {
+    let python = match python_with("mujoco", "import mujoco") {
+        Ok(python) => python,
+        Err(why) => return skip("MUJOCO", why),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let truth = slid(&python, folder.path());
+    let model = folder.path().join("slide.xml");
+    let (report, taxels) = authored(&model);
+    assert_eq!(taxels.len(), 71);
+    let notes = report["notes"].to_string();
+    assert!(notes.contains("10 of its 81 taxels look past every shape") && !notes.contains("--map mujoco"), "{notes}");
+    let (body, source) = (model.with_extension("glb"), folder.path().join("slide.ndjson"));
+    let asked = ["--map", "mujoco", "--backend", "reference", "--outputs", "total,shear_vector"];
+    let output =
+        super::output(&[&["run", "--body", text_of(&body), "--source", text_of(&source)][..], &asked].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("the body lacks 10 of 81 taxels, which are skipped: 0, 1, "),
+        "{}",
+        stderr(&output)
+    );
+    let lines = String::from_utf8(output.stdout).unwrap();
+    // In the link's frame, which is that of the model's body.
+    let found: Vec<[f64; 2]> = super::frames(&lines)
+        .iter()
+        .map(|frame| {
+            let fields = frame["fields"].as_array().unwrap();
+            let shear = fields.iter().find_map(|field| field["shear_vector"].as_array()).expect("something pulls");
+            assert!(shear[2].as_f64().unwrap().abs() < 1e-3, "{shear:?}");
+            [0, 1].map(|axis| shear[axis].as_f64().unwrap())
+        })
+        .collect();
+    assert_eq!((found.len(), truth.len()), (24, 24));
+    for ([x, y], [pulled, slid]) in found.into_iter().zip(truth) {
+        for right in [pulled, slid] {
+            let off = (y.atan2(x) - right).sin().atan2((y.atan2(x) - right).cos()).abs().to_degrees();
+            assert!(off < 3.0, "({x}, {y}) is {off}° from {right}");
+        }
+    }
+}
+
+#[test]
+fn a_skin_of_mujoco_with_one_axis_reads_its_own_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("pad.xml");
+    let pad = |channels: u32| {
+        let text = format!(
+            "<mujoco><worldbody><body name=\"pad\"><geom type=\"box\" size=\"0.03 0.03 0.004\"/>\
+             <site name=\"eye\" pos=\"0 0 -0.02\" euler=\"180 0 0\"/></body></worldbody><sensor>\
+             <plugin name=\"grid\" plugin=\"mujoco.sensor.touch_grid\" objtype=\"site\" objname=\"eye\">\
+             <config key=\"nchannel\" value=\"{channels}\"/><config key=\"size\" value=\"9 9\"/>\
+             <config key=\"fov\" value=\"60 60\"/></plugin></sensor></mujoco>"
+        );
+        std::fs::write(&model, text).unwrap();
+        authored(&model).0["notes"].to_string()
+    };
+    let (body, source) = (model.with_extension("glb"), folder.path().join("pad.ndjson"));
+    for (channels, says) in [(1, ""), (6, "of its 6 channels the first is read")] {
+        assert!(pad(channels).contains(says));
+        let values: Vec<u32> = (0..81 * channels).map(|at| if at == 40 { 7 } else { 0 }).collect();
+        std::fs::write(&source, format!("{{\"time\": 0, \"sensordata\": {values:?}}}\n")).unwrap();
+        let asked = ["--map", "mujoco", "--backend", "reference", "--outputs", "total,active"];
+        let lines = done(&[&["run", "--body", text_of(&body), "--source", text_of(&source)][..], &asked].concat());
+        let field = &super::frames(&lines)[0]["fields"][0];
+        assert_eq!((field["total"].as_f64(), field["active"].as_u64()), (Some(7.0), Some(1)), "{channels}: {lines}");
+    }
 }
 
 /// A `<tactile>` sensor gives speeds of slip, without a sign: a direction between both tangents is told, and others are mirrored into it.

@@ -56,6 +56,17 @@ fn every_taxel_comes_back_from_a_table_and_from_a_urdf() {
 }
 
 #[test]
+fn what_a_urdf_has_no_place_for_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let there = folder.path().join("skin.urdf");
+    let said = stderr(&output(&["convert", "sensing-hand", "-o", text_of(&there)]));
+    assert!(said.contains("29 taxels have three axes, for two of which a URDF has no place"), "{said}");
+    assert!(said.contains("taxels measure something else than pressure"), "{said}");
+    let plain = stderr(&output(&["convert", "hand", "-o", text_of(&folder.path().join("hand.urdf"))]));
+    assert!(!plain.contains("three axes"), "{plain}");
+}
+
+#[test]
 fn what_taxels_measure_and_their_tangents_come_back_from_a_table() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -1,9 +1,10 @@
 """A ball that slides over a pad with a touch grid, in MuJoCo.
 
-    slide.py FRAMES.ndjson
+    slide.py FRAMES.ndjson [MODEL.xml]
 
 Writes lines {"time": s, "sensordata": [...]}: the grid's forces along the normal, then along x and y of its site. Prints for
-each line the direction of the force on the pad in its plane, in radians, and the direction of the slide.
+each line the direction of the force on the pad in its plane, in radians, and the direction of the slide. With a second file, that
+is where the model is written, and its site is turned by 40° about the normal.
 """
 
 import json
@@ -39,6 +40,10 @@ MODEL = """
 </mujoco>
 """
 
+if len(sys.argv) > 2:
+    MODEL = MODEL.replace('euler="180 0 0"', 'euler="180 0 40"')
+    with open(sys.argv[2], "w", encoding="utf-8") as to:
+        to.write(MODEL.strip())
 model = mujoco.MjModel.from_xml_string(MODEL)
 truth = []
 with open(sys.argv[1], "w", encoding="utf-8") as to:

@@ -356,6 +356,8 @@ def test_a_bundled_body_is_simulated_with_its_senses() -> None:
     touch = 'on = "hand/midhand/index"\nindenter = "ball"\nradius_m = 0.01\npath = [[0, 0]]\ntimes_s = [0]\nforce_newton = [[0, 2], [1, 2]]\nfriction = 0.5'
     made = st.simulate(f'body = "sensing-hand"\nrate_hz = 20\nduration_s = 1\n[layer]\nthickness_m = 0.005\n[sensor]\nkind = "ideal"\n[[touch]]\n{touch}\n')
     assert len(made.recording.channels) == 111 and made.recording.body.name == "sensing-hand"
+    with pytest.warns(UserWarning, match="`friction` has no effect: the body has no taxels of force3"):
+        st.simulate(f'body = "hand"\nrate_hz = 20\nduration_s = 0.1\n[layer]\nthickness_m = 0.005\n[[touch]]\n{touch}\n')
     p = made.recording.engine(backend="cpu").process(made.recording.t, made.recording.values)
     assert set(p.letters) >= {"sustained", "shear"} and np.isfinite(p.select(letters="shear")["friction"]).any()
 

@@ -129,6 +129,9 @@ fn listed(words: &[String]) -> String {
     }
 }
 
+/// Places that lie nearer to the surface are on it: what is printed is 0.0 mm.
+const SAME_PLACE_M: f64 = 0.05e-3;
+
 /// How far places that were given had to be moved, the worst first.
 fn moves(place: &PlaceReport) -> String {
     if place.moved_m.is_empty() {
@@ -136,6 +139,9 @@ fn moves(place: &PlaceReport) -> String {
     }
     let mut worst = place.moved_m.clone();
     worst.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    if worst[0].1 < SAME_PLACE_M {
+        return String::new();
+    }
     let mean = worst.iter().map(|(_, moved)| moved).sum::<f64>() / worst.len() as f64;
     let shown: Vec<String> =
         worst.iter().take(MOST_LISTED).map(|(id, moved)| format!("{id} by {} mm", millimetres(*moved))).collect();
@@ -183,4 +189,24 @@ pub(super) fn summary(output: &Path, authored: &Authored, errors: Option<&[Layou
         summary["errors"] = errors[0].as_json_with_ideal(&errors[1]);
     }
     summary
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_on_the_surface_are_not_told_as_moved() {
+        let moved = |moved_m: Vec<(u32, f64)>| {
+            let mut place = PlaceReport::default();
+            (place.name, place.moved_m) = ("th".to_owned(), moved_m);
+            moves(&place)
+        };
+        assert_eq!(moved(vec![(200, 4.9e-5), (201, 0.0)]), "");
+        let said = moved(vec![(200, 0.0), (201, 6e-5)]);
+        assert!(
+            said.contains("place `th`: moved to the surface by 0.0 mm on average; farthest 201 by 0.1 mm, 200"),
+            "{said}"
+        );
+    }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
-use crate::body::{Body, Taxel};
+use crate::body::{Body, Modality, Taxel};
 use crate::plain;
 
 /// The depth of a taxel's box, which says nothing, m.
@@ -55,7 +55,13 @@ pub fn urdf_of_skin(body: &Body) -> (String, Vec<String>) {
     }
     text += "</robot>\n";
     let others = body.taxels.iter().filter(|taxel| !taxel.modality.is_pressed()).count();
+    let with_axes = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Force3).count();
     let mut notes = Vec::new();
+    if with_axes > 0 {
+        notes.push(format!(
+            "{with_axes} taxels have three axes, for two of which a URDF has no place: they are written as taxels of pressure"
+        ));
+    }
     if others > 0 {
         notes.push(format!(
             "{others} taxels measure something else than pressure, for which a URDF has no place: left out"

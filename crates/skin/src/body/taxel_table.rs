@@ -12,14 +12,18 @@ use crate::error::{Error, Result, failed};
 use crate::limits::MAX_TAXELS;
 
 /// The columns that a table may have, in the order in which they are written; the last three only where a taxel has a tangent.
-const COLUMNS: [&str; 13] =
-    ["id", "link", "x", "y", "z", "nx", "ny", "nz", "area", "modality", TANGENT[0], TANGENT[1], TANGENT[2]];
+const COLUMNS: [&str; 13] = [
+    "id", "link", "x", "y", "z", NORMAL[0], NORMAL[1], NORMAL[2], "area", "modality", TANGENT[0], TANGENT[1],
+    TANGENT[2],
+];
 
 /// Sine of the angle to its normal under which a tangent has no direction along the skin.
 const ALONG_NORMAL: f64 = 1e-3;
 
 /// The columns of a taxel's tangent.
 const TANGENT: [&str; 3] = ["tx", "ty", "tz"];
+/// The same of normals.
+const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 
 /// Maximum area of a taxel, m²; larger ones are in another unit.
 const MAX_TAXEL_AREA_M2: f64 = 1.0;
@@ -118,7 +122,7 @@ impl Columns {
         Ok(Self {
             id: needed("id")?,
             place: [Some(needed("x")?), Some(needed("y")?), z],
-            normal: direction("normal", ["nx", "ny", "nz"])?,
+            normal: direction("normal", NORMAL)?,
             tangent: direction("tangent", TANGENT)?,
             link: column("link"),
             area: column("area"),
@@ -139,8 +143,19 @@ impl Columns {
         })?;
         let [x, y, z] = self.place.map(|column| column.map_or(Ok(0.0), number));
         let direction = |what: &str, columns: Option<[usize; 3]>| match columns {
-            Some([x, y, z]) if [x, y, z].iter().any(|&column| !cell(column).is_empty()) => {
-                let direction = DVec3::new(number(x)?, number(y)?, number(z)?);
+            Some(columns) if columns.iter().any(|&column| !cell(column).is_empty()) => {
+                let [first, .., last] = if what == "tangent" { TANGENT } else { NORMAL };
+                let part = |column: usize| {
+                    let part = cell(column).parse().ok().filter(|x: &f64| x.is_finite());
+                    part.ok_or_else(|| match cell(column) {
+                        "" => failed!("a {what} needs all three of {first} to {last}, or none"),
+                        text => {
+                            failed!("`{text}` is not a number; a {what} has three, {first} to {last}, without a unit")
+                        }
+                    })
+                };
+                let [x, y, z] = columns.map(part);
+                let direction = DVec3::new(x?, y?, z?);
                 // What is a unit vector to the digits of single precision stays as it is written.
                 let is_unit = (direction.length_squared() - 1.0).abs() < 1e-6;
                 let unit = if is_unit { Some(direction) } else { direction.try_normalize() };
@@ -260,6 +275,14 @@ mod tests {
         assert!(why("id,x,y,z,tx\n1,0,0,0,1\n").contains("a tangent has three columns, tx, ty"));
         let tangent = "id,x,y,z,tx,ty,tz,modality\n1,0,0,0";
         assert!(why(&format!("{tangent},0,0,0,force3\n")).contains("its tangent is zero"));
+        for (given, says) in [
+            ("1,,", "line 2: a tangent needs all three of tx to tz, or none"),
+            ("1,a,0", "line 2: `a` is not a number; a tangent has three, tx to tz, without a unit"),
+        ] {
+            let why = why(&format!("{tangent},{given},force3\n"));
+            assert!(why.contains(says) && !why.contains("metres"), "{why}");
+        }
+        assert!(why("id,x,y,z,nx,ny,nz\n1,0,0,0,0,1,\n").contains("a normal needs all three of nx to nz, or none"));
         let normal = "id,x,y,z,nx,ny,nz,tx,ty,tz,modality\n1,0,0,0,0,0,1";
         assert!(why(&format!("{normal},0,0,-2,force3\n")).contains("line 2: its tangent is along its normal"));
         assert!(read(&format!("{normal},0.1,0,-2,force3\n")).is_ok());

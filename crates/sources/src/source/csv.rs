@@ -556,7 +556,14 @@ mod tests {
                 .contains("--columns force_*: there is no such column; the header has frame, ")
         );
         assert!(why(None, Some("stamp"), None, None).contains("--time stamp: there is no such column"));
-        assert!(why(Some("2-4"), Some("5"), None, None).contains("3 columns are sensors, for 2 taxels; "));
+        assert!(why(Some("2-4"), Some("5"), None, None).contains("3 columns are sensors, and the body has 2 taxels; "));
+        for (columns, ids, says) in [
+            ("2-4", "0", "3 columns are sensors, and --ids has 1 taxel; give each column one id, as 4,4.u,4.v for"),
+            ("2", "0,1", "1 column is a sensor, and --ids has 2 taxels; give each column one id"),
+        ] {
+            let why = why(Some(columns), Some("5"), Some(ids), None);
+            assert!(why.contains(says), "{why}");
+        }
         assert!(why(Some("2,4"), None, None, None).contains("column 1 is not the time; name the column"));
         assert!(why(Some("2,4"), Some("5"), None, Some(1.0)).contains("give one of them"));
         assert!(why(Some("2,4"), Some("arrival"), None, None).contains("--time arrival is for lines as they come"));
@@ -661,11 +668,14 @@ mod tests {
         assert!(why("\n\n", None).contains("empty"));
         assert!(why("t\n0\n", None).contains("no taxel"));
         assert!(why("t,4,4\n", None).contains("taxel 4 heads columns 2 and 3"));
+        let elsewhere = why("0.v,t,0.u,0\n1,2,3,4\n", None);
+        assert!(elsewhere.contains("column 2 is headed `t`") && elsewhere.contains("--time 2 says so"), "{elsewhere}");
+        assert!(why("t,4,time\n0,1,2\n", None).contains("which is not a taxel id; column 1 has the time already"));
         assert!(why("t,4,04\n", None).contains("taxel 4 heads"));
         assert!(why("t,4,\n", None).contains("column 3 is headed ``"));
         assert!(why("t,palm\n", None).contains("`palm`"));
         assert!(why("t,-1\n", None).contains("`-1`"));
-        assert!(why("t,4,t\n", None).contains("first column"));
+        assert!(why("t,4,t\n", None).contains("column 1 has the time already; remove one of the two"));
         assert!(why("t;4;7\n", None).contains("commas"));
         assert!(why("t,4\r0,1\r", None).contains("newline"));
         assert!(

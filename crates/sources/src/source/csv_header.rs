@@ -63,7 +63,7 @@ pub(super) fn read(first: &ByteRecord, below: &[ByteRecord], has_rate: bool) -> 
             header.notes.push(format!("column {} (`{name}`) is not a taxel and is left out", index + 1));
             continue;
         }
-        let id = header_id(index + 1, cell, || way_out(first, below, skipped))?;
+        let id = header_id(index + 1, cell, header.time.is_some(), || way_out(first, below, skipped))?;
         if let Some(before) = columns.insert(id, index + 1) {
             return Err(failed!(
                 "taxel {} heads columns {before} and {}; give each taxel one column",
@@ -192,8 +192,16 @@ fn way_out(first: &ByteRecord, below: &[ByteRecord], skipped: usize) -> String {
     }
 }
 
-/// The taxel id that heads column `column`, counted from 1.
-fn header_id(column: usize, cell: &[u8], way_out: impl FnOnce() -> String) -> Result<u32> {
+/// What to do about a time that is not in column 1 but in `column`; `has_time` is whether column 1 has one, too.
+fn time_elsewhere(column: usize, has_time: bool) -> String {
+    match has_time {
+        true => "column 1 has the time already; remove one of the two".to_owned(),
+        false => format!("if it is the time, --time {column} says so; else head it with an id"),
+    }
+}
+
+/// The taxel id that heads column `column`, counted from 1. `has_time` is whether column 1 is the time.
+fn header_id(column: usize, cell: &[u8], has_time: bool, way_out: impl FnOnce() -> String) -> Result<u32> {
     let word = word(cell);
     if let Some(channel) = Channel::named(&word) {
         return Ok(channel.0);
@@ -209,7 +217,7 @@ fn header_id(column: usize, cell: &[u8], way_out: impl FnOnce() -> String) -> Re
     } else if word.is_empty() {
         "remove the comma before it, or write the id".to_owned()
     } else if unit_in_head(&word).is_ok_and(|unit| unit.is_some()) {
-        "t is the first column, and there is one".to_owned()
+        time_elsewhere(column, has_time)
     } else {
         way_out()
     };

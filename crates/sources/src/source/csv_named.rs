@@ -100,10 +100,21 @@ fn taxels(names: &[String], sensors: &[usize], asked: &TextOptions, ids: &[u32])
     if taxels.len() != sensors.len() {
         let of_body = Channel::taxels_of(&taxels).len();
         let values = if of_body == taxels.len() { String::new() } else { format!(" with {} values", taxels.len()) };
-        return Err(Error::usage(format!(
-            "{} columns are sensors, for {of_body} taxels{values}; name the columns with --columns, or their taxels with --ids",
-            sensors.len()
-        )));
+        let [columns, taxels] =
+            [(sensors.len(), "column is a sensor", "columns are sensors"), (of_body, "taxel", "taxels")]
+                .map(|(count, one, many)| format!("{count} {}", if count == 1 { one } else { many }));
+        let listed = matches!(asked.ids, Some(TextIds::Listed(_)));
+        let (whose, remedy) = match (listed, &asked.columns) {
+            (true, Some(_)) => {
+                ("--ids has ", "give each column one id, as 4,4.u,4.v for a taxel of three axes, or other --columns")
+            }
+            (true, None) => (
+                "--ids has ",
+                "give each column one id, as 4,4.u,4.v for a taxel of three axes, or name the columns with --columns",
+            ),
+            (false, _) => ("the body has ", "name the columns with --columns, or their taxels with --ids"),
+        };
+        return Err(Error::usage(format!("{columns}, and {whose}{taxels}{values}; {remedy}")));
     }
     let mut sorted = taxels.clone();
     sorted.sort_unstable();

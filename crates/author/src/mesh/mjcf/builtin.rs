@@ -16,8 +16,9 @@ pub(super) fn make(kind: &str, params: &[f64]) -> Result<Triangles> {
         let is_count = x.fract() == 0.0 && (2.0..=MAX_SIDE).contains(&x);
         if is_count { Ok(x as u32) } else { Err(failed!("`params` has {x} vertices; give 2 to {MAX_SIDE}")) }
     };
-    let grid =
-        |x: f64, y: f64, fov_deg, gamma| Ok::<_, Error>(TouchGrid { size: [side(x)?, side(y)?], fov_deg, gamma });
+    let grid = |x: f64, y: f64, fov_deg, gamma| {
+        Ok::<_, Error>(TouchGrid { size: [side(x)?, side(y)?], fov_deg, gamma, channels: 1 })
+    };
     if let &[x, y, ..] = params
         && x * y > MAX_CELLS as f64
     {

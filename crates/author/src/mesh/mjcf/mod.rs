@@ -16,7 +16,7 @@ mod read;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 
 use self::model::{Geom, GeomShape, MjSensor, Model, SensorKind, TouchGrid};
 use self::places::{Places, Shape};
@@ -33,9 +33,11 @@ use crate::skin::{Authored, author};
 
 /// A ray that meets a surface flatter than this tells no area of it.
 const MIN_COSINE: f64 = 0.2;
+/// The cosine of the largest angle between a grid's axis and a normal at which its forces count as along and across that, 30°.
+const ALONG_AXIS: f64 = 0.866_025_403_784_438_6;
 
 /// The body of the MJCF at `path` with the taxels of its `<tactile>` and `touch_grid` sensors, grouped into fields as without
-/// rules. An id is the index in the sensor's data (of its first channel), plus the number of taxels of the sensors before it.
+/// rules. An id is the index of the taxel's first value in the data of these sensors, which follow each other.
 ///
 /// # Errors
 /// The file cannot be read or is invalid, has no such sensor, or one that names what is not there; with the line.
@@ -61,20 +63,20 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
     }
     let mut skin = Skin::default();
     let mut places = Places::from_model(model);
-    let mut first_id = 0_u64;
+    let (mut first_id, mut taxels) = (0_u64, 0_u64);
     for sensor in &model.sensors {
         let at = |e: Error| e.at(format!("line {}", sensor.line));
-        first_id += u64::from(place(&mut places, sensor, first_id as u32, &mut skin).map_err(at)?);
-        if first_id > MAX_TAXELS as u64 {
+        let count = place(&mut places, sensor, first_id as u32, &mut skin).map_err(at)?;
+        taxels += u64::from(count);
+        first_id += u64::from(count) * u64::from(sensor.kind.channels());
+        if taxels > MAX_TAXELS as u64 {
             return Err(at(failed!("its sensors have over {MAX_TAXELS} taxels; give fewer")));
         }
         if first_id > u64::from(MAX_TAXEL_ID) + 1 {
             return Err(failed!("its taxels reach {first_id}, over the {MAX_TAXEL_ID} that a file can hold"));
         }
     }
-    if model.scalar_touches > 0 {
-        skin.notes.push(format!("{} <touch> sensors have no surface, and are left out", model.scalar_touches));
-    }
+    skin.notes.extend(about_data(model));
     let mut glb = Glb::new();
     let material = glb.material("robot", [0.6, 0.62, 0.66], 0.8);
     let (up, note) = options.robot_up();
@@ -107,12 +109,46 @@ fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> 
     Ok(Authored { places: skin.places, notes: skin.notes, ..made })
 }
 
+/// What is to be said of the sensors' data, `mjData.sensordata`.
+fn about_data(model: &Model) -> Vec<String> {
+    let mut notes = Vec::new();
+    if model.scalar_touches > 0 {
+        notes.push(format!("{} <touch> sensors have no surface, and are left out", model.scalar_touches));
+    }
+    let has_axes = model.sensors.iter().any(|sensor| sensor.kind.has_axes());
+    let others = model.other_sensors + if has_axes { model.sensors.len() - 1 } else { 0 };
+    if others > 0 {
+        let of = if has_axes { "one sensor with three axes" } else { "sensors that are skin" };
+        let values = match has_axes {
+            false => "values = \"sensordata[7:88]\"",
+            true => {
+                "values = [\"sensordata[7:88]\", \"sensordata[88:169]\", \"sensordata[169:250]\"], axes = \"n,u,-v\" and ids"
+            }
+        };
+        notes.push(format!(
+            "--map mujoco is for a `sensordata` of {of}, and this one has {others} more: name the skin's part in a map of your \
+             own, as {values}"
+        ));
+    }
+    notes
+}
+
 /// Places the taxels of `sensor`, whose ids go on from `first_id`; gives how many ids are its own.
 fn place(places: &mut Places<'_>, sensor: &MjSensor, first_id: u32, skin: &mut Skin) -> Result<u32> {
     let model = places.model;
     let (count, placed) = match &sensor.kind {
         SensorKind::Tactile { geom, mesh } => on_vertices(places, sensor, geom, mesh)?,
-        SensorKind::TouchGrid { site, grid } => in_bins(places, sensor, site, grid)?,
+        SensorKind::TouchGrid { site, grid } => {
+            let (count, placed, aside) = in_bins(places, sensor, site, grid)?;
+            if grid.has_axes() && aside > 0 {
+                skin.notes.push(format!(
+                    "sensor `{}`: its forces are along its site's axes; {aside} of its taxels look over 30° away from its z, where \
+                     what presses and what pulls are mixed",
+                    sensor.name
+                ));
+            }
+            (count, placed)
+        }
     };
     let mut links: BTreeMap<String, usize> = BTreeMap::new();
     let mut ids = Vec::new();
@@ -137,6 +173,14 @@ fn place(places: &mut Places<'_>, sensor: &MjSensor, first_id: u32, skin: &mut S
         ));
     }
     let name = sensor.name.clone();
+    if let SensorKind::TouchGrid { grid, .. } = &sensor.kind
+        && !matches!(grid.channels, 1 | 3)
+    {
+        skin.notes.push(format!(
+            "sensor `{}`: of its {} channels the first is read; with nchannel=3 its taxels have three axes",
+            sensor.name, grid.channels
+        ));
+    }
     skin.places.push(PlaceReport {
         name,
         ids,
@@ -203,8 +247,14 @@ fn on_vertices(places: &Places<'_>, sensor: &MjSensor, geom: &str, mesh: &str) -
     Ok((vertices.positions.len() as u32, placed))
 }
 
-/// A taxel for each bin of `grid`, where its middle leaves the shapes that move with the site's body.
-fn in_bins(places: &mut Places<'_>, sensor: &MjSensor, site: &str, grid: &TouchGrid) -> Result<PlacedTaxels> {
+/// A taxel for each bin of `grid`, where its middle leaves the shapes that move with the site's body; and how many of them look over
+/// 30° away from the site's −z.
+fn in_bins(
+    places: &mut Places<'_>,
+    sensor: &MjSensor,
+    site: &str,
+    grid: &TouchGrid,
+) -> Result<(u32, Vec<(u32, usize, Taxel)>, usize)> {
     let model = places.model;
     let &(body, index) = places
         .sites
@@ -222,7 +272,8 @@ fn in_bins(places: &mut Places<'_>, sensor: &MjSensor, site: &str, grid: &TouchG
             sensor.name
         ));
     }
-    let mut placed = Vec::new();
+    let [site_x, site_z] = [DVec3::X, DVec3::Z].map(|axis| world_from_site.transform_vector3(axis));
+    let (mut placed, mut aside) = (Vec::new(), 0);
     for index in 0..grid.taxels() {
         let [[a0, a1], [e0, e1]] = grid.bin(index);
         let direction = TouchGrid::direction((a0 + a1) / 2.0, (e0 + e1) / 2.0);
@@ -238,21 +289,26 @@ fn in_bins(places: &mut Places<'_>, sensor: &MjSensor, site: &str, grid: &TouchG
         let solid_angle = (a1 - a0) * (libm::sin(e1) - libm::sin(e0));
         let cosine = along.dot(exit.normal);
         let area = if cosine < MIN_COSINE { 0.0 } else { solid_angle * exit.distance_m.powi(2) / cosine };
+        let normal = exit.normal.normalize();
+        aside += usize::from(normal.dot(-site_z) < ALONG_AXIS);
+        // Where the surface is turned against the site, its x is turned with it.
+        let tangent = DQuat::from_rotation_arc(-site_z, normal) * site_x;
+        let tangent_in_link = grid.has_axes().then(|| body_from_world.transform_vector3(tangent).normalize());
         let taxel = Taxel {
             id: 0,
             link: 0,
             position_in_link: body_from_world.transform_point3(from + exit.distance_m * along),
-            normal_in_link: body_from_world.transform_vector3(exit.normal).normalize(),
+            normal_in_link: body_from_world.transform_vector3(normal).normalize(),
             area,
-            modality: Modality::Pressure,
-            tangent_in_link: None,
+            modality: if grid.has_axes() { Modality::Force3 } else { Modality::Pressure },
+            tangent_in_link,
         };
         placed.push((index, on, taxel));
     }
     if placed.is_empty() {
         return Err(failed!("sensor `{}`: no shape of its body is visible from its site along −z", sensor.name));
     }
-    Ok((grid.taxels(), placed))
+    Ok((grid.taxels(), placed, aside))
 }
 
 /// What of `geoms` is shown, in their body's frame; all if its colliding shapes have taxels.

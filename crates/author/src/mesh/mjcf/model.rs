@@ -6,6 +6,9 @@ use glam::{DAffine3, DVec3};
 
 use crate::mesh::triangles::Triangles;
 
+/// What a `<tactile>` sensor gives of each vertex: a depth, and two speeds.
+const TACTILE_CHANNELS: u32 = 3;
+
 /// Bodies with their geometry, meshes, and the sensors that are skin.
 #[derive(Debug, Default)]
 pub(super) struct Model {
@@ -15,6 +18,8 @@ pub(super) struct Model {
     pub(super) sensors: Vec<MjSensor>,
     /// `<touch>` sensors, which have no surface.
     pub(super) scalar_touches: usize,
+    /// Sensors that are no skin, `<touch>` among them; their values lie among those of skins.
+    pub(super) other_sensors: usize,
 }
 
 #[derive(Debug)]
@@ -79,6 +84,21 @@ pub(super) enum SensorKind {
     TouchGrid { site: String, grid: TouchGrid },
 }
 
+impl SensorKind {
+    /// How many values it gives of each taxel.
+    pub(super) fn channels(&self) -> u32 {
+        match self {
+            Self::Tactile { .. } => TACTILE_CHANNELS,
+            Self::TouchGrid { grid, .. } => grid.channels,
+        }
+    }
+
+    /// Whether its taxels have three axes.
+    pub(super) fn has_axes(&self) -> bool {
+        matches!(self, Self::TouchGrid { grid, .. } if grid.has_axes())
+    }
+}
+
 /// The bins of a `touch_grid` sensor, which looks along −z: azimuth is positive towards x, elevation towards y.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TouchGrid {
@@ -88,11 +108,18 @@ pub(super) struct TouchGrid {
     pub(super) fov_deg: [f64; 2],
     /// How much narrower the bins in the middle are, 0 to 1.
     pub(super) gamma: f64,
+    /// What it gives of each bin, 1 to 6: the force along the site's z, x and y, then the torque about them.
+    pub(super) channels: u32,
 }
 
 impl TouchGrid {
     pub(super) fn taxels(&self) -> u32 {
         self.size[0] * self.size[1]
+    }
+
+    /// Whether it gives a force with three axes of each bin, and nothing else.
+    pub(super) fn has_axes(&self) -> bool {
+        self.channels == 3
     }
 
     /// The azimuths and elevations between which the bin `index` is, rad.
@@ -123,7 +150,7 @@ mod tests {
 
     #[test]
     fn bins_cover_the_field_of_view_row_by_row() {
-        let grid = TouchGrid { size: [4, 2], fov_deg: [40.0, 20.0], gamma: 0.0 };
+        let grid = TouchGrid { size: [4, 2], fov_deg: [40.0, 20.0], gamma: 0.0, channels: 1 };
         let near = |a: f64, deg: f64| (a - deg.to_radians()).abs() < 1e-12;
         let [azimuth, elevation] = grid.bin(0);
         assert!(

@@ -192,13 +192,20 @@ impl<'a> Reader<'a> {
             }
             "touch" => {
                 self.model.scalar_touches += 1;
+                self.model.other_sensors += 1;
                 return Ok(());
             }
             "plugin" => match self.touch_grid(node)? {
                 Some(grid) => SensorKind::TouchGrid { site: attribute(node, "objname")?.to_owned(), grid },
-                None => return Ok(()),
+                None => {
+                    self.model.other_sensors += 1;
+                    return Ok(());
+                }
             },
-            _ => return Ok(()),
+            _ => {
+                self.model.other_sensors += 1;
+                return Ok(());
+            }
         };
         self.model.sensors.push(MjSensor { name, line: self.lines.line(node), kind });
         Ok(())
@@ -242,6 +249,16 @@ impl<'a> Reader<'a> {
         }
         let gamma = config("gamma").map_or(Ok(Vec::new()), |text| numbers(node, "gamma", text))?;
         let gamma = gamma.first().copied().unwrap_or(0.0).clamp(0.0, 1.0);
-        Ok(Some(TouchGrid { size, fov_deg, gamma }))
+        // As in MuJoCo, 0 counts as 1.
+        let channels = match config("nchannel").map(|text| (text, numbers(node, "nchannel", text))) {
+            None => 1,
+            Some((_, Ok(given))) if matches!(given[..], [c] if (0.0..=6.0).contains(&c) && c.fract() == 0.0) => {
+                (given[0] as u32).max(1)
+            }
+            Some((text, _)) => {
+                return Err(at(node, failed!("`nchannel` is `{text}`; write a whole number from 1 to 6")));
+            }
+        };
+        Ok(Some(TouchGrid { size, fov_deg, gamma, channels }))
     }
 }

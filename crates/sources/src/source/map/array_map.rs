@@ -120,6 +120,9 @@ pub struct ArrayMap {
     pub notes: Vec<String>,
     /// Of taxels with three axes, which of their values is along which.
     pub(in crate::source) axes: Option<Axes>,
+    /// Of a preset for bodies whose ids are the indices of a message's values, how these are along the axes of taxels that have three: all
+    /// values along the first, then along the second, then along the third.
+    pub(in crate::source) skin_axes: Option<Axes>,
     pub(in crate::source) pads: Vec<Pad>,
     pub(in crate::source) grid: Option<[u32; 2]>,
     pub(in crate::source) pitch_m: Option<[f64; 2]>,
@@ -148,6 +151,7 @@ impl ArrayMap {
                 map.notes.push("untested: nobody has run it on this hardware, so check each pad by a press".to_owned());
             }
             map.definition = preset.definition.map(str::to_owned);
+            map.skin_axes = preset.skin_axes.map(str::parse).transpose()?;
             return Ok(Self { name: name.to_owned(), ..map });
         }
         let path = Path::new(name);
@@ -210,6 +214,7 @@ impl ArrayMap {
             message: keys.message,
             kind: keys.r#type.map(whole).transpose()?,
             axes,
+            skin_axes: None,
             values: values.iter().map(|path| path.parse()).collect::<Result<_>>().map_err(at("values"))?,
             names: keys.names.as_deref().map(str::parse).transpose().map_err(at("names"))?,
             ids,
@@ -382,12 +387,20 @@ mod tests {
             ("values = 'a'\ntype = 'x'", "type: `x` is not a type"),
             ("values = 'a'\ntime = 't:h'", "time: `h` is not a unit"),
             ("values = 'a'\naxes = 'xyz'", "axes: `xyz` does not name"),
-            ("values = ['a', 'b']\naxes = 'u,v,n'", "axes: each path of values has one axis"),
+            (
+                "values = ['a', 'b']\naxes = 'u,v,n'",
+                "axes: with commas each path of values has one axis, so that a pad needs three, and there are 2 paths",
+            ),
+            (
+                "values = 'a'\naxes = 'u,v,n'",
+                "axes: with commas each path of values has one axis, so that a pad needs three, and there is one",
+            ),
             ("values = 'a'\ndecoder = 'x'", "decoder: `x` is not a decoder"),
             ("values = 'a'\n[[pads]]\nname = 'p'\ngrid = 'a'", "pads: "),
         ] {
             let why = ArrayMap::parse(text).unwrap_err().to_string();
             assert!(why.contains(says) && why.lines().count() == 1, "{text:?}: {why}");
+            assert!(why.matches("axes: ").count() < 2, "{why}");
         }
         let why = ArrayMap::named("dex4").unwrap_err();
         assert!(why.is_usage() && why.to_string().contains("did you mean `dex3`?"), "{why}");

@@ -60,7 +60,10 @@ impl Axes {
         if !self.is_apart || (paths.is_multiple_of(3) && (pads == 0 || groups == 1 || pads == groups)) {
             return Ok(());
         }
-        Err(failed!("axes: each path of values has one axis, so there are three for each pad; there are {paths} paths"))
+        let given = if paths == 1 { "there is one path".to_owned() } else { format!("there are {paths} paths") };
+        Err(failed!(
+            "with commas each path of values has one axis, so that a pad needs three, and {given}; without commas one path has all"
+        ))
     }
 
     /// The taxels of `values` values.

@@ -8,9 +8,9 @@ use super::super::Source;
 use super::super::skipped_bad::SkippedBad;
 use super::array_map::ArrayMap;
 use super::body;
-use super::taxels::{MappedTaxels, turn};
+use super::taxels::MappedTaxels;
 use crate::error::{Error, Result, failed};
-use crate::signal::{Channel, Frame, FrameTime, RawValue};
+use crate::signal::{Frame, FrameTime, RawValue};
 
 /// What was read of a message.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,14 +80,14 @@ pub trait Messages {
 pub struct MappedSource {
     messages: Box<dyn Messages + Send>,
     map: ArrayMap,
-    ids: Vec<u32>,
+    taxels: MappedTaxels,
+    /// How many values a message has; 0 before the first one.
+    count: usize,
     /// The names of sensors, with how many values each has.
     named: Vec<(String, usize)>,
     /// The first message, until it is given.
     first: Option<(FrameTime, Vec<RawValue>)>,
     values: Vec<RawValue>,
-    /// The places of values that point the other way.
-    turned: Vec<usize>,
     skipped: SkippedBad,
     notices: Vec<String>,
 }
@@ -103,11 +103,11 @@ impl MappedSource {
         let mut source = Self {
             messages,
             map: map.clone(),
-            ids: Vec::new(),
+            taxels: MappedTaxels::default(),
+            count: 0,
             named: Vec::new(),
             first: None,
             values: Vec::new(),
-            turned: Vec::new(),
             skipped: SkippedBad::new(skip_bad),
             notices: Vec::new(),
         };
@@ -125,7 +125,7 @@ impl MappedSource {
         source.first = Some((time, source.values.clone()));
         let taxels = MappedTaxels::new(Some(map), None, count, None);
         let taxels = taxels.map_err(|e| e.at(&map.name).at(source.messages.name()))?;
-        (source.ids, source.turned) = (taxels.channels, taxels.turned);
+        (source.taxels, source.count) = (taxels, count);
         source.named = source.messages.named().to_vec();
         let of_sensors = match &source.named[..] {
             [] => String::new(),
@@ -149,8 +149,8 @@ impl MappedSource {
             let wrong = match self.messages.next(&mut self.values) {
                 Ok(Came::End) => return Ok(None),
                 Ok(Came::Damaged) => continue,
-                Ok(Came::Message(time)) if self.ids.is_empty() => return Ok(Some(time)),
-                Ok(Came::Message(time)) if self.values.len() == self.ids.len() => {
+                Ok(Came::Message(time)) if self.count == 0 => return Ok(Some(time)),
+                Ok(Came::Message(time)) if self.values.len() == self.count => {
                     if self.messages.named() == self.named {
                         return Ok(Some(time));
                     }
@@ -163,7 +163,7 @@ impl MappedSource {
                     )
                 }
                 Ok(Came::Message(time)) => {
-                    let what = failed!("it has {} values, the first one {}", self.values.len(), self.ids.len());
+                    let what = failed!("it has {} values, the first one {}", self.values.len(), self.count);
                     let error = what.at(format!("{}: the message of {} s", self.messages.name(), time.s));
                     ("another number of values", error)
                 }
@@ -179,37 +179,31 @@ impl MappedSource {
     /// # Errors
     /// The map has pads or a grid for another number of values.
     pub fn body(&self) -> Result<Vec<u8>> {
-        body::glb(&self.map, &self.ids).map_err(|e| e.at(&self.map.name))
+        body::glb(&self.map, &self.taxels.channels).map_err(|e| e.at(&self.map.name))
     }
 
     /// What is to be said of [`MappedSource::body`].
     #[must_use]
     pub fn about_body(&self) -> String {
-        body::about(&self.map, &self.ids)
+        body::about(&self.map, &self.taxels.channels)
     }
 
-    /// Makes its taxels those of a body that has `taxels`: where the map does not name them, they are the body's in ascending order.
+    /// Makes its taxels those of a body that has `taxels`: where the map does not name them, they are the body's in ascending order, or by
+    /// `mujoco`, the indices of values. Named ones that the body lacks are skipped, and a notice counts them.
     ///
     /// # Errors
-    /// There are more or fewer values than taxels, or the body lacks a taxel.
+    /// There are more or fewer values than taxels, or the body lacks all of them, or their axes.
     pub fn for_body(mut self, taxels: &[u32]) -> Result<Self> {
         if self.map.ids.is_none() {
-            let named = MappedTaxels::new(Some(&self.map), None, self.ids.len(), Some(taxels));
-            let named = named.map_err(|e| {
+            let named = MappedTaxels::new(Some(&self.map), None, self.count, Some(taxels));
+            self.taxels = named.map_err(|e| {
                 failed!("{e}; name the values' taxels in the map: ids = \"0-15\"").at(self.messages.name())
             })?;
-            (self.ids, self.turned) = (named.channels, named.turned);
         }
-        match self.ids.iter().find(|id| !taxels.contains(id)) {
-            Some(id) => {
-                let what = failed!(
-                    "the body has no taxel {}; is it the right body? ids in the map names the values' taxels",
-                    Channel(*id)
-                );
-                Err(what.at(self.messages.name()))
-            }
-            None => Ok(self),
-        }
+        let skipped = self.taxels.skip_absent(taxels, true, "ids in the map names the values' taxels");
+        let skipped = skipped.map_err(|e| e.at(self.messages.name()))?;
+        self.notices.extend(skipped.map(|what| format!("{}: {what}", self.messages.name())));
+        Ok(self)
     }
 
     /// What was taken for what, a line each, once.
@@ -220,7 +214,7 @@ impl MappedSource {
 
 impl Source for MappedSource {
     fn taxels(&self) -> &[u32] {
-        &self.ids
+        &self.taxels.channels
     }
 
     fn next_frame(&mut self, frame: &mut Frame) -> Result<bool> {
@@ -236,7 +230,7 @@ impl Source for MappedSource {
         };
         frame.clear();
         frame.values.clone_from(&self.values);
-        self.turned.iter().for_each(|&index| turn(&mut frame.values[index]));
+        self.taxels.arrange(&mut frame.values);
         frame.set_time(time);
         Ok(true)
     }
@@ -272,6 +266,7 @@ impl Source for MappedSource {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::Channel;
 
     struct Given(Vec<Result<Vec<f64>>>);
 
@@ -397,6 +392,54 @@ mod tests {
         );
         let [four_u, four_v] = ["4.u", "4.v"].map(|name| Channel::named(name).unwrap().0);
         assert_eq!(source("values = 'a'\nids = '4.v,4'").for_body(&[4, four_u, four_v]).unwrap().taxels(), [four_v, 4]);
-        assert!(source("values = 'a'\nids = '9,4'").for_body(&[4]).unwrap_err().to_string().contains("no taxel 9"));
+        assert!(source("values = 'a'\nids = '9,4'").for_body(&[5]).unwrap_err().to_string().contains("no taxel 9"));
+    }
+
+    /// What `map` reads of one message with `values` for a body with these channels: names, numbers, notices.
+    fn read_for(map: &ArrayMap, values: &[f64], body: &[&str]) -> Result<(Vec<String>, Vec<f64>, Vec<String>)> {
+        let body: Vec<u32> = body.iter().map(|name| Channel::named(name).unwrap().0).collect();
+        let source = MappedSource::new(Box::new(Given(vec![Ok(values.to_vec())])), map, false)?;
+        let mut source = source.for_body(&body)?;
+        let mut frame = Frame::default();
+        source.next_frame(&mut frame)?;
+        let names = source.taxels().iter().map(|&channel| Channel(channel).to_string()).collect();
+        Ok((names, frame.values.iter().filter_map(|value| value.number()).collect(), source.notices().split_off(1)))
+    }
+
+    #[test]
+    fn taxels_that_the_body_lacks_are_skipped_and_counted() {
+        let map = ArrayMap::parse("values = 'a'\naxes = 'nu-v'\nids = '8,4,2'").unwrap();
+        let values = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+        let (names, numbers, notices) = read_for(&map, &values, &["4", "4.u", "4.v", "9"]).unwrap();
+        assert_eq!((names.join(" ").as_str(), &numbers[..]), ("4 4.u 4.v", &[4.0, 5.0, -6.0][..]));
+        assert_eq!(notices, ["given: the body lacks 2 of 3 taxels, which are skipped: 2, 8"]);
+        for (body, says) in [(["9", "10"], "no taxel 8;"), (["4", "8"], "no taxel 8.u;")] {
+            let why = read_for(&map, &values, &body).unwrap_err().to_string();
+            assert!(why.contains(says) && why.lines().count() == 1, "{why}");
+        }
+    }
+
+    #[test]
+    fn a_skin_of_mujoco_reads_its_own_data() {
+        let map = ArrayMap::named("mujoco").unwrap();
+        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        // Of four bins two meet the shape: all normals come first, then the site's x, then its y, against n × t.
+        let (names, numbers, notices) = read_for(&map, &values, &["1", "1.u", "1.v", "2", "2.u", "2.v"]).unwrap();
+        assert_eq!(names.join(" "), "1 2 1.u 2.u 1.v 2.v");
+        assert_eq!(numbers, [1.0, 2.0, 5.0, 6.0, -9.0, -10.0]);
+        assert_eq!(notices, ["given: the body lacks 2 of 4 taxels, which are skipped: 0, 3"]);
+        let (names, numbers, notices) = read_for(&map, &values, &["1", "11"]).unwrap();
+        assert_eq!((names.join(" ").as_str(), &numbers[..]), ("1 11", &[1.0, 11.0][..]));
+        assert!(notices[0].contains("lacks 10 of 12 taxels, which are skipped: 0, 2, 3 …"), "{notices:?}");
+        // A second sensor with three axes, or one with other values among them.
+        for (body, count) in [(&["0", "0.u", "0.v", "6", "6.u", "6.v"][..], 12), (&["0", "0.u", "0.v"], 5)] {
+            let why = read_for(&map, &values[..count], body).unwrap_err().to_string();
+            assert!(why.contains("are not all of one sensor with three axes"), "{why}");
+        }
+        let mixed = read_for(&map, &values, &["0", "1", "1.u", "1.v"]).unwrap_err().to_string();
+        assert!(mixed.contains("name the values' taxels in the map"), "{mixed}");
+        assert!(
+            read_for(&map, &values, &["7", "12"]).unwrap_err().to_string().contains("12 values, and the body 2 taxels")
+        );
     }
 }

@@ -23,4 +23,4 @@ pub use self::layout::{Dimension, Lies, order};
 pub use self::mapped::{Came, MappedSource, Messages};
 pub use self::path::{ArrayPath, Step};
 pub use self::sensor_names::named_sensors;
-pub(in crate::source) use self::taxels::{MappedTaxels, turn};
+pub(in crate::source) use self::taxels::MappedTaxels;

@@ -10,6 +10,8 @@ pub(super) struct Preset {
     pub(super) notes: &'static [&'static str],
     /// Whether its format is public, but no bytes of the hardware are.
     pub(super) is_untested: bool,
+    /// As [`super::array_map::ArrayMap`] has it.
+    pub(super) skin_axes: Option<&'static str>,
 }
 
 const DEX3: &str = r#"
@@ -81,6 +83,10 @@ const MUJOCO: &str = r#"
 values = "sensordata"
 time = "time:s"
 "#;
+
+/// A `touch_grid` gives all forces along its site's z, then along x, then along y, and looks along −z. A taxel's tangent is the site's x,
+/// so that n × t is −y.
+const TOUCH_GRID_AXES: &str = "n,u,-v";
 
 /// The names are those of the DDS messages of the maker's SDK, `inspire_hand_sdk`, and so are the registers, which it reads over Modbus TCP:
 /// addresses count bytes, so that the nine registers from 3000 on are followed by those from 3018 on.
@@ -203,6 +209,7 @@ const PRESETS: [Preset; 8] = [
             "public sources differ about the Dex3-1: its manual has 6 pads of 3 × 4, its SDK 9; none lists their order",
         ],
         is_untested: true,
+        skin_axes: None,
     },
     Preset {
         name: "tactile-state",
@@ -210,8 +217,16 @@ const PRESETS: [Preset; 8] = [
         definition: Some(TACTILE_STATE_DEFINITION),
         notes: &[],
         is_untested: false,
+        skin_axes: None,
     },
-    Preset { name: "mujoco", map: MUJOCO, definition: None, notes: &[], is_untested: false },
+    Preset {
+        name: "mujoco",
+        map: MUJOCO,
+        definition: None,
+        notes: &[],
+        is_untested: false,
+        skin_axes: Some(TOUCH_GRID_AXES),
+    },
     Preset {
         name: "inspire",
         map: INSPIRE,
@@ -221,6 +236,7 @@ const PRESETS: [Preset; 8] = [
             "public sources differ about the palm of an Inspire RH56: 14 × 8 here, 8 × 14 in others; none lists how its pads lie",
         ],
         is_untested: true,
+        skin_axes: None,
     },
     Preset {
         name: "xela",
@@ -232,6 +248,7 @@ const PRESETS: [Preset; 8] = [
             UNMEASURED_AXES,
         ],
         is_untested: true,
+        skin_axes: None,
     },
     Preset {
         name: "xela-ros2",
@@ -239,6 +256,7 @@ const PRESETS: [Preset; 8] = [
         definition: Some(XELA_DEFINITION),
         notes: &[XELA_GRIDS, UNMEASURED_AXES],
         is_untested: true,
+        skin_axes: None,
     },
     Preset {
         name: "contactile",
@@ -251,6 +269,7 @@ const PRESETS: [Preset; 8] = [
             UNMEASURED_AXES,
         ],
         is_untested: true,
+        skin_axes: None,
     },
     Preset {
         name: "paxini",
@@ -261,6 +280,7 @@ const PRESETS: [Preset; 8] = [
             UNMEASURED_AXES,
         ],
         is_untested: true,
+        skin_axes: None,
     },
 ];
 

@@ -78,6 +78,7 @@ pub struct SimulatedSource {
     channels: Vec<u32>,
     delivered: Vec<Delivered>,
     touches: Touches,
+    notices: Vec<String>,
     next: u64,
     truth: Vec<Truth>,
     forces_newton: Vec<f64>,
@@ -210,6 +211,7 @@ impl SimulatedSource {
             delivered,
             taxels,
             touches,
+            notices: senses_setup::without_effect(file, &body).into_iter().collect(),
             next: 0,
             truth: Vec::new(),
             body,
@@ -339,6 +341,10 @@ impl Source for SimulatedSource {
 
     fn progress(&self) -> Option<f64> {
         Some(self.next as f64 / self.frames as f64)
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
     }
 }
 

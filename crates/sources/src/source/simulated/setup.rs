@@ -31,6 +31,8 @@ pub(super) struct Touch {
     pub(super) angle: Option<Profile>,
     pub(super) path: Path,
     pub(super) force_newton: Profile,
+    /// Whether the body has taxels that see distances.
+    pub(super) is_seen: bool,
     /// How far its lowest point is above the skin while it does not press, m; `None` where nothing sees that.
     pub(super) gap_m: Option<Profile>,
 }
@@ -41,10 +43,12 @@ impl Touch {
         self.force_newton.within(t_s).filter(|&force| force > 0.0)
     }
 
-    /// How far above the skin it is at `t_s`, m, if that can be seen.
+    /// How far above the skin it is at `t_s`, m, if that can be seen: 0 while it presses.
     pub(super) fn gap(&self, t_s: f64) -> Option<f64> {
-        let gap_m = self.gap_m.as_ref()?;
-        if self.force(t_s).is_some() { Some(0.0) } else { gap_m.within(t_s) }
+        match self.force(t_s) {
+            Some(_) => self.is_seen.then_some(0.0),
+            None => self.gap_m.as_ref()?.within(t_s),
+        }
     }
 
     /// Whether it presses or is seen at `t_s`.
@@ -132,6 +136,7 @@ impl Setup<'_> {
             angle: self.angle(keys, indenter.is_long())?,
             path: Path { frame, surface, waypoints, times_s },
             force_newton: self.force(keys)?,
+            is_seen: self.sees(),
             gap_m: self.gap(keys)?,
         };
         let gaps = touch.gap_m.iter().flat_map(Profile::times);

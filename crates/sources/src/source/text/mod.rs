@@ -56,9 +56,7 @@ pub struct TextSource {
     splitter: Splitter,
     assembler: Assembler,
     form: Form,
-    ids: Vec<u32>,
-    /// The places of values that point the other way.
-    turned: Vec<usize>,
+    taxels: MappedTaxels,
     pitch_m: Option<[f64; 2]>,
     map: Option<ArrayMap>,
     start: Instant,
@@ -119,15 +117,14 @@ impl TextSource {
             has_axes: options.map.as_ref().is_some_and(|map| map.axes.is_some()),
         };
         let Opened { form, kept, is_ended } = listen(&mut link, place, start, known, tell).map_err(|e| e.at(place))?;
-        let named = MappedTaxels::new(options.map.as_ref(), form.ids.as_deref(), form.sensors(), None)
+        let taxels = MappedTaxels::new(options.map.as_ref(), form.ids.as_deref(), form.sensors(), None)
             .map_err(|e| e.at(place))?;
         let mut source = Self {
             name: place.to_string(),
             link,
             splitter: Splitter::default(),
             assembler: Assembler::new(form.clone(), is_joined),
-            ids: named.channels,
-            turned: named.turned,
+            taxels,
             pitch_m: options.pitch_m.or(options.map.as_ref().and_then(|map| map.pitch_m)),
             map: options.map.clone(),
             start,
@@ -173,7 +170,7 @@ impl TextSource {
 
     /// Rows and columns of its sensors; one row where it is not known that they are a grid.
     fn size(&self) -> [usize; 2] {
-        self.form.grid.unwrap_or([1, Channel::taxels_of(&self.ids).len()])
+        self.form.grid.unwrap_or([1, Channel::taxels_of(&self.taxels.channels).len()])
     }
 
     /// The map, if it says that the sensors are pads.
@@ -187,8 +184,8 @@ impl TextSource {
     /// Two of its sensors have the same id, or it has too many.
     pub fn body(&self) -> Result<Vec<u8>> {
         let made = match self.with_pads() {
-            Some(map) => map::body::glb(map, &self.ids),
-            None => body::glb(&self.ids, self.size(), self.pitch_m.unwrap_or([USUAL_PITCH_M; 2])),
+            Some(map) => map::body::glb(map, &self.taxels.channels),
+            None => body::glb(&self.taxels.channels, self.size(), self.pitch_m.unwrap_or([USUAL_PITCH_M; 2])),
         };
         made.map_err(|e| e.at(&self.name))
     }
@@ -197,7 +194,7 @@ impl TextSource {
     #[must_use]
     pub fn about_body(&self) -> String {
         if let Some(map) = self.with_pads() {
-            return map::body::about(map, &self.ids);
+            return map::body::about(map, &self.taxels.channels);
         }
         let [rows, columns] = self.size();
         let what = match rows {
@@ -220,22 +217,15 @@ impl TextSource {
     /// # Errors
     /// It has another number of sensors than the body has taxels, or the body lacks a taxel.
     pub fn for_body(mut self, taxels: &[u32]) -> Result<Self> {
+        let by_map = self.form.ids.is_none() && self.map.is_some();
         if self.form.ids.is_none() && self.map.as_ref().is_none_or(|map| map.ids.is_none()) {
-            let named = MappedTaxels::new(self.map.as_ref(), None, self.ids.len(), Some(taxels));
+            let named = MappedTaxels::new(self.map.as_ref(), None, self.taxels.channels.len(), Some(taxels));
             let advice = "--ids says which these are, --columns which columns are sensors";
-            let named = named.map_err(|e| failed!("{e}; {advice}").at(&self.name))?;
-            (self.ids, self.turned) = (named.channels, named.turned);
+            self.taxels = named.map_err(|e| failed!("{e}; {advice}").at(&self.name))?;
         }
-        match self.ids.iter().find(|id| !taxels.contains(id)) {
-            Some(id) => {
-                let what = failed!(
-                    "the body has no taxel {}; is it the right body? --ids says which taxels the sensors are",
-                    Channel(*id)
-                );
-                Err(what.at(&self.name))
-            }
-            None => Ok(self),
-        }
+        let skipped = self.taxels.skip_absent(taxels, by_map, "--ids says which taxels the sensors are");
+        self.notices.extend(skipped.map_err(|e| e.at(&self.name))?);
+        Ok(self)
     }
 
     /// Takes `bytes`, which came at `now_s`.
@@ -281,7 +271,7 @@ impl TextSource {
         }
         frame.clear();
         frame.values.clear();
-        frame.values.resize(self.ids.len(), RawValue::STALE);
+        frame.values.resize(self.taxels.channels.len(), RawValue::STALE);
         frame.t_s = t_s + at.elapsed().as_secs_f64();
         (self.has_stale, self.read_at) = (true, None);
         true
@@ -304,7 +294,7 @@ impl TextSource {
             for value in &mut next.values {
                 *value = value.number().map_or(*value, |number| map.value(number));
             }
-            self.turned.iter().for_each(|&index| map::turn(&mut next.values[index]));
+            self.taxels.arrange(&mut next.values);
         }
         self.assembler.give_back(std::mem::replace(frame, next));
         self.last = Some((Instant::now(), frame.t_s));
@@ -325,7 +315,7 @@ fn take(link: &Link, bytes: &[u8], splitter: &mut Splitter, assembler: &mut Asse
 
 impl Source for TextSource {
     fn taxels(&self) -> &[u32] {
-        &self.ids
+        &self.taxels.channels
     }
 
     fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
