@@ -161,6 +161,30 @@ fn taxels_have_the_colours_of_the_letter_that_is_asked_for() {
 }
 
 #[test]
+fn a_letter_with_nothing_to_see_is_drawn_from_where_its_taxels_are_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // They look up, and from the front and the back are seen edge on.
+    let row = |kind: &str, id: i32| format!("{id},pad,{},0,0,0,1,0,1.6e-5,{kind}\n", 0.005 * f64::from(id));
+    let rows: String = (0..6).map(|id| row(if id < 3 { "pressure" } else { "proximity" }, id)).collect();
+    std::fs::write(at("skin.csv"), format!("id,link,x,y,z,nx,ny,nz,area,modality\n{rows}")).unwrap();
+    std::fs::write(at("fields.toml"), "[[fields]]\nname = \"pad\"\ntaxels = [\"0..=5\"]\n").unwrap();
+    std::fs::write(at("far.toml"), "[proximity]\nunit = \"mm\"\nrange = 80\n").unwrap();
+    std::fs::write(at("far.csv"), "t,0,1,2,3,4,5\n0,0,0,0,200,200,200\n").unwrap();
+    let (skin, bare, body) = (at("skin.csv"), at("bare.glb"), at("pad.glb"));
+    done(&["author", "--csv-skin", text_of(&skin), "-o", text_of(&bare)]);
+    done(&["author", text_of(&bare), "--recipe", text_of(&at("fields.toml")), "-o", text_of(&body)]);
+    let [source, calibration] = ["far.csv", "far.toml"].map(at);
+    for letter in ["pressure", "proximity"] {
+        let to = at("a.png");
+        let from = ["render", text_of(&body), "--source", text_of(&source), "--calibration", text_of(&calibration)];
+        let how = ["--letter", letter, "--size", "600", "-o", text_of(&to), "--force"];
+        let Some(picture) = drawn(&[&from[..], &how].concat(), &to) else { return };
+        assert!(count(&picture, [0xD6, 0xD6, 0xD4]) > 1000, "{letter}");
+    }
+}
+
+#[test]
 fn letters_that_cannot_be_drawn_are_refused() {
     let skin = Skin::new();
     let [body, touch, to] = ["pad.glb", "touch.csv", "a.png"].map(|name| skin.at(name));
