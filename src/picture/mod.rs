@@ -65,8 +65,8 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Pictu
     let dots = Dots::from_body(body);
     let shown = FieldColours::for_fields(fields, &options.fields, &dots);
     let title = format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel"));
-    let prepared = Prepared::new(body, fields, options, &title, shown.key(fields))?;
-    let Prepared { size, middle, arrangement, views, .. } = &prepared;
+    let prepared = Prepared::new(body, dots, (fields, options), &title, shown.key(fields))?;
+    let Prepared { dots, size, middle, arrangement, views, .. } = &prepared;
     let mut drawing = prepared.drawing(linear(PAPER));
     drawing.slices = dots.slices(&shown.coloured(fields), *middle, prepared.usual_radius() > 2.0);
     let mut pixels = raster::draw(&drawing)?;
@@ -102,17 +102,16 @@ struct Prepared {
 }
 
 impl Prepared {
-    /// For a picture with this title and key.
+    /// For a picture of `body` and its `dots` with this title and key.
     fn new(
         body: &Body,
-        fields: &[Field],
-        options: &Options,
+        dots: Dots,
+        (fields, options): (&[Field], &Options),
         title: &str,
         key: Vec<(Option<[u8; 3]>, String)>,
     ) -> Result<Self> {
         let size = checked(options.size)?;
         let triangles = body.triangles_at_rest();
-        let dots = Dots::from_body(body);
         let bounds = || triangles.iter().flat_map(|(_, corners)| *corners).chain(dots.places.iter().copied());
         let (low, high) = bounds().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
         if !(low.is_finite() && high.is_finite()) {

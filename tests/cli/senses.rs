@@ -72,7 +72,7 @@ impl Skin {
 }
 
 /// The colours of the picture that `arguments` draw at `to`, or none where no adapter answers.
-fn drawn(arguments: &[&str], to: &Path) -> Option<Vec<[u8; 3]>> {
+pub(super) fn drawn(arguments: &[&str], to: &Path) -> Option<Vec<[u8; 3]>> {
     let output = output(arguments);
     let said = stderr(&output);
     if said.contains("no GPU driver answers") {
@@ -92,7 +92,7 @@ fn pixels(path: &Path) -> Vec<[u8; 3]> {
 }
 
 /// Pixels of a colour, as near as an adapter rounds: of discs, which are flat, and a column of the legend.
-fn count(picture: &[[u8; 3]], colour: [u8; 3]) -> usize {
+pub(super) fn count(picture: &[[u8; 3]], colour: [u8; 3]) -> usize {
     let is_of = |pixel: &&[u8; 3]| pixel.iter().zip(colour).all(|(&one, other)| one.abs_diff(other) <= 2);
     picture.iter().filter(is_of).count()
 }
@@ -158,30 +158,6 @@ fn taxels_have_the_colours_of_the_letter_that_is_asked_for() {
     // Arrows are black around white, and there are none on temperatures.
     let black = [0; 3];
     assert!(count(&shears, black) > count(&temperatures, black) + 50);
-}
-
-#[test]
-fn a_letter_with_nothing_to_see_is_drawn_from_where_its_taxels_are_seen() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    // They look up, and from the front and the back are seen edge on.
-    let row = |kind: &str, id: i32| format!("{id},pad,{},0,0,0,1,0,1.6e-5,{kind}\n", 0.005 * f64::from(id));
-    let rows: String = (0..6).map(|id| row(if id < 3 { "pressure" } else { "proximity" }, id)).collect();
-    std::fs::write(at("skin.csv"), format!("id,link,x,y,z,nx,ny,nz,area,modality\n{rows}")).unwrap();
-    std::fs::write(at("fields.toml"), "[[fields]]\nname = \"pad\"\ntaxels = [\"0..=5\"]\n").unwrap();
-    std::fs::write(at("far.toml"), "[proximity]\nunit = \"mm\"\nrange = 80\n").unwrap();
-    std::fs::write(at("far.csv"), "t,0,1,2,3,4,5\n0,0,0,0,200,200,200\n").unwrap();
-    let (skin, bare, body) = (at("skin.csv"), at("bare.glb"), at("pad.glb"));
-    done(&["author", "--csv-skin", text_of(&skin), "-o", text_of(&bare)]);
-    done(&["author", text_of(&bare), "--recipe", text_of(&at("fields.toml")), "-o", text_of(&body)]);
-    let [source, calibration] = ["far.csv", "far.toml"].map(at);
-    for letter in ["pressure", "proximity"] {
-        let to = at("a.png");
-        let from = ["render", text_of(&body), "--source", text_of(&source), "--calibration", text_of(&calibration)];
-        let how = ["--letter", letter, "--size", "600", "-o", text_of(&to), "--force"];
-        let Some(picture) = drawn(&[&from[..], &how].concat(), &to) else { return };
-        assert!(count(&picture, [0xD6, 0xD6, 0xD4]) > 1000, "{letter}");
-    }
 }
 
 #[test]
@@ -292,6 +268,8 @@ fn a_skin_of_temperatures_alone_is_planned_compared_drawn_and_has_nothing_to_tra
         let bill = done(&[&["plan", "--json", "--body", body][..], source].concat());
         let bill: serde_json::Value = serde_json::from_str(&bill).unwrap();
         assert_eq!([&bill["taxels"], &bill["of_taxels"], &bill["fields"], &bill["of_fields"]], [4, 4, 1, 1]);
+        let text = done(&[&["plan", "--body", body][..], source].concat());
+        assert!(text.contains("memberships 4\n") && text.contains("1 of 1\n") && !text.contains("pressed"), "{text}");
         let timed = bill["stages"].as_array().unwrap().iter().filter(|stage| stage["us"].is_number());
         assert_eq!(timed.map(|stage| stage["stage"].as_str().unwrap()).collect::<Vec<_>>(), ["temperature"]);
     }
@@ -343,6 +321,9 @@ fn a_plan_and_a_trade_tell_what_each_letter_costs() {
         assert!(stage(&all, letter)["us"].is_number(), "{letter}: {all}");
     }
     assert_eq!((&all["taxels"], &all["fields"], &all["of_fields"]), (&53.into(), &23.into(), &23.into()));
+    // In words, fields of the body are told apart from their percepts, and memberships of pressures from others.
+    let text = done(&["plan", "--body", "sensing-hand", "--backend", "cpu"]);
+    assert!(text.contains("14 of 14, 23 percepts of 4 letters") && text.contains(" of other letters\n"), "{text}");
     // A letter that is not asked for does not run, and it is not said that there are no taxels.
     let two = bill(&["--letters", "sustained,temperature"]);
     assert!(stage(&two, "temperature")["us"].is_number() && stage(&two, "shear")["runs"] == false);
