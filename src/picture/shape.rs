@@ -81,9 +81,7 @@ impl Dots {
     /// At `places`; a single one is drawn as if its neighbours were a tenth of `extent_m` away.
     pub(super) fn at(places: Vec<DVec3>, normals: Vec<DVec3>, extent_m: f64) -> Self {
         let gaps = gaps(&places);
-        let mut known: Vec<f64> = gaps.iter().flatten().copied().collect();
-        known.sort_by(f64::total_cmp);
-        let spacing_m = known.get(known.len() / 2).copied().unwrap_or((0.1 * extent_m).max(1e-3));
+        let spacing_m = median(&gaps).unwrap_or((0.1 * extent_m).max(1e-3));
         let radii: Vec<f64> = gaps.iter().map(|gap| radius(*gap, spacing_m)).collect();
         Self { places, normals, narrow_radii: radii.clone(), radii, spacing_m }
     }
@@ -100,17 +98,23 @@ impl Dots {
                 kinds.push(taxel.modality);
             }
         }
-        for kind in kinds.iter().filter(|_| kinds.len() > 1) {
+        if kinds.len() < 2 {
+            return self;
+        }
+        let mut own_gaps = vec![None; taxels.len()];
+        for kind in &kinds {
             let is_own = |index: &usize| {
                 let modality = taxels[*index].modality;
                 modality == *kind || is_skin(modality) && is_skin(*kind)
             };
             let own: Vec<usize> = (0..taxels.len()).filter(is_own).collect();
             let places: Vec<DVec3> = own.iter().map(|&index| self.places[index]).collect();
-            for (index, gap) in own.into_iter().zip(gaps(&places)) {
-                let wide = radius(gap, self.spacing_m).min(largest_radius(taxels[index]));
-                self.radii[index] = wide.max(self.narrow_radii[index]);
-            }
+            own.iter().zip(gaps(&places)).for_each(|(&index, gap)| own_gaps[index] = gap);
+        }
+        let spacing_m = median(&own_gaps).unwrap_or(self.spacing_m);
+        for (index, gap) in own_gaps.into_iter().enumerate() {
+            let wide = radius(gap, spacing_m).min(largest_radius(taxels[index]));
+            self.radii[index] = wide.max(self.narrow_radii[index]);
         }
         self
     }
@@ -224,6 +228,13 @@ fn gaps(places: &[DVec3]) -> Vec<Option<f64>> {
         near.map(|(_, squared)| squared.sqrt()).find(|&distance| distance > COINCIDENT_M)
     };
     places.iter().map(gap).collect()
+}
+
+/// The median of the gaps that are known.
+fn median(gaps: &[Option<f64>]) -> Option<f64> {
+    let mut known: Vec<f64> = gaps.iter().flatten().copied().collect();
+    known.sort_by(f64::total_cmp);
+    known.get(known.len() / 2).copied()
 }
 
 /// The radius of a disc that has its nearest neighbour at `gap` where they usually are `spacing_m` apart, m.
