@@ -173,6 +173,7 @@ fn run(body: &Body, way: Way) -> Took {
                 sensed: &|frame, taxels, to| engine.sensed_alone(frame, taxels, to),
                 plan: engine.plan(),
                 values_read: engine.values_read(),
+                values_noted: engine.values_noted(),
                 values_sensed: engine.values_sensed(),
                 arrived: None,
                 call: Duration::ZERO,

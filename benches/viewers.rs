@@ -197,6 +197,7 @@ impl Run {
             self.publisher.read(&PageInput {
                 frame: &frame,
                 values_read: self.engine.values_read(),
+                values_noted: self.engine.values_noted(),
                 values_sensed: self.engine.values_sensed(),
                 plan: self.engine.plan(),
                 arrived: None,

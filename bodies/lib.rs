@@ -11,14 +11,14 @@ pub const MAT: &[u8] = include_bytes!("mat.glb");
 /// A humanoid of a small child's shape with 960 taxels, skinned to 17 links.
 pub const HUMANOID: &[u8] = include_bytes!("humanoid.glb");
 
-/// [`HAND`] with more senses: three-axis taxels in its fingers, temperature and proximity in its palm.
+/// [`HAND`] with more senses: three-axis taxels in its palm and fingers, temperature and proximity in its palm.
 pub const SENSING_HAND: &[u8] = include_bytes!("sensing-hand.glb");
 
 /// Some seconds of touch on [`HAND`], as CSV. It is computed, not measured.
 pub const TOUCH: &[u8] = include_bytes!("touch.csv");
 
-/// Another hand comes near [`SENSING_HAND`], warms and presses its palm, then drags its index finger; as CSV, in N, °C and mm. It is
-/// computed, not measured.
+/// Another hand comes near the palm of [`SENSING_HAND`], presses and warms it and is dragged over it; then a fingertip is dragged along
+/// its index finger; as CSV, in N, °C and mm. It is computed, not measured.
 pub const MEETING: &[u8] = include_bytes!("meeting.csv");
 
 /// The calibration of [`SENSING_HAND`] in [`MEETING`]: its units, the range of its distance sensors, and when it slips; TOML.

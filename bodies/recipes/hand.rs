@@ -30,7 +30,7 @@ const MIDHAND_CHANNEL: u32 = 32;
 pub(crate) enum Senses {
     /// 40 force-sensing resistors.
     Pressure,
-    /// Those of the fingers measure along three axes; the palm has nine thermometers and four distance sensors between its own.
+    /// Those of the palm and the fingers measure along three axes; the palm has nine thermometers and four distance sensors between its own.
     All,
 }
 
@@ -191,14 +191,11 @@ fn taxels(sensors: &[Sensor], origin_in_hand: DVec3) -> Vec<Taxel> {
         .collect()
 }
 
-/// Gives the sensors of fingers three axes: along the finger, and across it.
-fn pull(sensors: &mut [Sensor], links: &[(usize, Finger)]) {
-    for (five, (_, finger)) in sensors.chunks_mut(5).zip(links) {
-        for sensor in five {
-            sensor.modality = Modality::Force3;
-            let forward = finger.forward - sensor.normal * finger.forward.dot(sensor.normal);
-            sensor.tangent = Some(forward.normalize());
-        }
+/// Gives sensors three axes: along `forward` as it lies in the skin, and across it.
+fn pull(sensors: &mut [Sensor], forward: DVec3) {
+    for sensor in sensors {
+        sensor.modality = Modality::Force3;
+        sensor.tangent = Some((forward - sensor.normal * forward.dot(sensor.normal)).normalize());
     }
 }
 
@@ -264,7 +261,10 @@ pub(crate) fn make(senses: Senses) -> Hand {
     }
 
     if senses == Senses::All {
-        pull(&mut sensors[20..], &links);
+        pull(&mut sensors[..9], DVec3::Z);
+        for (five, (_, finger)) in sensors[20..].chunks_mut(5).zip(&links) {
+            pull(five, finger.forward);
+        }
         let more = palm_senses(&palm);
         sensors.splice(20..20, more);
     }

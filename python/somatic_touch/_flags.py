@@ -45,6 +45,7 @@ class Flags(_Flags):
     JUMPED = 1 << 17
     DRIFT_UNKNOWN = 1 << 18
     NO_UNIT = 1 << 19
+    NO_GRADIENT = 1 << 20
     NOISE_UNKNOWN = 1 << 25
     UNSURE = 1 << 26
     STALE_POSE = 1 << 27

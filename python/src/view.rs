@@ -72,6 +72,7 @@ impl Page {
         publisher.read(&PageInput {
             frame: &frame,
             values_read: engine.values_read(),
+            values_noted: engine.values_noted(),
             values_sensed: engine.values_sensed(),
             plan: engine.plan(),
             arrived: Some(began),

@@ -46,8 +46,8 @@ const OF_LETTERS: [(TouchOutputs, &str, Option<&str>); 3] = [
         TouchOutputs::TEMPERATURE,
         "temperature",
         Some(
-            "Mean of the temperature taxels that are nearest to its taxels, °C; also warmest, warmest_taxel, coldest, coldest_taxel, \
-             temperature_gradient and temperature_rate.",
+            "Mean of the temperature taxels that are nearest to its taxels, °C; also warmest, warmest_taxel, warmest_position, coldest, \
+             coldest_taxel, coldest_position, temperature_gradient and temperature_rate.",
         ),
     ),
 ];

@@ -40,7 +40,7 @@ impl Path {
             self.points += 1;
         }
         if self.points > MAX_POINTS {
-            self.step *= 2;
+            self.step = self.step.saturating_mul(2);
             for run in &mut self.runs {
                 let mut index = 0;
                 run.retain(|_| {
@@ -74,5 +74,14 @@ mod tests {
             assert!(!run.is_empty() && run.iter().all(|&(_, v)| v == contact as f64));
             assert!(run.windows(2).all(|pair| pair[0].0 < pair[1].0));
         }
+    }
+
+    #[test]
+    fn contacts_of_single_frames_are_no_longer_thinned_when_the_step_is_as_large_as_it_gets() {
+        let mut path = Path::default();
+        for frame in 0..600_000_u32 {
+            path.push(frame.is_multiple_of(2).then(|| [f64::from(frame), 0.0]));
+        }
+        assert!(path.step == usize::MAX && path.points <= MAX_POINTS && path.runs[1] == [(2.0, 0.0)]);
     }
 }

@@ -248,6 +248,7 @@ impl Run {
             sensed: &|frame, taxels, to| engine.sensed_alone(frame, taxels, to),
             plan: engine.plan(),
             values_read: engine.values_read(),
+            values_noted: engine.values_noted(),
             values_sensed: engine.values_sensed(),
             arrived: info.read_at.last().copied(),
             call,

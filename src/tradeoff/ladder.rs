@@ -138,7 +138,7 @@ mod tests {
         let scenes = [
             (usual.clone().outputs(Outputs::empty()), "touches"),
             (usual.clone().outputs(Outputs::TOTAL).touches(sigma), "touches"),
-            (usual.clone().fields(["hand/palm"]), "touches"),
+            (usual.clone().fields(["hand/back"]), "touches"),
             (named.outputs(Outputs::TOTAL).touches(sigma), "shear"),
             (usual, "proximity"),
         ];

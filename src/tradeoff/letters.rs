@@ -216,7 +216,7 @@ mod tests {
         let letters = ["shear", "temperature", "proximity"];
         assert_eq!(named, [("live", letters), ("batch", letters)].map(|(way, all)| all.map(|one| (one, way))).concat());
         assert!(has_options && all.iter().all(|cost| (0.0..1.0).contains(&cost.share)), "{all:?}");
-        // A shear of twenty pressed taxels is not free.
+        // A shear of 29 pressed taxels is not free.
         assert!(all.iter().all(|cost| cost.letter != "shear" || cost.us > 0.0), "{all:?}");
         // Alone, a letter is all of the time, and nothing is to be chosen.
         let (has_options, alone) = costs(&[Receptor::Temperature]);

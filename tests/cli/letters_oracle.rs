@@ -18,7 +18,7 @@ fn assert_right(found: &Value, cells: u64, touches: u64) {
     }
     // Each quantity was there often.
     let present = found["present"].as_object().unwrap();
-    assert_eq!(present.len(), 38);
+    assert_eq!(present.len(), 40);
     assert!(present.values().all(|number| number.as_u64().unwrap() * 200 >= cells), "{present:?}");
 }
 

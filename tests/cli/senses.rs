@@ -131,12 +131,15 @@ fn each_quantity_is_plotted_in_the_letter_that_gives_it_with_its_unit() {
 fn a_quantity_that_no_upper_field_has_is_plotted_of_the_first_one_that_has_it() {
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("a.svg");
-    let named = |outputs: &str| {
-        done(&["plot", "--body", "sensing-hand", "--outputs", outputs, "-o", text_of(&to), "--force"]);
+    let named = |outputs: &str, from_s: &str| {
+        let asked = ["plot", "--body", "sensing-hand", "--outputs", outputs, "--from", from_s, "-o", text_of(&to)];
+        done(&[&asked[..], &["--force"]].concat());
         std::fs::read_to_string(&to).unwrap().matches("hand/midhand/index").count()
     };
-    // Maps name it twice. The fields above it have a friction, and no chart to have a shear in.
-    assert_eq!((named("friction"), named("shear")), (2, 3));
+    // Maps name it twice. While the finger alone is touched, the fields above it have a friction, and no chart to have a shear in.
+    assert_eq!((named("friction", "4"), named("shear", "4")), (2, 3));
+    // Before, the palm has both.
+    assert_eq!(named("shear", "0"), 2);
 }
 
 #[test]
@@ -228,19 +231,21 @@ fn charts_have_the_colours_of_their_letter_and_dots_for_other_taxels() {
     let grey = |picture: &[[u8; 3]]| count(picture, [0xD6, 0xD6, 0xD4]);
     let named = chart("hand/palm", "temperature", &["--ids"]).unwrap();
     assert!(grey(&temperatures) > 500 && 2 * grey(&temperatures) < grey(&named));
-    let why = ["render", "sensing-hand", "--source", MEETING, "--uv", "hand/palm", "--letter", "shear", "-o", "no.png"];
-    assert!(fails(2, &why).contains("no taxel of field `hand/palm` measures what letter `shear` shows"));
+    let why = ["render", "sensing-hand", "--source", MEETING, "--uv", "hand/back", "--letter", "shear", "-o", "no.png"];
+    assert!(fails(2, &why).contains("no taxel of field `hand/back` measures what letter `shear` shows"));
 }
 
 #[test]
 fn pictures_are_of_the_time_at_which_there_is_most_to_see_of_their_letter() {
-    let same = |letter: &str, at: &str| {
-        let Some(usual) = chart("hand/midhand/index", letter, &[]) else { return true };
-        usual == chart("hand/midhand/index", letter, &["--at", at]).unwrap()
-    };
-    assert!(same("shear", "4.86s"));
-    // Most is pressed while nothing pulls.
-    assert!(same("pressure", "1.9s") && !same("shear", "1.9s"));
+    // Most is pressed when it begins to slip, and it is warmest when the other hand goes.
+    let most = [("shear", "2.54s"), ("pressure", "2.58s"), ("temperature", "3.44s")];
+    for (letter, at) in most {
+        let Some(usual) = chart("hand/palm", letter, &[]) else { return };
+        for (_, other) in most {
+            let drawn = chart("hand/palm", letter, &["--at", other]).unwrap();
+            assert_eq!(usual == drawn, at == other, "{letter} at {other}");
+        }
+    }
 }
 
 /// A skin of temperature taxels alone, and a recording in which they warm up.
@@ -320,10 +325,10 @@ fn a_plan_and_a_trade_tell_what_each_letter_costs() {
     for letter in ["shear", "temperature", "proximity"] {
         assert!(stage(&all, letter)["us"].is_number(), "{letter}: {all}");
     }
-    assert_eq!((&all["taxels"], &all["fields"], &all["of_fields"]), (&53.into(), &23.into(), &23.into()));
+    assert_eq!((&all["taxels"], &all["fields"], &all["of_fields"]), (&53.into(), &28.into(), &28.into()));
     // In words, fields of the body are told apart from their percepts, and memberships of pressures from others.
     let text = done(&["plan", "--body", "sensing-hand", "--backend", "cpu"]);
-    assert!(text.contains("13 of 13, 23 percepts of 4 letters") && text.contains(" of other letters\n"), "{text}");
+    assert!(text.contains("13 of 13, 28 percepts of 4 letters") && text.contains(" of other letters\n"), "{text}");
     // A letter that is not asked for does not run, and it is not said that there are no taxels.
     let two = bill(&["--letters", "sustained,temperature"]);
     assert!(stage(&two, "temperature")["us"].is_number() && stage(&two, "shear")["runs"] == false);
@@ -347,12 +352,12 @@ fn what_runs_has_a_plan_also_if_touches_have_shear_and_no_field_has() {
     let scenes: [&[&str]; 4] = [
         &["--outputs", "touches"],
         &["--outputs", "touches.wrench,touches.total"],
-        &["--fields", "hand/palm"],
+        &["--fields", "hand/back"],
         &["--letters", "sustained,shear", "--outputs", "total,touches.friction_sigma"],
     ];
     for asked in scenes {
         let flags = [&["--body", "sensing-hand", "--backend", "cpu"][..], asked].concat();
-        let run = done(&[&["run", "--quiet", "--sink", "csv:-"][..], &flags].concat());
+        let run = done(&[&["run", "--quiet", "--all-fields", "--sink", "csv:-"][..], &flags].concat());
         assert!(run.lines().count() > 1, "{asked:?}");
         let bill: serde_json::Value = serde_json::from_str(&done(&[&["plan", "--json"][..], &flags].concat())).unwrap();
         let stages = bill["stages"].as_array().unwrap();

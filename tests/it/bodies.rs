@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use somatic::Body;
 use somatic::author::lint;
-use somatic::body::{FieldSpec, Surface, Taxel};
+use somatic::body::{FieldSpec, Modality, Surface, Taxel};
 use somatic::field::FieldSet;
 use somatic::internal::author::widest_radius;
 
@@ -212,6 +212,30 @@ fn the_palms_quadrants_share_its_centre() {
         assert_eq!(quadrant.name.contains("radial"), mean.x > 0.001, "{}: the thumb is at +x", quadrant.name);
         assert_eq!(quadrant.name.contains("distal"), mean.z > 0.001, "{}: the fingers are at +z", quadrant.name);
     }
+}
+
+#[test]
+fn the_sensing_hand_has_three_axes_in_its_palm_and_fingers_and_four_kinds_of_taxels() {
+    let (plain, body) = (load("hand.glb"), load("sensing-hand.glb"));
+    let of = |modality: Modality| -> BTreeSet<u32> {
+        body.taxels.iter().filter(|taxel| taxel.modality == modality).map(|taxel| taxel.id).collect()
+    };
+    assert_eq!(of(Modality::Force3), (0..9).chain(32..52).collect());
+    assert_eq!(of(Modality::Temperature), (64..73).collect());
+    assert_eq!(of(Modality::Proximity), (80..84).collect());
+    assert_eq!(of(Modality::Pressure), (16..27).collect());
+    assert!(plain.taxels.iter().all(|own| own.position_in_link == taxel(&body, own.id).position_in_link));
+    // To the fingertips, in the skin.
+    for id in 0..9 {
+        let sensor = taxel(&body, id);
+        let tangent = sensor.tangent_in_link.unwrap();
+        assert!(tangent.dot(DVec3::Z) > 0.999 && tangent.dot(sensor.normal_in_link).abs() < 1e-6, "{id}: {tangent}");
+    }
+    let meeting = std::fs::read_to_string(bundled("meeting.csv")).unwrap();
+    let readme = std::fs::read_to_string(bundled("README.md")).unwrap();
+    let values = meeting.lines().next().unwrap().split(',').count() - 1;
+    assert_eq!((values, meeting.lines().count()), (body.taxels.len() + 2 * of(Modality::Force3).len(), 1 + 6 * 50));
+    assert!(readme.contains(&format!("on the {values} values of `sensing-hand.glb`")), "{values}");
 }
 
 #[test]

@@ -419,7 +419,7 @@ fn a_drag_over_an_elbow_pulls_at_both_links_and_what_presses_stays_the_same() {
     // The same presses on a body of pressure taxels.
     let mut of_plain = simulated(&plain, sensor, [20.0, 1.5], &touch);
     let pressed = with_wrenches(TouchOutputs::empty());
-    let mut engine = engine(&plain, "[all]\nunit = \"N\"\n", pressed);
+    let mut engine = engine(&plain, &of_plain.calibration(), pressed);
     let mut frame = Frame::missing(0.0, of_plain.taxels().len());
     let mut compared = 0;
     while of_plain.next_frame(&mut frame).unwrap() {

@@ -345,7 +345,8 @@ fn one_taxel_has_no_torsion_and_two_have_no_gradient() {
     assert!(
         percepts[1].torsion.is_none() && percepts[1].flags.contains(Flags::ONE_TAXEL) && percepts[1].shear.is_some()
     );
-    assert!(percepts[2].temperature_gradient.is_none() && percepts[2].flags.contains(Flags::COINCIDENT));
+    assert!(percepts[2].temperature_gradient.is_none() && percepts[2].flags.contains(Flags::NO_GRADIENT));
+    assert!(!percepts[2].flags.contains(Flags::COINCIDENT) && !percepts[1].flags.contains(Flags::NO_GRADIENT));
 }
 
 #[test]

@@ -416,3 +416,29 @@ fn fields_that_share_taxels_have_each_its_own_and_faulty_ones_have_none() {
         }
     }
 }
+
+#[test]
+fn codes_of_every_table_are_missing_before_values_are_held() {
+    let body = skin(3);
+    let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+    let codes = "[all]\nmissing = [7]\n[temperature]\nmissing = [-999]\n[proximity]\nmissing = [8190]\n[taxel.101]\nmissing = [9]\n";
+    for (name, letter, code) in
+        [("100", 2, 7.0), ("100", 2, -999.0), ("200", 3, 8190.0), ("101", 2, 9.0), ("101", 2, -999.0)]
+    {
+        for (max_age_s, is_held) in [(0.5, true), (0.0, false)] {
+            let calibration = Calibration::parse(codes, &ids).unwrap();
+            let scene = Scene::default().max_age_s(max_age_s);
+            let options = Options::default().scene(scene).calibration(Some(calibration)).backend(BackendKind::Cpu);
+            let mut engine = Engine::new(&body, options).unwrap();
+            let [before, after] = [0.0, 0.1].map(|t_s| {
+                let mut frame = TOUCH.frame(&engine, t_s);
+                let index = engine.index_of(name).unwrap();
+                frame.values[index] = if t_s > 0.0 { RawValue::new(code) } else { frame.values[index] };
+                let percept = engine.process_one(&frame).unwrap().get(0, letter);
+                (percept.flags.contains(Flags::INCOMPLETE), percept.temperature, percept.covered)
+            });
+            assert_eq!((before.0, after.0), (false, !is_held), "{name} = {code}, held for {max_age_s} s");
+            assert_eq!((before.1, before.2) == (after.1, after.2), is_held, "{name} = {code}: {before:?} {after:?}");
+        }
+    }
+}

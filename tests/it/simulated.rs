@@ -251,6 +251,31 @@ fn gains_and_thresholds_differ_from_the_calibration() {
 }
 
 #[test]
+fn what_the_layers_tails_leave_without_noise_is_no_touch() {
+    let touch = "indenter = \"ball\"\nradius_m = 0.01\npath = [[0, 0]]\nhold = { newton = 4 }";
+    let mut simulation = on_dense("", touch);
+    let frame = first(&mut simulation);
+    let forces = numbers(&frame);
+    let over = |least: f64| forces.iter().filter(|force| **force > least).count() as u32;
+    assert!(over(1e-6) > 50 && over(0.0) > over(1e-6) + 50, "{} {}", over(0.0), over(1e-6));
+    let active = |simulation: &SimulatedSource| {
+        let calibration = Calibration::parse(&simulation.calibration(), simulation.taxels()).unwrap();
+        let options = Options::default().calibration(Some(calibration)).backend(BackendKind::Reference);
+        let mut engine = Engine::new(simulation.body(), options).unwrap();
+        engine.process_one(&frame).unwrap().get(0, 0).active.unwrap()
+    };
+    assert_eq!(active(&simulation), over(1e-6));
+    for (sensor, dead_band) in [
+        ("kind = \"linear\"\noffset = 500\ngain = 20", "dead_band = 0.000001\n"),
+        ("kind = \"linear\"\noffset = 500\ngain = 20\nbits = 10", "dead_band = 0.025\n"),
+        ("noise_sigma = 0.5", "dead_band = 3\n"),
+    ] {
+        let calibration = on_dense(sensor, touch).calibration();
+        assert!(calibration.contains(dead_band), "{sensor}: {calibration}");
+    }
+}
+
+#[test]
 fn the_calibrations_noise_is_that_of_raw_values() {
     let touch = "indenter = \"ball\"\nradius_m = 0.01\npath = [[0, 0]]\nhold = { newton = 0 }";
     for sensor in [

@@ -1,7 +1,9 @@
 //! Taxels with three axes, each with a gain, a range and shares in the others, by closed forms on every backend.
 
 use glam::{DMat3, DVec3};
+use somatic::internal::signal::Reading;
 use somatic::percept::TouchFlags;
+use somatic::signal::Unfit;
 use somatic::{
     BackendKind, Body, Calibration, Engine, Flags, Frame, Options, Outputs, Percept, RawValue, Scene, TouchOutputs,
     touch,
@@ -218,6 +220,29 @@ fn a_normal_value_is_corrected_by_what_is_known_and_flagged_for_the_rest() {
                 assert!(is_right, "{name} {value}: {:?}", touch.flags);
             }
         }
+    }
+}
+
+#[test]
+fn a_sensor_at_its_end_is_found_whatever_its_value_is_corrected_to() {
+    let body = skin(1);
+    let text = "[all]\nunit = \"N\"\nraw_range = [-10, 1023]\n[drift]\nsaturated_s = 0.5\ncadence_s = 0.2\n\
+                [shear]\ncross_axis = [[0.5, 0, 0], [0, 1, 0], [0, 0, 1]]\n";
+    for kind in backends() {
+        let mut engine = engine(&body, kind, text, false);
+        let at = |engine: &Engine, id: &str| engine.index_of(id).unwrap();
+        for tick in 0..20 {
+            let mut pressed = engine.frame(0.1 * f64::from(tick));
+            pressed.values.fill(RawValue::new(0.0));
+            // One at its end, one just under it, and one that is beyond it in the last frame.
+            pressed.values[at(&engine, "12")] = RawValue::new(1023.0);
+            pressed.values[at(&engine, "13")] = RawValue::new(1022.0);
+            pressed.values[at(&engine, "6")] = RawValue::new(if tick == 19 { 1030.0 } else { 500.0 });
+            engine.process_one(&pressed).unwrap();
+        }
+        assert_eq!(engine.unfit().collect::<Vec<_>>(), [(12, Unfit::Saturated)], "{kind:?}");
+        // As pages are told.
+        assert_eq!(engine.values_noted(), [(6, Reading::Value(1030.0, false))], "{kind:?}");
     }
 }
 

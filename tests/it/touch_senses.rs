@@ -1,9 +1,12 @@
 //! Shear and temperature of touches: weighed as places are, with what taxels of one axis press, and warm as what lies under them.
 
-use glam::{DVec2, DVec3};
+use std::f64::consts::FRAC_PI_2;
+
+use glam::{DQuat, DVec2, DVec3, Mat4};
 use somatic::body::{Modality, Taxel};
-use somatic::internal::body::Glb;
+use somatic::internal::body::{Glb, MeshData, Skinning};
 use somatic::percept::{Touch as Felt, TouchFlags};
+use somatic::signal::Pose;
 use somatic::{BackendKind, Body, Calibration, Engine, Flags, Frame, Options, RawValue, Scene, touch};
 
 use crate::common::backends;
@@ -190,4 +193,95 @@ fn a_touch_says_what_is_lost_of_its_warmth() {
     let touch = felt(&mut engine, &frame);
     assert!(touch.flags.contains(TouchFlags::INCOMPLETE) && !touch.flags.contains(TouchFlags::NO_GRADIENT));
     assert!(touch.temperature_celsius.is_none() && touch.warmest_celsius.is_none() && touch.warmest_taxel.is_none());
+}
+
+/// Two links side by side under one surface: three pressure taxels on `near` and two on `far`, in a row 5 mm apart along x, each with one of
+/// temperature.
+fn pair() -> Body {
+    let mut glb = Glb::new();
+    let far_m = DVec3::new(3.0 * PITCH, 0.0, 0.0);
+    let mut links = Vec::new();
+    for (name, at, ids) in [("near", DVec3::ZERO, 0..3), ("far", far_m, 3..5)] {
+        let link = glb.node(name, None, at);
+        for (first, modality) in [(0, Modality::Pressure), (WARM, Modality::Temperature)] {
+            let taxel = |id: u32| Taxel {
+                id: first + id,
+                link: 0,
+                position_in_link: DVec3::new(PITCH * f64::from(id), 0.0, 0.0) - at,
+                normal_in_link: DVec3::Y,
+                area: PITCH * PITCH,
+                modality,
+                tangent_in_link: None,
+            };
+            glb.taxels(&format!("{name} {first}"), Some(link), &ids.clone().map(taxel).collect::<Vec<_>>(), None);
+        }
+        let members = ids.map(|id| (id, Default::default())).collect();
+        let field = somatic::body::FieldSpec { name: name.into(), parent: None, members, chart: None };
+        glb.field(&field, Some(link), DVec3::ZERO);
+        links.push(link);
+    }
+    // A strip from half a taxel before the first to half a taxel behind the last, of which each link carries its part.
+    let corners = || (0..=5_u8).flat_map(|column| [(column, -0.5), (column, 0.5)]);
+    let at = |(column, side): (u8, f64)| PITCH * DVec3::new(f64::from(column) - 0.5, 0.0, side);
+    let of_far = |(column, _): (u8, f64)| (f32::from(column) - 2.5).clamp(0.0, 1.0);
+    let weights = |corner| [1.0 - of_far(corner), of_far(corner), 0.0, 0.0];
+    let skinning = Skinning { joints: vec![[0, 1, 0, 0]; 12], weights: corners().map(weights).collect() };
+    let mesh = MeshData {
+        positions: corners().map(|corner| at(corner).as_vec3().to_array()).collect(),
+        normals: vec![[0.0, 1.0, 0.0]; 12],
+        triangles: (0..5_u32).map(|column| 2 * column).flat_map(|a| [[a, a + 1, a + 3], [a, a + 3, a + 2]]).collect(),
+        skinning: Some(skinning),
+    };
+    let binds = [DVec3::ZERO, -far_m].map(|at| Mat4::from_translation(at.as_vec3()).to_cols_array());
+    let (shown, skin) = (glb.node("skin", None, DVec3::ZERO), glb.skin("skin", &links, &binds));
+    glb.mesh(shown, "skin", &mesh, None, Some(skin));
+    Body::from_bytes("pair", &glb.to_bytes().unwrap()).unwrap()
+}
+
+#[test]
+fn the_warmest_and_the_coldest_taxel_of_a_touch_are_where_their_links_have_them() {
+    let body = pair();
+    let values: Vec<(String, f64)> =
+        (0..5).flat_map(|id| [(id.to_string(), 1.0), ((WARM + id).to_string(), 20.0 + f64::from(id))]).collect();
+    let values: Vec<(&str, f64)> = values.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+    let turn = DQuat::from_rotation_z(0.5);
+    let near = Pose { translation: DVec3::Z, rotation: DQuat::from_rotation_x(FRAC_PI_2) };
+    let far = Pose { translation: DVec3::new(0.1, 0.2, 0.3), rotation: turn };
+    // glTF's places are in single precision.
+    let same = |a: Option<DVec3>, b: DVec3| assert!((a.unwrap() - b).length() < 1e-8, "{a:?} is not {b}");
+    for kind in backends() {
+        let (mut engine, mut frame) = calibrated(&body, kind, "", &values);
+        // At rest both are in the frame of the link with most of it.
+        let touch = felt(&mut engine, &frame);
+        assert_eq!((touch.warmest_taxel, touch.coldest_taxel), (Some(WARM + 4), Some(WARM)));
+        assert!(touch.flags.contains(TouchFlags::SEVERAL_LINKS) && !touch.in_world);
+        assert_eq!(body.links[touch.link as usize].name, "near");
+        same(touch.warmest_position, DVec3::new(4.0 * PITCH, 0.0, 0.0));
+        same(touch.coldest_position, DVec3::ZERO);
+        // Beside a link whose pose is known, one without a pose is as at rest.
+        (frame.t_s, frame.pose) = (0.1, vec![("near".into(), near)]);
+        let touch = felt(&mut engine, &frame);
+        assert!(touch.in_world);
+        same(touch.warmest_position, near.rotation * DVec3::new(4.0 * PITCH, 0.0, 0.0) + DVec3::Z);
+        // Each is where its own link is.
+        (frame.t_s, frame.pose) = (0.2, vec![("near".into(), near), ("far".into(), far)]);
+        let touch = felt(&mut engine, &frame);
+        same(touch.warmest_position, turn * DVec3::new(PITCH, 0.0, 0.0) + far.translation);
+        same(touch.coldest_position, near.translation);
+        // In a touch of the other link alone, in its frame; without readings nowhere.
+        (frame.t_s, frame.pose) = (0.3, Vec::new());
+        for id in 0..3 {
+            frame.values[engine.index_of(&id.to_string()).unwrap()] = RawValue::new(0.0);
+        }
+        let touch = felt(&mut engine, &frame);
+        assert_eq!(body.links[touch.link as usize].name, "far");
+        same(touch.warmest_position, DVec3::new(PITCH, 0.0, 0.0));
+        same(touch.coldest_position, DVec3::ZERO);
+        for id in 3..5 {
+            frame.values[engine.index_of(&(WARM + id).to_string()).unwrap()] = RawValue::MISSING;
+        }
+        frame.t_s = 0.4;
+        let touch = felt(&mut engine, &frame);
+        assert!(touch.warmest_position.is_none() && touch.coldest_position.is_none());
+    }
 }

@@ -16,7 +16,7 @@ from made import ALONG, unit
 
 TOUCHES = [
     "total", "shear", "shear_in_chart", "shear_direction", "force_vector", "torsion", "friction", "slip_ratio", "temperature",
-    "warmest", "warmest_taxel", "coldest", "coldest_taxel", "temperature_gradient",
+    "warmest", "warmest_taxel", "warmest_position", "coldest", "coldest_taxel", "coldest_position", "temperature_gradient",
 ]
 # P is of single precision on the CPU: some units of the terms that it is made of.
 SAME_ON_CPU = 4 * 2.0**-24
@@ -120,7 +120,8 @@ class TouchesOf:
     def right(self, frame, touch):
         """What is right of a touch: quantities, and those in each chart that it may have."""
         nodes = np.array([self.node_of[taxel] for taxel in touch["taxels"]])
-        turn = self.poses[self.link_of[touch["link"]]][0].T
+        rotation, origin = self.poses[self.link_of[touch["link"]]]
+        turn = rotation.T
         p = self.gain[nodes] * (self.raw[frame, nodes] - self.baseline[nodes])
         p_size = np.abs(self.gain[nodes]) * (np.abs(self.raw[frame, nodes]) + np.abs(self.baseline[nodes]))
         found = {"total": Value(p.sum(), p_size.sum())}
@@ -132,6 +133,7 @@ class TouchesOf:
             for name, place in (("warmest", celsius.argmax()), ("coldest", celsius.argmin())):
                 found[name] = Value(celsius[place], size)
                 found[f"{name}_taxel"] = Value(self.warm_ids[under[place]])
+                found[f"{name}_position"] = Value(turn @ (self.warm_at[under[place]] - origin), 1)
         # The nearest to its middle first: it is mostly that.
         load = self.weight[nodes] * p
         away = np.linalg.norm(self.at[nodes] - load @ self.at[nodes] / load.sum(), axis=1)
@@ -182,7 +184,7 @@ class TouchesOf:
         places = (offsets if is_wrapped else unrolled(offsets, up, self.normal[own])[0]) @ axes.T
         flat, size = turned @ axes.T, weight @ terms
         total = weight @ flat
-        pull = np.linalg.norm(weight @ each) if is_wrapped else np.linalg.norm(total)
+        pull = weight @ np.linalg.norm(each, axis=1) if is_wrapped else np.linalg.norm(total)
         # The sum of P may be off by as much as its terms.
         found["friction"] = Value(pull / load, doubt * (size + pull) / load)
         if self.slips_at is not None:

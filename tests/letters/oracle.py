@@ -66,10 +66,15 @@ class Slope:
     def take(self, t, value, size):
         if self.kept and t <= self.kept[-1][0]:
             self.kept.clear()
+        # After a gap of two windows in frames that were not slow, nothing is known of before.
+        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] <= self.window and t - self.kept[-1][0] > 2 * self.window:
+            self.kept.clear()
         if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] < self.window / 128:
             self.kept.pop()
         self.kept.append((t, value, size))
         while len(self.kept) > 1 and t - self.kept[1][0] >= self.window * (1 - 1e-9):
+            self.kept.popleft()
+        if len(self.kept) > 2 and t - self.kept[0][0] > 2 * self.window:
             self.kept.popleft()
         if t - self.kept[0][0] < self.window / 2:
             return None
@@ -128,9 +133,9 @@ def temperatures(recording, field, frames):
             elif share > 0.999e-6:
                 found["temperature_gradient"] = None
             else:
-                flags |= {"coincident"}
+                flags |= {"no_gradient"}
         elif field.chart:
-            flags |= {"coincident"}
+            flags |= {"no_gradient"}
         weighted = lambda of: sum(field.weights[m] * c for m, c in of.items()) / sum(field.weights[m] for m in of) if of else None
         found["temperature_rate"] = slope.follow(t, dict(zip(there, celsius)), weighted, size)
         yield found, flags | (set() if found["temperature_rate"] else {"no_previous"}), True
@@ -257,7 +262,8 @@ def shears(recording, field, frames):
         terms = np.abs(cross[1:]) @ np.vstack([(p + np.abs(cross[0, 1:]) @ large) / cross[0, 0], large])
         size, pull = (weights * terms.sum(axis=0)).sum(), (weights * p).sum()
         vector = (weights[:, None] * in_space).sum(axis=0)
-        friction = np.linalg.norm(vector) / pull
+        # Without a chart, of each.
+        friction = weights @ np.linalg.norm(along, axis=0) / pull
         found = {"shear_vector": Value(vector, size)}
         if "no_unit" not in flags:
             force = (newtons[there, None] * in_space).sum(axis=0) + normal.sum(axis=0)

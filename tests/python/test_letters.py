@@ -355,7 +355,7 @@ def test_notebooks_show_what_each_letter_tells() -> None:
 def test_a_bundled_body_is_simulated_with_its_senses() -> None:
     touch = 'on = "hand/midhand/index"\nindenter = "ball"\nradius_m = 0.01\npath = [[0, 0]]\ntimes_s = [0]\nforce_newton = [[0, 2], [1, 2]]\nfriction = 0.5'
     made = st.simulate(f'body = "sensing-hand"\nrate_hz = 20\nduration_s = 1\n[layer]\nthickness_m = 0.005\n[sensor]\nkind = "ideal"\n[[touch]]\n{touch}\n')
-    assert len(made.recording.channels) == 93 and made.recording.body.name == "sensing-hand"
+    assert len(made.recording.channels) == 111 and made.recording.body.name == "sensing-hand"
     p = made.recording.engine(backend="cpu").process(made.recording.t, made.recording.values)
     assert set(p.letters) >= {"sustained", "shear"} and np.isfinite(p.select(letters="shear")["friction"]).any()
 

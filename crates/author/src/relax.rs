@@ -8,6 +8,7 @@ use crate::body::{NONE, SurfaceIndex, Topology, area_vector, point_tree};
 use crate::error::Result;
 use crate::field::Relaxation;
 use crate::field::geodesic::barycentric;
+use crate::parallel;
 
 /// Rounds that give about all that there is to gain; fewer where surface counts unequally, as points keep their numbers better then.
 const ROUNDS: usize = 30;
@@ -62,11 +63,11 @@ pub(super) fn relax(
     };
     let corners = |triangle: usize| triangles[triangle].map(|v| positions[v as usize]);
     let rounds = if matches!(weight, Weight::Density(_)) { WEIGHTED_ROUNDS } else { ROUNDS };
-    let mut relaxation = match weight {
-        Weight::Same => Relaxation::new(topology, &points, spacing_m, None),
+    let mut relaxations = match weight {
+        Weight::Same => Relaxation::of_points(topology, &points, spacing_m, None),
         Weight::Open(is_open) => {
             let weight = |p: DVec3, normal: DVec3| if is_open(p, normal) { 1.0 } else { 0.0 };
-            Relaxation::new(topology, &points, spacing_m, Some(&weight))
+            Relaxation::of_points(topology, &points, spacing_m, Some(&weight))
         }
         Weight::Density(density) => {
             let index = SurfaceIndex::of_triangles((0..triangles.len()).map(corners));
@@ -74,20 +75,21 @@ pub(super) fn relax(
             let weight = |p: DVec3, normal: DVec3| {
                 on_surface(&index, corners, p, normal).map_or(0.0, |at| density(&at).max(0.0).powi(2))
             };
-            Relaxation::new(topology, &points, spacing_m, Some(&weight))
+            Relaxation::of_points(topology, &points, spacing_m, Some(&weight))
         }
     };
     for round in 0..rounds {
         report_progress(progress, round as f64 / rounds as f64)?;
-        relaxation.round(1.0);
+        parallel::for_each(parallel::threads(), &mut relaxations, |one: &mut Relaxation| one.round(1.0));
     }
-    let moved = relaxation.points();
+    let mut moved: Vec<(usize, (DVec3, DVec3))> = relaxations.iter().flat_map(Relaxation::points).collect();
+    moved.sort_by_key(|(number, _)| *number);
+    let moved: Vec<(DVec3, DVec3)> = moved.into_iter().map(|(_, point)| point).collect();
     let tree = point_tree(moved.iter().map(|(position, _)| *position));
     let is_near = |triangle: &usize| {
         let [a, b, c] = corners(*triangle);
         let reach_m = DEVIATION * spacing_m + a.distance(b).max(a.distance(c));
-        let nearest = tree.nearest_neighbor_iter_with_distance_2(a.to_array()).next();
-        nearest.is_some_and(|(_, squared)| squared <= reach_m * reach_m)
+        tree.locate_within_distance(a.to_array(), reach_m * reach_m).next().is_some()
     };
     let near: Vec<usize> = (0..triangles.len()).filter(is_near).collect();
     let index = SurfaceIndex::of_triangles(near.iter().map(|&triangle| corners(triangle)));

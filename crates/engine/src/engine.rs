@@ -27,7 +27,7 @@ mod touch_warmth;
 use self::cadence::OnChange;
 use self::check::Check;
 use self::drift_state::DriftState;
-use self::ids::{checked_by_pressure, no_channel, taxels_of};
+use self::ids::{checked_by_pressure, no_channel, taxels_of, with_codes_of_senses};
 use self::input::Input;
 use self::links::Links;
 use self::on_skin::OnSkin;
@@ -146,7 +146,7 @@ impl Engine {
         }
         let chosen = backend::choose(kind, &plan, batch.max(1))?;
         let layer = calibration.layer;
-        let calibration = checked_by_pressure(body, calibration);
+        let calibration = with_codes_of_senses(body, checked_by_pressure(body, calibration));
         let beside = if calibration.checks.isolated_ratio.is_some() { neighbours(body) } else { Vec::new() };
         let mut engine = Self {
             steps: Vec::new(),

@@ -10,7 +10,7 @@ use super::log::{About, Event, EventKind};
 use super::scene::PageScene;
 use super::series::{Series, Trail};
 use super::snapshot::Snapshot;
-use crate::signal::{BoardHealth, Frame, Pose, RawValue};
+use crate::signal::{BoardHealth, Frame, Pose, RawValue, Reading};
 use somatic_engine::percept::{Percepts, TouchTrails};
 use somatic_engine::scene::Plan;
 
@@ -24,6 +24,8 @@ pub struct PageInput<'a> {
     pub frame: &'a Frame,
     /// The values that its percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
     pub values_read: Option<&'a [RawValue]>,
+    /// What is wrong with values that were corrected ([`Engine::values_noted`](somatic_engine::Engine::values_noted)).
+    pub values_noted: &'a [(usize, Reading)],
     /// The values that its letters beside pressure are made of ([`Engine::values_sensed`](somatic_engine::Engine::values_sensed)).
     pub values_sensed: &'a [RawValue],
     /// The engine's plan as it is after the call.
@@ -107,6 +109,10 @@ impl Publisher {
                 _ => own,
             };
         }
+        let is_off = |(_, reading): &&(usize, Reading)| matches!(reading, Reading::Value(..));
+        let channel = |(taxel, _): &(usize, Reading)| input.plan.body_taxels.binary_search(taxel).ok();
+        snapshot.out_of_range.clear();
+        snapshot.out_of_range.extend(input.values_noted.iter().filter(is_off).filter_map(channel));
         snapshot.sensed.clear();
         snapshot.sensed.extend_from_slice(input.values_sensed);
         snapshot.poses.clear();

@@ -61,6 +61,8 @@ pub(super) struct Readings {
     health: Vec<u8>,
     /// What they are made of.
     raw: Vec<RawValue>,
+    /// Channels that were out of range before they were corrected.
+    out_of_range: Vec<usize>,
     /// Taxels that read something else, if there are any; their values and states are among those above.
     senses: Option<Sensed>,
     /// Counts the frames that read differently from the one before.
@@ -105,6 +107,7 @@ impl Readings {
             pressures: vec![f32::NAN; taxels],
             health: vec![Health::LeftOut as u8; taxels],
             raw: Vec::new(),
+            out_of_range: Vec::new(),
             senses: senses.map(|of| Sensed {
                 of: of.clone(),
                 raw: Vec::new(),
@@ -140,11 +143,13 @@ impl Readings {
     /// Reads `snapshot`; the largest pressure in it.
     pub(super) fn read(&mut self, snapshot: &Snapshot) -> f64 {
         let has_sensed = self.senses.as_ref().is_some_and(|senses| senses.raw != snapshot.sensed);
-        if self.take_baselines(snapshot) || self.raw != snapshot.raw || has_sensed {
+        let is_changed = self.raw != snapshot.raw || self.out_of_range != snapshot.out_of_range;
+        if self.take_baselines(snapshot) || is_changed || has_sensed {
             self.raw.clone_from(&snapshot.raw);
+            self.out_of_range.clone_from(&snapshot.out_of_range);
             self.changes += 1;
             for channel in 0..self.raw.len() {
-                let reading = self.of_channel(channel, self.raw[channel]);
+                let reading = self.of_channel(channel, snapshot);
                 let taxel = self.plan.body_taxels[channel];
                 self.pressures[taxel] = reading.pressure.map_or(f32::NAN, |pressure| pressure as f32);
                 self.health[taxel] = reading.health as u8;
@@ -193,7 +198,7 @@ impl Readings {
             // What is read of all taxels is of another calibration.
             self.raw.clear();
         }
-        self.of_channel(channel, snapshot.raw[channel])
+        self.of_channel(channel, snapshot)
     }
 
     fn take_baselines(&mut self, snapshot: &Snapshot) -> bool {
@@ -207,7 +212,9 @@ impl Readings {
         changed
     }
 
-    fn of_channel(&self, channel: usize, value: RawValue) -> Reading {
+    fn of_channel(&self, channel: usize, snapshot: &Snapshot) -> Reading {
+        let value = snapshot.raw[channel];
+        let was_out_of_range = snapshot.out_of_range.binary_search(&channel).is_ok();
         let taxel = &self.plan.calibrations[channel];
         let pressure = reference(value, taxel, self.plan.curve_of(channel));
         let flags = Flags::from_bits_truncate(pressure.status & !UNUSABLE);
@@ -218,7 +225,7 @@ impl Readings {
             () if value.is_missing() => Health::Missing,
             () if flags.contains(Flags::FAULTY_INPUT) => Health::Faulty,
             () if flags.contains(Flags::SATURATED) => Health::Saturated,
-            () if flags.contains(Flags::OUT_OF_RANGE) => Health::OutOfRange,
+            () if was_out_of_range || flags.contains(Flags::OUT_OF_RANGE) => Health::OutOfRange,
             () => Health::Good,
         };
         let is_usable = matches!(health, Health::Good | Health::Saturated | Health::OutOfRange);
@@ -351,6 +358,12 @@ mod tests {
         snapshot.sensed[0] = RawValue::new(22.0);
         readings.read(&snapshot);
         assert_eq!((readings.changes(), readings.pressures()[2]), (2, 22.0), "what is sensed alone is a change");
+        // What was out of range before it was corrected does not show in its value.
+        snapshot.out_of_range = vec![0];
+        readings.read(&snapshot);
+        assert_eq!((readings.changes(), readings.health()[0]), (3, Health::OutOfRange as u8));
+        assert_eq!([0, 1].map(|taxel| readings.taxel(&snapshot, taxel).health), [Health::OutOfRange, Health::Good]);
+        assert_eq!(readings.pressures()[0], 2.0);
         // Without their channels they are not sent, and a plan of pressure alone has none of this.
         let unsent = PageSenses::new(&body, &plan, &ids[..2], SenseRanges::default()).unwrap();
         snapshot.sensed.fill(RawValue::MISSING);

@@ -20,6 +20,8 @@ pub(super) struct Snapshot {
     pub(super) call_us: f32,
     /// By the plan's channels.
     pub(super) raw: Vec<RawValue>,
+    /// The plan's channels, ascending, that were out of range, or what corrects them was, before they were corrected.
+    pub(super) out_of_range: Vec<usize>,
     /// By the channels of other letters than pressure.
     pub(super) sensed: Vec<RawValue>,
     /// How often the calibration had changed for the baselines.
@@ -49,6 +51,7 @@ impl Snapshot {
             arrived: Instant::now(),
             call_us: f32::NAN,
             raw: vec![RawValue::MISSING; plan.channels()],
+            out_of_range: Vec::new(),
             sensed: Vec::new(),
             calibration_changes: 0,
             baselines: Vec::new(),

@@ -87,6 +87,20 @@ fn body() -> Body {
     }
 }
 
+/// The last of the frames that `engine` went through.
+fn input_of<'a>(engine: &'a Engine, frame: &'a Frame, arrived: Instant) -> PageInput<'a> {
+    PageInput {
+        frame,
+        values_read: engine.values_read(),
+        values_noted: engine.values_noted(),
+        values_sensed: engine.values_sensed(),
+        plan: engine.plan(),
+        arrived: Some(arrived),
+        call_us: 12.5,
+        number: None,
+    }
+}
+
 /// Everything from an engine to a viewer, without sockets.
 struct Bench {
     engine: Engine,
@@ -139,15 +153,7 @@ impl Bench {
     /// Through the engine, and over to the server's side.
     fn process(&mut self, frames: &[Frame]) {
         self.engine.process(frames).unwrap();
-        self.publisher.read(&PageInput {
-            frame: &frames[frames.len() - 1],
-            values_read: self.engine.values_read(),
-            values_sensed: self.engine.values_sensed(),
-            plan: self.engine.plan(),
-            arrived: Some(self.arrived),
-            call_us: 12.5,
-            number: None,
-        });
+        self.publisher.read(&input_of(&self.engine, &frames[frames.len() - 1], self.arrived));
         self.publisher.publish(self.engine.percepts());
         let mut shared = self.exchange.lock();
         assert!(std::mem::take(&mut shared.is_new));
@@ -399,15 +405,7 @@ fn the_steady_state_does_not_allocate() {
     }
     bench.engine.process_one(&frame).unwrap();
     let (publisher, percepts) = (&mut bench.publisher, bench.engine.percepts());
-    let input = PageInput {
-        frame: &frame,
-        values_read: bench.engine.values_read(),
-        values_sensed: bench.engine.values_sensed(),
-        plan: bench.engine.plan(),
-        arrived: None,
-        call_us: 1.0,
-        number: None,
-    };
+    let input = input_of(&bench.engine, &frame, bench.arrived);
     let measured = allocation_counter::measure(|| {
         for _ in 0..1000 {
             publisher.read(&input);

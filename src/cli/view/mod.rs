@@ -209,6 +209,7 @@ impl Opening<'_> {
         opened.publisher.read(&PageInput {
             frame: &frame,
             values_read: None,
+            values_noted: &[],
             values_sensed: &[],
             plan: engine.plan(),
             arrived: None,

@@ -251,7 +251,8 @@ impl Player {
         let call_us = started.elapsed().as_secs_f32() * 1e6 / count as f32;
         self.publisher.read(&PageInput {
             frame,
-            values_read: None,
+            values_read: self.engine.values_read(),
+            values_noted: self.engine.values_noted(),
             values_sensed: self.engine.values_sensed(),
             plan: self.engine.plan(),
             arrived: Some(started),

@@ -3,12 +3,12 @@
 //! They are exact by [`LogMap`]; if the surface is too rough for that, or there is none, approximate along a net: the
 //! surface's edges, or lines between neighbouring taxels.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use glam::{DVec2, DVec3};
 
+use super::net::Net;
 use crate::body::point_tree;
 use crate::field::LinkSurface;
 use crate::field::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
@@ -40,9 +40,6 @@ pub(super) struct TaxelDistance {
 
 const UNREACHED: TaxelDistance = TaxelDistance { distance_m: f64::INFINITY, uv: None };
 
-/// Per node the nodes beside it and the ways there, m: the surface's vertices, then the taxels.
-type Net = Vec<Vec<(u32, f64)>>;
-
 /// Taxels of one link, and the distances between them.
 pub(super) struct LinkDistances {
     /// Indices of the taxels in their body.
@@ -53,6 +50,7 @@ pub(super) struct LinkDistances {
     places: Vec<SurfacePlace>,
     /// The limit from which exact distances have failed, m.
     too_long_m: Option<f64>,
+    /// Its nodes are the surface's vertices, then the taxels.
     net: Option<Net>,
     /// The same with lines between taxels of parts that do not meet.
     joined_net: Option<Net>,
@@ -150,7 +148,7 @@ impl LinkDistances {
             return self.along_net(from, f64::INFINITY, wanted).into_iter().map(|way| way.distance_m).collect();
         }
         let net = self.joined_net.take().unwrap_or_else(|| self.joined());
-        let lengths_m = self.along(&net, from, f64::INFINITY, wanted);
+        let lengths_m = net.lengths(from, f64::INFINITY, wanted);
         self.joined_net = Some(net);
         lengths_m
     }
@@ -162,50 +160,14 @@ impl LinkDistances {
             None if self.places.is_empty() => self.beside(),
             None => self.along_edges(),
         };
-        let lengths_m = self.along(&net, from, limit_m, wanted);
+        let lengths_m = net.lengths(from, limit_m, wanted);
         self.net = Some(net);
         lengths_m.into_iter().map(|distance_m| TaxelDistance { distance_m, uv: None }).collect()
-    }
-
-    /// The lengths of the ways in `net` from taxel `from` to the taxels (Dijkstra), final for those `wanted`.
-    fn along(&self, net: &Net, from: usize, limit_m: f64, wanted: Option<&[usize]>) -> Vec<f64> {
-        let first_taxel = if self.places.is_empty() { 0 } else { self.surface.topology.positions.len() };
-        let mut lengths = vec![f64::INFINITY; net.len()];
-        // Non-negative floats sort like their bits.
-        let mut open = BinaryHeap::from([(Reverse(0_u64), (first_taxel + from) as u32)]);
-        lengths[first_taxel + from] = 0.0;
-        let mut is_wanted = vec![false; if wanted.is_some() { self.len() } else { 0 }];
-        wanted.iter().copied().flatten().for_each(|&taxel| is_wanted[taxel] = true);
-        let mut missing = wanted.map_or(usize::MAX, <[usize]>::len);
-        // Each entry is a shorter length of a node than before, or is skipped.
-        while let Some((Reverse(bits), node)) = open.pop() {
-            let length = f64::from_bits(bits);
-            if length > lengths[node as usize] {
-                continue;
-            }
-            if let Some(wanted) = (node as usize).checked_sub(first_taxel).and_then(|i| is_wanted.get_mut(i))
-                && std::mem::replace(wanted, false)
-            {
-                missing -= 1;
-                if missing == 0 {
-                    break;
-                }
-            }
-            for &(next, step) in &net[node as usize] {
-                let through = length + step;
-                if through < lengths[next as usize] && through <= limit_m {
-                    lengths[next as usize] = through;
-                    open.push((Reverse(through.to_bits()), next));
-                }
-            }
-        }
-        lengths.split_off(first_taxel)
     }
 
     /// The net of the surface's edges, and lines between taxels near each other on parts that do not meet.
     fn joined(&self) -> Net {
         let mut net = self.along_edges();
-        let first_taxel = net.len() - self.len();
         let tree = point_tree(self.points.iter().map(|(position, _)| *position));
         let apart = |i: usize, j: usize| self.points[i].0.distance(self.points[j].0);
         let near = |i: usize| {
@@ -219,8 +181,7 @@ impl LinkDistances {
         for i in 0..self.len() {
             let beyond = |&j: &usize| part(i) != part(j) && self.points[i].1.dot(self.points[j].1) > 0.0;
             for j in near(i).take_while(|&j| apart(i, j) <= reach_m).filter(beyond).take(MAX_JOINED) {
-                net[first_taxel + i].push(((first_taxel + j) as u32, apart(i, j)));
-                net[first_taxel + j].push(((first_taxel + i) as u32, apart(i, j)));
+                net.join(i, j, apart(i, j));
             }
         }
         self.join_few(&mut net, near);
@@ -229,13 +190,12 @@ impl LinkDistances {
 
     /// Joins each set of fewer than [`FEW`] taxels that `net` connects to the taxel nearest to it: alone they would be no patch.
     fn join_few<'n, Near: Iterator<Item = usize> + 'n>(&self, net: &mut Net, near: impl Fn(usize) -> Near) {
-        let first_taxel = net.len() - self.len();
         let mut is_seen = vec![false; self.len()];
         for i in 0..self.len() {
             if std::mem::replace(&mut is_seen[i], true) {
                 continue;
             }
-            let lengths_m = self.along(net, i, f64::INFINITY, None);
+            let lengths_m = net.lengths(i, f64::INFINITY, None);
             let own: Vec<usize> = (0..self.len()).filter(|&j| lengths_m[j] < f64::INFINITY).collect();
             own.iter().for_each(|&j| is_seen[j] = true);
             if own.len() >= FEW {
@@ -244,8 +204,7 @@ impl LinkDistances {
             let beyond = own.iter().filter_map(|&a| Some((a, near(a).find(|b| !own.contains(b))?)));
             let apart = |(a, b): (usize, usize)| self.points[a].0.distance(self.points[b].0);
             if let Some((a, b)) = beyond.min_by(|x, y| apart(*x).total_cmp(&apart(*y))) {
-                net[first_taxel + a].push(((first_taxel + b) as u32, apart((a, b))));
-                net[first_taxel + b].push(((first_taxel + a) as u32, apart((a, b))));
+                net.join(a, b, apart((a, b)));
             }
         }
     }
@@ -253,15 +212,13 @@ impl LinkDistances {
     /// The net of the surface's edges, with each taxel connected to its triangle's corners and nearest taxels.
     fn along_edges(&self) -> Net {
         let vertices = &self.surface.topology.positions;
-        let mut net = vec![Vec::new(); vertices.len() + self.len()];
-        let mut join = |a: usize, b: usize, length: f64| {
-            net[a].push((b as u32, length));
-            net[b].push((a as u32, length));
-        };
-        for triangle in &self.surface.topology.triangles {
-            let [a, b, c] = triangle.map(|v| v as usize);
-            for (p, q) in [(a, b), (b, c), (c, a)] {
-                join(p, q, vertices[p].distance(vertices[q]));
+        let mut ways = Vec::with_capacity(self.surface.topology.across.len() + 3 * self.len());
+        let mut join = |a: usize, b: usize, length: f64| ways.push((a as u32, b as u32, length));
+        for (edge, &beyond) in (0..).zip(&self.surface.topology.across) {
+            // One of two that are the same.
+            if edge < beyond {
+                let (p, q) = self.surface.topology.ends(edge);
+                join(p as usize, q as usize, vertices[p as usize].distance(vertices[q as usize]));
             }
         }
         let at: Vec<DVec3> = self.places.iter().map(|place| place.position(&self.surface.topology)).collect();
@@ -281,7 +238,7 @@ impl LinkDistances {
                 });
             }
         }
-        net
+        Net::new(vertices.len() + self.len(), self.len(), &ways)
     }
 
     /// The net of neighbouring taxels with normals less than 90° apart.
@@ -293,10 +250,10 @@ impl LinkDistances {
         distances.sort_by(f64::total_cmp);
         let reach = NEIGHBOUR_DISTANCE * distances.get(distances.len() / 2).copied().unwrap_or(0.0);
         let same_side = |i: usize, j: usize| self.points[i].1.dot(self.points[j].1) > 0.0;
-        let around = |i: usize| {
-            let near = others(i).filter(|&j| apart(i, j) <= reach && same_side(i, j));
-            near.map(|j| (j as u32, apart(i, j))).collect()
-        };
-        (0..self.len()).map(around).collect()
+        let mut net = Net::new(self.len(), self.len(), &[]);
+        for i in 0..self.len() {
+            (0..i).filter(|&j| apart(i, j) <= reach && same_side(i, j)).for_each(|j| net.join(i, j, apart(i, j)));
+        }
+        net
     }
 }

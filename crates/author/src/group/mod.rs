@@ -13,6 +13,7 @@ mod even;
 mod grouper;
 mod halves;
 mod link_names;
+mod net;
 mod painted;
 mod patches;
 mod rule;

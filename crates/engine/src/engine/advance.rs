@@ -15,7 +15,7 @@ use super::touch_check::TouchCheck;
 use crate::backend::{Delivered, FieldState, Picks, RawBatch, Rows};
 use crate::error::{Error, Result, nearest};
 use crate::scene::{SensedTaxels, SensedValue};
-use crate::signal::{Axis, Channel, Frame, RawValue};
+use crate::signal::{Axis, Channel, Frame, RawValue, Reading};
 
 /// Frames until `go_on` is asked first.
 const FIRST_PART: usize = 256;
@@ -54,6 +54,13 @@ impl Engine {
             }
         }
         raw
+    }
+
+    /// What was wrong in the last frame with values that are corrected by others, or with these, by taxel of the body, ascending: as fields and
+    /// touches are flagged for it.
+    #[doc(hidden)]
+    pub fn values_noted(&self) -> &[(usize, Reading)] {
+        self.intake.notes().last().map_or(&[], Vec::as_slice)
     }
 
     /// The values that the last frame's letters beside pressure were made of, by
@@ -108,6 +115,11 @@ impl Engine {
             }
             if let Some(state) = &mut self.drift {
                 let channels = self.plan.channels();
+                for taxel in self.intake.at_ends().get(index).into_iter().flatten() {
+                    if let Ok(channel) = self.plan.body_taxels.binary_search(taxel) {
+                        state.compensation.note_at_end(channel);
+                    }
+                }
                 state.compensation.observe(frames[index].t_s, &self.raw[index * channels..][..channels]);
             }
         }

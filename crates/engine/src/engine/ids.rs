@@ -1,6 +1,6 @@
 //! Ids in words, and what belongs to which.
 
-use crate::body::Body;
+use crate::body::{Body, Modality};
 use crate::error::Error;
 use crate::signal::{Calibration, Channel};
 
@@ -36,6 +36,24 @@ fn ranges(ids: &[u32]) -> String {
 pub(super) fn checked_by_pressure(body: &Body, mut calibration: Calibration) -> Calibration {
     let others = body.taxels.iter().zip(&mut calibration.taxels).filter(|(taxel, _)| !taxel.modality.is_pressed());
     others.for_each(|(_, own)| own.mask = true);
+    calibration
+}
+
+/// `calibration` whose codes of temperatures and distances that are no readings are those of their taxels, as what `[all]` and `[taxel.N]` have
+/// of them is: all are missing before values are held.
+pub(super) fn with_codes_of_senses(body: &Body, mut calibration: Calibration) -> Calibration {
+    for (index, taxel) in body.taxels.iter().enumerate() {
+        let sense = match taxel.modality {
+            Modality::Temperature => &calibration.temperature,
+            Modality::Proximity => &calibration.proximity,
+            _ => continue,
+        };
+        let codes = &sense.of_taxel(index).missing;
+        if !codes.is_empty() {
+            calibration.missing.resize(body.taxels.len(), Vec::new());
+            calibration.missing[index].extend(codes);
+        }
+    }
     calibration
 }
 

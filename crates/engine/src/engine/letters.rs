@@ -223,7 +223,7 @@ impl Cell<'_> {
                 Some(gradient) => {
                     made.give(Outputs::TEMPERATURE_GRADIENT, Host::TemperatureGradient, &gradient.to_array());
                 }
-                None => made.flags |= Flags::COINCIDENT,
+                None => made.flags |= Flags::NO_GRADIENT,
             }
         }
         let sensed = &self.field.sensed;

@@ -192,15 +192,16 @@ impl OnSkin {
             if let Some(sigmas) = &mut self.sigmas {
                 sigmas.add((plan, self.touches.skin()), raw, offset, pressures, &mut found);
             }
-            if let Some(senses) = &mut self.senses {
-                let sensed = Sensed { t_s: frame.t_s, raw, offset, row: sensed.row(index), pressures };
-                senses.add((plan, self.touches.skin()), &sensed, &mut found);
-            }
             self.poses.clear();
             if !found.touches.is_empty() && links.may_pose(frame) {
                 links.poses_into(index, frame, &mut self.poses);
-                put_in_world(&self.poses, &mut found);
             }
+            if let Some(senses) = &mut self.senses {
+                let (row, poses) = (sensed.row(index), &self.poses[..]);
+                let sensed = Sensed { t_s: frame.t_s, raw, offset, row, pressures, poses };
+                senses.add((plan, self.touches.skin()), &sensed, &mut found);
+            }
+            put_in_world(&self.poses, &mut found);
             if let Some(self_contacts) = &mut self.self_contacts {
                 let (contacts, are_known) = self_contacts.find(&found, input.restarts);
                 percepts.push_self_contacts(contacts, are_known);
@@ -366,7 +367,7 @@ fn sigma(plan: &Plan, channel: usize) -> f64 {
 /// Puts the touches whose links `poses` has into the world.
 fn put_in_world(poses: &[Option<DAffine3>], found: &mut TouchFrame) {
     for touch in &mut found.touches {
-        let Some(world_from_link) = poses[touch.link as usize] else { continue };
+        let Some(world_from_link) = poses.get(touch.link as usize).copied().flatten() else { continue };
         let turn = |direction: &mut DVec3| *direction = world_from_link.transform_vector3(*direction);
         touch.position = world_from_link.transform_point3(touch.position);
         touch.centre = world_from_link.transform_point3(touch.centre);

@@ -3,10 +3,10 @@
 //! Sums, direction, torsion and friction are those of stage *shear*, over the taxels of a touch that have three axes and whose tangential
 //! forces are known, in the touch's chart: a taxel counts as in the touch's place, and s and torsion are scaled by ΣP/ΣwP, so that they
 //! are in the unit of the touch's total. The force has the normal part of all other taxels of the touch, too. Around a limb, where there is
-//! no chart, forces are added up in space, and the torsion is that across the plane of the touch's base. Tangential forces are a part
+//! no chart, the torsion is that across the plane of the touch's base. Tangential forces are a part
 //! of wrenches.
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
 use super::pulls::{Sides, Tangential, tangential};
 use super::touch_warmth::{Trends, Warmth};
@@ -65,6 +65,8 @@ pub(super) struct Sensed<'a> {
     pub(super) row: &'a [RawValue],
     /// P by node.
     pub(super) pressures: &'a [f64],
+    /// Where links are in the world, by link; empty if none is posed.
+    pub(super) poses: &'a [Option<DAffine3>],
 }
 
 /// Finds them.
@@ -138,7 +140,7 @@ impl TouchSenses {
         self.warmth.iter_mut().for_each(|warmth| warmth.set_trends(trends));
     }
 
-    /// Puts them into the touches `found` of a frame, in the frames of their links, and what pulls into their wrenches.
+    /// Puts them into the touches `found` of a frame, directions in the frames of their links, and what pulls into their wrenches.
     pub(super) fn add(&mut self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, found: &mut TouchFrame) {
         if self.calibration_changes != plan.calibration_changes {
             self.calibrate(plan);
@@ -151,7 +153,7 @@ impl TouchSenses {
             let [from, to] = touch.taxels.map(|end| end as usize);
             let nodes = &taxels[from..to];
             if let Some(warmth) = &mut self.warmth {
-                warmth.add((plan, skin), (sensed.t_s, sensed.row), nodes, touch);
+                warmth.add((plan, skin), (sensed.t_s, sensed.row, sensed.poses), nodes, touch);
             }
             if self.wanted.intersects(OF_PULLS) && self.look(plan, sensed, nodes, touch) {
                 let [from, to] = touch.links.map(|end| end as usize);
@@ -317,7 +319,6 @@ impl TouchSenses {
         let first_slot = plan.touched_from.unwrap_or(0);
         let chart = TouchChart::new(skin, touch);
         let in_chart = found.along_chart.normalize_or(DVec2::X);
-        let in_space = found.in_space().try_normalize();
         self.pulls.iter().filter(|pull| pull.felt.is_some()).try_fold(0.0, |sum, pull| {
             let node = pull.node as usize;
             let (calibration, own) = (&plan.calibrations[node], self.pulled[node].as_ref()?);
@@ -328,11 +329,10 @@ impl TouchSenses {
                 of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
                 of_sides: gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),
             };
-            let along = match in_space {
-                _ if !chart.is_wrapped => chart.tangents(pull).map(|tangent| tangent.dot(in_chart)),
-                Some(in_space) => pull.tangents_in_body.map(|tangent| tangent.dot(in_space)),
-                // Where nothing pulls, every direction is as good.
-                None => [1.0, 0.0],
+            let along = match pull.felt {
+                // Around a limb, each along its own direction; where nothing pulls, every direction is as good.
+                Some(felt) if chart.is_wrapped => DVec2::from_array(felt.forces).normalize_or(DVec2::X).to_array(),
+                _ => chart.tangents(pull).map(|tangent| tangent.dot(in_chart)),
             };
             Some(sum + skin.taxels()[node].weight().powi(2) * noise.variance(by, along, friction))
         })

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use crate::body::{Body, Modality};
 use crate::percept::{Touch, TouchFlags};
@@ -24,12 +24,27 @@ struct WarmTaxel {
     /// Its place in the body.
     taxel: usize,
     id: u32,
+    link: u32,
     /// Where its value is among those that are read beside pressures.
     value: usize,
     /// On the body at rest.
     position: DVec3,
     /// The mean normal of the skin at its nearest pressure taxel.
     mean_normal: DVec3,
+}
+
+impl WarmTaxel {
+    /// Where it is, in the world if the touch's link is posed, else in that link's frame: there, and if its own link is not posed, as on the
+    /// body at rest.
+    fn in_frame_of(&self, touch: &Touch, skin: &Skin, poses: &[Option<DAffine3>]) -> DVec3 {
+        let pose_of = |link: u32| poses.get(link as usize).copied().flatten();
+        let (link, world_from_link) = match (pose_of(touch.link), pose_of(self.link)) {
+            (None, _) => (touch.link, DAffine3::IDENTITY),
+            (Some(world_from_link), None) => (touch.link, world_from_link),
+            (Some(_), Some(world_from_link)) => (self.link, world_from_link),
+        };
+        world_from_link.transform_point3(skin.link_from_body(link).transform_point3(self.position))
+    }
 }
 
 /// How the temperature under each touch went, by the touch's id.
@@ -71,7 +86,8 @@ impl Warmth {
                 && far(node.position) <= REACH * node.cell_m2.sqrt()
             {
                 by_node.entry(number).or_default().push(taxels.len());
-                taxels.push(WarmTaxel { taxel, id: own.id, value, position, mean_normal: node.mean_normal });
+                let (link, mean_normal) = (own.link as u32, node.mean_normal);
+                taxels.push(WarmTaxel { taxel, id: own.id, link, value, position, mean_normal });
             }
         }
         (!taxels.is_empty()).then(|| Self {
@@ -117,11 +133,12 @@ impl Warmth {
         }
     }
 
-    /// Gives `touch`, whose taxels are `nodes`, what it has of temperature at `t_s`. `row` has the values that are read beside pressures.
+    /// Gives `touch`, whose taxels are `nodes`, what it has of temperature at `t_s`. `row` has the values that are read beside pressures,
+    /// and `poses` where links are in the world, by link.
     pub(super) fn add(
         &mut self,
         (plan, skin): (&Plan, &Skin),
-        (t_s, row): (f64, &[RawValue]),
+        (t_s, row, poses): (f64, &[RawValue], &[Option<DAffine3>]),
         nodes: &[u32],
         touch: &mut Touch,
     ) {
@@ -133,11 +150,13 @@ impl Warmth {
         touch.temperature_celsius = Some(temperature::mean(&self.warm));
         if let Some(warmest) = temperature::extreme(&self.warm, |a, b| a > b) {
             touch.warmest_celsius = Some(self.warm[warmest].celsius);
-            touch.warmest_taxel = Some(self.taxels[self.read[warmest]].id);
+            let own = &self.taxels[self.read[warmest]];
+            (touch.warmest_taxel, touch.warmest_position) = (Some(own.id), Some(own.in_frame_of(touch, skin, poses)));
         }
         if let Some(coldest) = temperature::extreme(&self.warm, |a, b| a < b) {
             touch.coldest_celsius = Some(self.warm[coldest].celsius);
-            touch.coldest_taxel = Some(self.taxels[self.read[coldest]].id);
+            let own = &self.taxels[self.read[coldest]];
+            (touch.coldest_taxel, touch.coldest_position) = (Some(own.id), Some(own.in_frame_of(touch, skin, poses)));
         }
         // Around a limb there is no chart.
         let is_wrapped = touch.flags.contains(TouchFlags::WRAPPED);

@@ -312,7 +312,7 @@ columns! {
     FORCE_VECTOR 42 force_vector: [f64; 3], Newton, Vector, shear, parts [] host [ForceVector];
     #[doc = "Σ wᵢ(xᵢ − c) × sᵢ · n about the centroid c: how the touch twists, counter-clockwise seen from outside."]
     TORSION 43 torsion: f64, PMetre, Number, shear, parts [] host [Torsion];
-    #[doc = "‖s‖ / Σ wᵢPᵢ over the taxels whose sᵢ is known."]
+    #[doc = "‖s‖ / Σ wᵢPᵢ over the taxels whose sᵢ is known; without a chart Σ wᵢ‖sᵢ‖ / Σ wᵢPᵢ."]
     FRICTION 44 friction: f64, One, Number, shear, parts [] host [Friction];
     #[doc = "The standard deviation of the friction by the sensors' noise; only on request."]
     FRICTION_SIGMA 45 friction_sigma: f64, One, Number, shear, parts [] host [FrictionSigma];

@@ -15,8 +15,7 @@ bitflags! {
         const ONE_TAXEL = 1 << 1;
         /// The second and third farthest points are as good as equally far (R₂ − R₃ ≤ 2⁻¹⁴ R₁): orientation is in doubt.
         const TIE = 1 << 2;
-        /// The points that would define a line fall together: orientation (or axis) is absent. Or taxels that would define a plane lie
-        /// in a line, or are under three: the gradient is absent.
+        /// The points that would define a line fall together: orientation (or axis) is absent.
         const COINCIDENT = 1 << 3;
         /// The pressure spreads equally in all directions (anisotropy under 10⁻³): the axis is absent.
         const ISOTROPIC = 1 << 4;
@@ -55,6 +54,8 @@ bitflags! {
         const DRIFT_UNKNOWN = 1 << 18;
         /// P has no unit, or a taxel no area: the force is absent.
         const NO_UNIT = 1 << 19;
+        /// Under three temperature taxels have a reading, or they lie in a line: the gradient is absent.
+        const NO_GRADIENT = 1 << 20;
         /// The calibration does not say how noisy a pressed taxel is: there are no sigmas.
         const NOISE_UNKNOWN = 1 << 25;
         /// Noise alone may switch a taxel on or off, or turn the axis anyhow: what depends on it has no sigma.

@@ -149,10 +149,14 @@ pub struct Touch {
     pub warmest_celsius: Option<f64>,
     /// The id of the taxel that has it; of equal ones the lowest.
     pub warmest_taxel: Option<u32>,
+    /// Where that taxel is, m; in the world by the pose of its own link, if that is known.
+    pub warmest_position: Option<DVec3>,
     /// The lowest temperature of these, °C.
     pub coldest_celsius: Option<f64>,
     /// The id of the taxel that has it; of equal ones the lowest.
     pub coldest_taxel: Option<u32>,
+    /// Where that taxel is, m; in the world by the pose of its own link, if that is known.
+    pub coldest_position: Option<DVec3>,
     /// Gradient of their temperature along u and v of the touch's chart, K/m.
     pub temperature_gradient_kelvin_per_m: Option<[f64; 2]>,
     /// How fast their mean changes, K/s, over the window of the calibration.

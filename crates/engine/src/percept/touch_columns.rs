@@ -241,8 +241,10 @@ touch_columns! {
     TEMPERATURE "temperature" Celsius 1 "Mean of the temperature taxels that are nearest to its taxels, °C." |touch| one_of(touch.temperature_celsius);
     TEMPERATURE "warmest" Celsius 1 "The highest temperature of these, °C." |touch| one_of(touch.warmest_celsius);
     TEMPERATURE "warmest_taxel" One 1 "The id of the taxel that has it." |touch| one_of(touch.warmest_taxel.map(f64::from));
+    TEMPERATURE "warmest_position" Metre 3 "Where that is, m." |touch| vector(touch.warmest_position);
     TEMPERATURE "coldest" Celsius 1 "The lowest temperature of these, °C." |touch| one_of(touch.coldest_celsius);
     TEMPERATURE "coldest_taxel" One 1 "The id of the taxel that has it." |touch| one_of(touch.coldest_taxel.map(f64::from));
+    TEMPERATURE "coldest_position" Metre 3 "Where that is, m." |touch| vector(touch.coldest_position);
     TEMPERATURE "temperature_gradient" KelvinPerMetre 2 "Gradient of their temperature along u and v of its own chart, K/m." |touch| touch.temperature_gradient_kelvin_per_m.map(|[u, v]| [u, v, 0.0]);
     TEMPERATURE "temperature_rate" KelvinPerSecond 1 "How fast that mean changes, over the window of the calibration, K/s." |touch| one_of(touch.temperature_rate_kelvin_per_s);
 }

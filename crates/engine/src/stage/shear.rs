@@ -2,15 +2,15 @@
 //!
 //! Over the pressed taxels, at x in the chart with weight w, normal part P > 0 and tangential force s = sᵤ t + sᵥ n × t: the sum
 //! s = Σ wᵢsᵢ, along u and v of the chart and as a vector in space; its direction; the torsion Σ wᵢ(xᵢ − c) × sᵢ · n about the
-//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP, along the chart where there is one; and the force on the skin,
-//! Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A taxel whose s is not known is in none of these but the force, with its normal
+//! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP along the chart, and without a chart Σ w‖sᵢ‖/Σ wP, as a sum in space gets shorter
+//! where the skin is curved; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A taxel whose s is not known is in none of these but the force, with its normal
 //! part. A tangent comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost,
 //! as a sum in space loses it where the skin is curved.
 //!
 //! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend. Each sum goes over the taxels once,
 //! the torsion as Σ wx × s − c × Σ ws, and sums in space are turned into the world link by link.
 //!
-//! **Sigma.** A taxel's s along the direction e of the sum is e·C(P, u, v)ᵀ = aₚP + aᵤu + aᵥv, with C its `cross_axis` and u and v
+//! **Sigma.** A taxel's s along a direction e, that of the sum in the chart or without a chart its own, is e·C(P, u, v)ᵀ = aₚP + aᵤu + aᵥv, with C its `cross_axis` and u and v
 //! its tangential values. With σₚ and σ the standard deviations of P and of u and v, all of independent noise, that of the friction f is
 //! √(Σ w²((aₚ − f)²σₚ² + aᵤ²σᵤ² + aᵥ²σᵥ²))/Σ wP. Where P has bᵤu + bᵥv in it, by a third row of `cross_axis`, noise of P and of u goes
 //! together: then aᵤ(aᵤ + 2(aₚ − f)bᵤ) is in the place of aᵤ², and that of v alike.
@@ -56,6 +56,8 @@ pub(crate) struct Sums {
     turn: f64,
     /// Σ w of what each s is made of: what the sums' rounding is a share of.
     size: f64,
+    /// Σ w‖s‖.
+    lengths: f64,
     space: InSpace,
 }
 
@@ -85,6 +87,7 @@ impl Sums {
         self.moment += pull * place_m;
         self.turn += place_m.perp_dot(along_chart);
         self.size += weight * size;
+        self.lengths += weight * DVec2::new(su, sv).length();
         self.space.shear += weight * in_space;
         match taxel.newtons_per_p {
             Some(newtons) => self.space.force += newtons * (in_space - pressure * normal),
@@ -120,6 +123,7 @@ impl Sums {
         self.moment += other.moment;
         self.turn += other.turn;
         self.size += other.size;
+        self.lengths += other.lengths;
         self.space.shear += turn(other.space.shear);
         self.space.force += turn(other.space.force);
         self.space.lacks_force |= other.space.lacks_force;
@@ -146,10 +150,10 @@ impl Sums {
         (self.taxels > 1).then(|| self.turn - (self.moment / self.pull).perp_dot(self.along_chart))
     }
 
-    /// Of a field that has a chart if it is `charted`.
+    /// In the chart if there is one, which is `charted`.
     pub(crate) fn friction(&self, charted: bool) -> f64 {
-        let size = if charted { self.along_chart.length() } else { self.space.shear.length() };
-        size / self.pull
+        let length = if charted { self.along_chart.length() } else { self.lengths };
+        length / self.pull
     }
 }
 
@@ -288,8 +292,7 @@ mod tests {
         let tilted = |(turn, tangents)| Pulled { tangents, ..at(0.03 * turn, 0.0, 2.0, [1.0, 0.0]) };
         let sums = sums_of(&turns.into_iter().zip(&tangents).map(tilted).collect::<Vec<_>>());
         assert!((sums.friction(true) - 0.5).abs() < 1e-15);
-        // Without a chart it is that of what is left in space.
-        let left = (1.0 + 2.0 * 1.0_f64.cos()) / 6.0;
-        assert!((sums.friction(false) - left).abs() < 1e-15 && left < 0.4);
+        // Without a chart, too: of what pulls, less than 0.4 of what presses is left in space.
+        assert!((sums.friction(false) - 0.5).abs() < 1e-15 && sums.in_space().length() < 0.4 * sums.pull);
     }
 }

@@ -9,6 +9,8 @@ use std::collections::VecDeque;
 const SAMPLES: f64 = 128.0;
 /// Share of the window that samples must span before there is a slope.
 const SPANNED: f64 = 0.5;
+/// Windows without a frame that are a gap.
+const GAP: f64 = 2.0;
 
 /// The samples of a value over a window that ends now.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,7 +26,8 @@ impl Window {
     }
 
     /// Takes `value` at `t_s`; gives the slope, per second, over the last `window_s`, where samples span enough of it: from the last
-    /// sample on that is as old, so that slow frames have a slope too.
+    /// sample on that is as old, so that slow frames have a slope too. What is before a gap, of two windows in frames that were not
+    /// slow, is forgotten.
     ///
     /// The last sample is the newest value, whatever the distance to the one before: that is replaced until it lies far enough
     /// from its own predecessor. So the slope is the same however frames are cut into calls.
@@ -32,7 +35,7 @@ impl Window {
         match self.samples.back() {
             // Of frames with one time the last counts: coarse clocks give many of them.
             Some(&[last, _]) if t_s == last => drop(self.samples.pop_back()),
-            Some(&[last, _]) if t_s > last => {}
+            Some(&[last, _]) if t_s > last && !self.is_gap(t_s - last, window_s) => {}
             _ => self.samples.clear(),
         }
         if !t_s.is_finite() {
@@ -47,8 +50,19 @@ impl Window {
         while self.samples.get(1).is_some_and(|&[second, _]| t_s - second >= window_s * (1.0 - 1e-9)) {
             self.samples.pop_front();
         }
+        // A single frame before a gap does not say that it was one.
+        if self.samples.len() > 2 && t_s - self.samples[0][0] > GAP * window_s {
+            self.samples.pop_front();
+        }
         let span_s = t_s - self.samples.front()?[0];
         (span_s >= SPANNED * window_s).then(|| self.slope())
+    }
+
+    /// Whether the next frame comes after a gap if it comes `after_s` after the last one.
+    fn is_gap(&self, after_s: f64, window_s: f64) -> bool {
+        let mut last = self.samples.iter().rev().map(|[t_s, _]| t_s);
+        let are_slow = last.next().zip(last.next()).is_none_or(|(last, before)| last - before > window_s);
+        !are_slow && after_s > GAP * window_s
     }
 
     /// Σ(t − t̄)(x − x̄) / Σ(t − t̄)².
@@ -210,6 +224,30 @@ mod tests {
         });
         let slopes: Vec<f64> = slopes.collect();
         assert!(slopes[5] > 0.1 && slopes[5] < 3.0 && (slopes[60] - 4.0).abs() < 1e-9, "{slopes:?}");
+    }
+
+    #[test]
+    fn what_was_before_a_gap_does_not_count() {
+        for before in [1, 2, 300] {
+            let mut window = Window::default();
+            for frame in 0..before {
+                window.take(f64::from(frame) * 0.01, 50.0, 0.5);
+            }
+            let after = |frame: u32| (10.0 + f64::from(frame) * 0.01, 50.0 + 0.04 * f64::from(frame));
+            // One frame alone may be a slow one.
+            let first = window.take(after(0).0, after(0).1, 0.5);
+            assert_eq!(first.is_some(), before == 1, "{first:?}");
+            for frame in 1..100 {
+                let (t_s, value) = after(frame);
+                let slope = window.take(t_s, value, 0.5);
+                assert_eq!(slope.is_some(), frame >= 50 / 2, "{frame}");
+                assert!(slope.is_none_or(|slope| (slope - 4.0).abs() < 1e-9), "{slope:?}");
+            }
+        }
+        // Frames that are always slow have none.
+        let mut window = Window::default();
+        let slopes: Vec<_> = (0..5).map(|second| window.take(f64::from(second), f64::from(second), 0.1)).collect();
+        assert!(slopes[0].is_none() && slopes[1..].iter().all(|slope| slope.is_some_and(|slope| slope == 1.0)));
     }
 
     #[test]

@@ -55,7 +55,7 @@ use crate::body::Body;
 use crate::error::{Error, Result, nearest};
 use crate::percept::{Outputs, Percepts};
 use crate::scene::{Plan, PlannedField, SensedTaxels, SensedValue};
-use crate::signal::{BoardHealth, Frame, RawValue, Wiring};
+use crate::signal::{BoardHealth, Frame, RawValue, Reading, Wiring};
 
 /// Something that takes percepts.
 pub trait Sink {
@@ -201,6 +201,8 @@ pub struct InputFrames<'a> {
     pub plan: &'a Plan,
     /// The values that the last frame's percepts are made of ([`Engine::values_read`](somatic_engine::Engine::values_read)).
     pub values_read: Option<&'a [RawValue]>,
+    /// What is wrong with values that were corrected ([`Engine::values_noted`](somatic_engine::Engine::values_noted)).
+    pub values_noted: &'a [(usize, Reading)],
     /// The values that its letters beside pressure are made of ([`Engine::values_sensed`](somatic_engine::Engine::values_sensed)).
     pub values_sensed: &'a [RawValue],
     /// When the last frame arrived, if known.

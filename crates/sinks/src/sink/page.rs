@@ -54,6 +54,7 @@ impl Sink for PageSink {
             self.publisher.read(&PageInput {
                 frame,
                 values_read: input.values_read,
+                values_noted: input.values_noted,
                 values_sensed: input.values_sensed,
                 plan: input.plan,
                 arrived: input.arrived,

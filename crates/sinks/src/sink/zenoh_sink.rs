@@ -229,6 +229,7 @@ mod tests {
             sensed: &|_, _, _| (),
             plan: engine.plan(),
             values_read: None,
+            values_noted: &[],
             values_sensed: &[],
             arrived: None,
             call: Duration::ZERO,

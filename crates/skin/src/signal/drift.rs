@@ -151,6 +151,8 @@ struct TaxelState {
     halves: [Sum; 2],
     at_ends: u32,
     steps: f64,
+    /// Whether the next value was at an end of its range before it was corrected.
+    was_at_end: bool,
     /// Time without a change, at an end of its range, and without a number, s.
     unchanged_s: f64,
     at_end_s: f64,
@@ -175,6 +177,7 @@ impl TaxelState {
             halves: [Sum::default(); 2],
             at_ends: 0,
             steps: 0.0,
+            was_at_end: false,
             unchanged_s: 0.0,
             at_end_s: 0.0,
             silent_s: 0.0,
@@ -312,6 +315,12 @@ impl DriftCompensation {
         self.epoch_start_s.is_some_and(|start| t_s - start >= self.cadence_s() || t_s < start)
     }
 
+    /// Notes that the value of the taxel at `index` in the next frame was at an end of its range before it was corrected, which does not show
+    /// in what [`DriftCompensation::observe`] takes.
+    pub fn note_at_end(&mut self, index: usize) {
+        self.taxels[index].was_at_end = true;
+    }
+
     /// Takes the raw values of the frame at `t_s` into the current epoch.
     pub fn observe(&mut self, t_s: f64, values: &[RawValue]) {
         let dt_s = if self.epoch_start_s.is_some() { (t_s - self.last_t_s).max(0.0) } else { 0.0 };
@@ -319,6 +328,7 @@ impl DriftCompensation {
         let half = usize::from(t_s - start_s >= 0.5 * self.cadence_s());
         self.last_t_s = t_s;
         for (taxel, value) in self.taxels.iter_mut().zip(values) {
+            let was_at_end = std::mem::take(&mut taxel.was_at_end);
             let Some(value) = value.number() else {
                 taxel.silent_s += dt_s;
                 continue;
@@ -327,7 +337,7 @@ impl DriftCompensation {
             let step = taxel.last.map_or(0.0, |last| (value - last).abs());
             taxel.unchanged_s = if taxel.last.is_some() && step == 0.0 { taxel.unchanged_s + dt_s } else { 0.0 };
             let [low, high] = taxel.file.raw_range.map(f64::from);
-            let at_end = value <= low || value >= high;
+            let at_end = was_at_end || value <= low || value >= high;
             taxel.at_end_s = if at_end { taxel.at_end_s + dt_s } else { 0.0 };
             taxel.at_ends += u32::from(at_end);
             taxel.last = Some(value);

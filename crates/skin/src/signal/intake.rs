@@ -30,6 +30,8 @@ pub struct Intake {
     stale: Option<Vec<Vec<usize>>>,
     /// Per frame since then what is wrong with values that corrected ones are made of; empty if none are corrected.
     notes: Vec<Vec<(usize, Reading)>>,
+    /// Per frame since then the taxels whose values were at an end of their range before they were corrected; empty if none are corrected.
+    at_ends: Vec<Vec<usize>>,
 }
 
 /// What it knows of the frames so far.
@@ -69,6 +71,7 @@ impl Intake {
             rise: vec![0.0; taxels],
             stale: None,
             notes: Vec::new(),
+            at_ends: Vec::new(),
         };
         made.set_channels((0..channels).collect());
         made
@@ -125,10 +128,17 @@ impl Intake {
         &self.notes
     }
 
+    /// Per frame since [`Intake::forget_notes`] the taxels, ascending, whose values were at an end of their range, or beyond, before they were
+    /// corrected; empty if none are corrected.
+    pub fn at_ends(&self) -> &[Vec<usize>] {
+        &self.at_ends
+    }
+
     /// Forgets what was noted of the frames so far.
     pub fn forget_notes(&mut self) {
         self.stale.iter_mut().for_each(Vec::clear);
         self.notes.clear();
+        self.at_ends.clear();
     }
 
     /// The number of values of a frame.
@@ -169,6 +179,7 @@ impl Intake {
         self.is_rejected = settling || self.is_broken();
         if self.is_rejected {
             self.notes.extend((!self.corrected.is_empty()).then(Vec::new));
+            self.at_ends.extend((!self.corrected.is_empty()).then(Vec::new));
             out.extend(
                 slots
                     .iter()
@@ -191,12 +202,14 @@ impl Intake {
         if self.corrected.is_empty() {
             return;
         }
-        let mut noted = Vec::new();
+        let (mut noted, mut at_ends) = (Vec::new(), Vec::new());
         for Corrected { leak, channels: [normal, u, v], .. } in &self.corrected {
+            at_ends.extend(Some(*normal).filter(|&normal| leak.is_at_end(self.now[normal])));
             let note = |reading| noted.push((*normal, reading));
             self.now[*normal] = leak.corrected(self.now[*normal], [self.now[*u], self.now[*v]], note);
         }
         self.notes.push(noted);
+        self.at_ends.push(at_ends);
     }
 
     /// Appends to `out` the values of the channels `slots` in the last frame taken.
@@ -440,12 +453,17 @@ mod tests {
         seen.values[3] = RawValue::MISSING;
         assert_eq!(numbers(&take(&mut intake, &seen)), [Some(90.0), Some(200.0), Some(207.0)]);
         assert_eq!(intake.notes(), [[(2, Reading::Value(101.0, false))]]);
+        assert_eq!(intake.at_ends(), [[2]]);
         assert_eq!(intake.stale(), [[0_usize; 0]]);
         seen.values[6] = RawValue::STALE;
         seen.values[2] = RawValue::new(900.0);
+        // At the end itself it is in range.
+        seen.values[0] = RawValue::new(100.0);
         intake.forget_notes();
+        assert!(intake.at_ends().is_empty());
         // Taxel 3 is not believed alone: nothing more is to be said of it.
-        assert_eq!(numbers(&take(&mut intake, &seen)), [Some(120.0), Some(200.0), None]);
+        assert_eq!(numbers(&take(&mut intake, &seen)), [Some(200.0), Some(200.0), None]);
+        assert_eq!(intake.at_ends(), [[0, 2]]);
         assert_eq!((intake.stale(), intake.notes()), (&[vec![0, 6]][..], &[vec![(0, Reading::Missing)]][..]));
     }
     #[test]

@@ -50,6 +50,12 @@ impl Leak {
         RawValue::new(sum)
     }
 
+    /// Whether the raw normal value `raw` is at an end of its range, or beyond it.
+    pub(super) fn is_at_end(&self, raw: RawValue) -> bool {
+        let [low, high] = self.range;
+        believed(raw).is_some_and(|normal| normal <= low || normal >= high)
+    }
+
     /// The standard deviation of a corrected value, where that of a normal one is `noise` and of a tangential one `of_sides`, raw units.
     fn noise(&self, noise: f64, of_sides: f64) -> f64 {
         let [of_normal, of_u, of_v] = self.shares;

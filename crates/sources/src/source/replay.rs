@@ -84,7 +84,9 @@ impl Replay {
     fn next_repetition(&mut self) -> Result<bool> {
         self.losses = self.losses();
         self.played += 1;
-        if self.played == self.cut.times || !self.has_delivered {
+        // Whoever reads in batches asks again at the end.
+        let is_over = self.cut.times > 0 && self.played >= self.cut.times;
+        if is_over || !self.has_delivered {
             return Ok(false);
         }
         self.had_stale |= self.source.has_stale();
@@ -216,6 +218,23 @@ mod tests {
         let twice = played(ROWS, Cut { to_s: 1.0, times: 2, ..Cut::WHOLE }, 99).0;
         assert_eq!(twice, [(10.0, 1.0), (10.5, 2.0), (11.0, 1.0), (11.5, 2.0)]);
         assert_eq!(played(ROWS, Cut { times: 0, ..Cut::WHOLE }, 9).0.len(), 9, "without end");
+    }
+
+    #[test]
+    fn an_end_is_one_however_often_it_is_asked_for() {
+        for (to_s, times, length) in [(f64::INFINITY, 1, 3), (1.5, 1, 2), (f64::INFINITY, 2, 6), (1.5, 2, 4)] {
+            let open = || -> Result<Box<dyn Source + Send>> {
+                Ok(Box::new(CsvSource::from_reader("a", ROWS.as_bytes(), None, None)?))
+            };
+            let mut replay = Replay::new(open, Cut { from_s: 0.5, to_s, times }).unwrap();
+            let mut frame = Frame::missing(0.0, 1);
+            let asked: Vec<bool> = (0..20).map(|_| replay.next_frame(&mut frame).unwrap()).collect();
+            assert!(
+                asked.iter().position(|there| !there) == Some(length) && !asked[length..].contains(&true),
+                "{asked:?}"
+            );
+            assert_eq!(replay.progress(), Some(1.0));
+        }
     }
 
     #[test]

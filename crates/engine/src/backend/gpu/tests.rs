@@ -87,7 +87,7 @@ fn bits_have_one_meaning() {
     let shared = Flags::all().bits() & ((1 << PRESENT) - 1);
     assert_eq!(constant(&module, "FLAGS"), Some(shared));
     let of_host = Flags::HELD | Flags::JUMPED | Flags::DRIFT_UNKNOWN | Flags::NO_UNIT;
-    let of_host = of_host | Flags::STALE_POSE | Flags::NO_POSE;
+    let of_host = of_host | Flags::NO_GRADIENT | Flags::STALE_POSE | Flags::NO_POSE;
     let of_sigma = Flags::NOISE_UNKNOWN | Flags::UNSURE;
     assert_eq!(Flags::all().bits() - shared, (of_host | of_sigma).bits());
     assert_eq!(constant(&module, "PRESENT"), Some(PRESENT));

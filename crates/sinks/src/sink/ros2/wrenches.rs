@@ -321,7 +321,7 @@ mod tests {
         assert_eq!(remarks(&body, newtons, with_touches(), &ids), "");
     }
 
-    /// A hand whose fingertips have three axes, pressed and pulled: an engine and its frame.
+    /// A hand with taxels of three axes, pressed and pulled: an engine and its frame.
     fn pulled_hand(body: &Body, ids: &[u32], scene: Scene) -> (Engine, crate::Frame) {
         let calibration = "[all]\ngain = 0.01\nunit = \"N\"\n[shear]\ngain = 0.02\n";
         let engine = engine(body, ids, calibration, scene);
@@ -351,17 +351,22 @@ mod tests {
         let taxel = (0..ids.len()).find(three).unwrap();
         let (id, link) = (ids[taxel], &body.links[body.taxels[taxel].link].name);
         let of_three = body.taxels.iter().filter(|taxel| taxel.modality == Modality::Force3);
-        let links: BTreeSet<&str> = of_three.map(|taxel| body.links[taxel.link].name.as_str()).collect();
+        let of_fingers = of_three.filter(|taxel| Some(taxel.link) != body.link_index("hand"));
+        let links: BTreeSet<&str> = of_fingers.clone().map(|taxel| body.links[taxel.link].name.as_str()).collect();
         let (right, found) = by_engine(&frame);
         let mut without = frame.clone();
-        without.values[ids.len()..].fill(RawValue::new(0.0));
+        for taxel in of_fingers {
+            for axis in [Axis::U, Axis::V] {
+                without.values[sent.binary_search(&Channel::of_taxel(taxel.id, axis).0).unwrap()] = RawValue::new(0.0);
+            }
+        }
         let (_, untouched) = by_engine(&without);
         assert!(links.len() >= 2);
         for (name, wrench) in &right {
             let own = &found[name];
             let [force, torque] = [&own.force, &own.torque].map(|own| DVec3::new(own.x, own.y, own.z));
             assert!(force.distance(wrench.force_newton) < 1e-12 && torque.distance(wrench.torque_newton_m) < 1e-12);
-            // Without what pulls, only links without such taxels have the same.
+            // Without what pulls fingers, only the palm's link has the same.
             assert_eq!(*own != untouched[name], links.contains(name.as_str()), "{name}");
         }
         let at = sent.binary_search(&Channel::of_taxel(id, Axis::U).0).unwrap();

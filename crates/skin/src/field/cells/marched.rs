@@ -18,6 +18,7 @@ const KEPT: usize = 4;
 
 /// The points that are near a corner, the nearest first.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
 struct Near {
     count: u8,
     sites: [u32; KEPT],
@@ -30,17 +31,27 @@ impl Near {
         Some(self.distances_m[known])
     }
 
-    /// Notes the distance to `site`, if that is less than what is noted; whether it may be. One for which there is no room is not noted.
+    /// Notes the distance to `site`, if that is less than what is noted and one of the least; whether it is. Else it would find no room:
+    /// those noted come first.
     fn lower(&mut self, site: u32, distance_m: f64) -> bool {
         let count = self.count as usize;
-        match self.sites[..count].iter().position(|&known| known == site) {
+        let at = match self.sites[..count].iter().position(|&known| known == site) {
             Some(known) if self.distances_m[known] <= distance_m => return false,
-            Some(known) => self.distances_m[known] = distance_m,
+            Some(known) => known,
             None if count < KEPT => {
-                (self.sites[count], self.distances_m[count], self.count) = (site, distance_m, self.count + 1);
+                self.count += 1;
+                count
             }
-            None => {}
-        }
+            None => {
+                let farther = |a: usize, b: usize| if self.distances_m[b] > self.distances_m[a] { b } else { a };
+                let last = (1..KEPT).fold(0, farther);
+                if self.distances_m[last] < distance_m {
+                    return false;
+                }
+                last
+            }
+        };
+        (self.sites[at], self.distances_m[at]) = (site, distance_m);
         true
     }
 }
@@ -52,26 +63,19 @@ struct Coming {
     site: u32,
 }
 
-/// Distances of corners to points.
-pub(super) struct Marched<'a> {
-    topology: &'a Topology,
-    near: Vec<Near>,
-    /// Per vertex the least distances that are in the queue, of some points.
-    coming: Vec<Near>,
+/// The triangles that are marched over, by their corners.
+pub(super) struct Ground {
     /// Per vertex where its half-edges begin in `leaving`.
     first: Vec<u32>,
     /// The half-edges that leave each vertex, one vertex after the other.
     leaving: Vec<u32>,
     /// Per vertex its longest edge, m.
     longest_m: Vec<f64>,
-    queue: BinaryHeap<Coming>,
-    /// Nothing is farther from a point than this, m.
-    reach_m: f64,
 }
 
-impl<'a> Marched<'a> {
-    /// On those triangles of `topology` for which `is_marched` is true, as far as `reach_m` from a point.
-    pub(super) fn new(topology: &'a Topology, is_marched: impl Fn(u32) -> bool, reach_m: f64) -> Self {
+impl Ground {
+    /// Those triangles of `topology` for which `is_marched` is true.
+    pub(super) fn new(topology: &Topology, is_marched: impl Fn(u32) -> bool) -> Self {
         let vertices = topology.positions.len();
         let mut first = vec![0_u32; vertices + 1];
         let edges = || (0..topology.triangles.len() as u32).filter(|&triangle| is_marched(triangle));
@@ -93,8 +97,28 @@ impl<'a> Marched<'a> {
             leaving[next[from] as usize] = edge;
             next[from] += 1;
         }
-        let near = if leaving.is_empty() { Vec::new() } else { vec![Near::default(); vertices] };
-        Self { topology, coming: near.clone(), near, first, leaving, longest_m, queue: BinaryHeap::new(), reach_m }
+        Self { first, leaving, longest_m }
+    }
+}
+
+/// Distances of corners to points.
+pub(super) struct Marched<'a> {
+    topology: &'a Topology,
+    ground: &'a Ground,
+    near: Vec<Near>,
+    /// Per vertex the least distances that are or were in the queue.
+    coming: Vec<Near>,
+    queue: BinaryHeap<Coming>,
+    /// Nothing is farther from a point than this, m.
+    reach_m: f64,
+}
+
+impl<'a> Marched<'a> {
+    /// On the triangles `ground` of `topology`, as far as `reach_m` from a point.
+    pub(super) fn new(topology: &'a Topology, ground: &'a Ground, reach_m: f64) -> Self {
+        let vertices = if ground.leaving.is_empty() { 0 } else { topology.positions.len() };
+        let near = vec![Near::default(); vertices];
+        Self { topology, ground, coming: near.clone(), near, queue: BinaryHeap::new(), reach_m }
     }
 
     /// Adds the point `site`, from which distances start at `start`.
@@ -115,43 +139,54 @@ impl<'a> Marched<'a> {
             if !self.arrive(vertex, site, distance_m) {
                 continue;
             }
-            let [from, to] = [0, 1].map(|step| self.first[vertex as usize + step] as usize);
-            for at in from..to {
-                let triangle = self.leaving[at] / 3;
-                let corners = self.topology.triangles[triangle as usize];
-                let own = corners.into_iter().position(|corner| corner == vertex).unwrap_or(0);
-                let [one, other] = [1, 2].map(|step| (own + step) % 3);
-                for (to, via) in [(one, other), (other, one)] {
-                    if self.near[corners[to] as usize].to(site).is_none() {
-                        let distance_m = self.by_corners(triangle, site, to, [own, via]);
-                        if self.coming[corners[to] as usize].lower(site, distance_m) {
-                            self.queue.push(Coming { distance_m, vertex: corners[to], site });
-                        }
+            let [from, to] = [0, 1].map(|step| self.ground.first[vertex as usize + step] as usize);
+            for &edge in &self.ground.leaving[from..to] {
+                let corners = self.topology.triangles[edge as usize / 3];
+                let own = edge as usize % 3;
+                let sides = [1, 2].map(|step| corners[(own + step) % 3]);
+                let known = sides.map(|side| self.near[side as usize].to(site));
+                for (to, via) in [(0, 1), (1, 0)] {
+                    if known[to].is_some() || self.near[sides[to] as usize].count as usize == KEPT {
+                        continue;
+                    }
+                    let known = [Some(distance_m), known[via]];
+                    let distance_m = self.by_corners(sides[to], [vertex, sides[via]], known);
+                    if !self.is_far(sides[to], distance_m) && self.coming[sides[to] as usize].lower(site, distance_m) {
+                        self.queue.push(Coming { distance_m, vertex: sides[to], site });
                     }
                 }
             }
         }
     }
 
+    /// Whether nothing that arrives at `vertex` after `distance_m` is noted there: it is beyond the reach, or beyond the triangles at a
+    /// border, where nothing is to be known of the point on the other side.
+    fn is_far(&self, vertex: u32, distance_m: f64) -> bool {
+        let (near, coming) = (&self.near[vertex as usize], &self.coming[vertex as usize]);
+        // The first to arrive is no farther than what is in the queue.
+        let first_m = match near.count {
+            0 => coming.distances_m[..coming.count as usize].iter().copied().fold(f64::INFINITY, f64::min),
+            _ => near.distances_m[0],
+        };
+        distance_m > first_m + self.ground.longest_m[vertex as usize] || distance_m > self.reach_m
+    }
+
     /// Whether `site` is the first from there at `vertex`, and near enough to count.
     fn arrive(&mut self, vertex: u32, site: u32, distance_m: f64) -> bool {
-        let beyond_m = self.longest_m[vertex as usize];
-        let near = &mut self.near[vertex as usize];
+        let near = &self.near[vertex as usize];
         let count = near.count as usize;
-        // Beyond the triangles at a border nothing is to be known of the point on the other side.
-        let is_far = count > 0 && distance_m > near.distances_m[0] + beyond_m;
+        let is_far = count > 0 && self.is_far(vertex, distance_m);
         if count == KEPT || is_far || distance_m > self.reach_m || near.to(site).is_some() {
             return false;
         }
+        let near = &mut self.near[vertex as usize];
         (near.sites[count], near.distances_m[count], near.count) = (site, distance_m, near.count + 1);
         true
     }
 
-    /// The distance to `site` of corner `to` of `triangle`, by those of the corners `from` that have one.
-    fn by_corners(&self, triangle: u32, site: u32, to: usize, from: [usize; 2]) -> f64 {
-        let vertices = self.topology.triangles[triangle as usize];
-        let at = |corner: usize| self.topology.positions[vertices[corner] as usize];
-        let known = from.map(|corner| self.near[vertices[corner] as usize].to(site));
+    /// The distance of vertex `to` to a point, by the distances `known` of the vertices `from`, which are in a triangle with it.
+    fn by_corners(&self, to: u32, from: [u32; 2], known: [Option<f64>; 2]) -> f64 {
+        let at = |vertex: u32| self.topology.positions[vertex as usize];
         let along = |which: usize| known[which].map_or(f64::INFINITY, |known| known + at(from[which]).distance(at(to)));
         let along_m = along(0).min(along(1));
         let [Some(a), Some(b)] = known else { return along_m };
@@ -192,7 +227,12 @@ impl<'a> Marched<'a> {
                 let known = vertices.map(|vertex| self.near[vertex as usize].to(site));
                 let distance = |corner: usize| {
                     known[corner].unwrap_or_else(|| {
-                        self.by_corners(triangle, site, corner, [(corner + 1) % 3, (corner + 2) % 3])
+                        let from = [(corner + 1) % 3, (corner + 2) % 3];
+                        self.by_corners(
+                            vertices[corner],
+                            from.map(|corner| vertices[corner]),
+                            from.map(|corner| known[corner]),
+                        )
                     })
                 };
                 candidates.push(Candidate { site, squared: [0, 1, 2].map(|corner| distance(corner).powi(2)) });

@@ -4,10 +4,12 @@
 //! marched (`marched.rs`), so that a round takes milliseconds; borders between cells are straight in each triangle, so that middles
 //! change evenly as points do, and rounds do not stall.
 
+use std::cmp::Ordering;
+
 use glam::{DVec2, DVec3};
 
-use super::Marched;
 use super::coarsen::coarsen;
+use super::marched::{Ground, Marched};
 use super::polygon::{Candidate, nearest_part};
 use super::refine::refine;
 use crate::body::{SurfaceIndex, Topology, area_vector};
@@ -24,11 +26,15 @@ const FINE_PER_POINT: usize = 30;
 const CUTS_PER_POINT: usize = 60;
 const CUTS_PER_TRIANGLE: usize = 4;
 
-/// A surface on which points move to the middles of their cells.
+/// A connected surface on which points move to the middles of their cells.
 pub struct Relaxation {
     topology: Topology,
+    ground: Ground,
     /// Per vertex how much surface there counts.
     weights: Option<Vec<f64>>,
+    /// The points' numbers, ascending.
+    numbers: Vec<usize>,
+    /// Per point.
     places: Vec<SurfacePlace>,
 }
 
@@ -40,14 +46,15 @@ struct Moment {
 }
 
 impl Relaxation {
-    /// `points`, each with its normal, on those parts of `topology` that have any; they will be about `spacing_m` apart.
-    /// `weight` says how much the surface at a position with a normal counts.
-    pub fn new(
+    /// `points`, each with its triangle, on those parts of `topology` that have any; they will be about `spacing_m` apart.
+    /// `weight` says how much the surface at a position with a normal counts. One for each set of parts that are connected, be it by a
+    /// vertex: they know nothing of each other, and so may be moved at the same time.
+    pub fn of_points(
         topology: &Topology,
         points: &[(u32, DVec3)],
         spacing_m: f64,
         weight: Option<&dyn Fn(DVec3, DVec3) -> f64>,
-    ) -> Self {
+    ) -> Vec<Self> {
         let mut has_points = vec![false; topology.parts()];
         points.iter().for_each(|(triangle, _)| has_points[topology.part[*triangle as usize] as usize] = true);
         let all = topology.triangles.iter().zip(&topology.part);
@@ -75,11 +82,46 @@ impl Relaxation {
             SurfacePlace::in_triangle(&fit, triangle, position).inward()
         };
         let places = if fit.triangles.is_empty() { Vec::new() } else { points.iter().map(place).collect() };
-        let weights = weight.map(|weight| {
+        let weights: Option<Vec<f64>> = weight.map(|weight| {
             let normals = vertex_normals(&fit);
             fit.positions.iter().zip(normals).map(|(&p, normal)| weight(p, normal)).collect()
         });
-        Self { topology: fit, weights, places }
+        Self::connected(&fit, weights.as_deref(), &places)
+    }
+
+    /// The connected parts of `topology` that have any of `places`.
+    fn connected(topology: &Topology, weights: Option<&[f64]>, places: &[SurfacePlace]) -> Vec<Self> {
+        let island = islands(topology);
+        let of_triangle = |triangle: u32| island[topology.triangles[triangle as usize][0] as usize];
+        // By island, in their order there, which decides between equals.
+        let (mut vertices, mut triangles): (Vec<u32>, Vec<u32>) =
+            ((0..island.len() as u32).collect(), (0..topology.triangles.len() as u32).collect());
+        vertices.sort_by_key(|&vertex| island[vertex as usize]);
+        triangles.sort_by_key(|&triangle| of_triangle(triangle));
+        let mut relaxations = Vec::new();
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|&point| of_triangle(places[point].triangle));
+        for numbers in order.chunk_by(|&a, &b| of_triangle(places[a].triangle) == of_triangle(places[b].triangle)) {
+            let own = of_triangle(places[numbers[0]].triangle);
+            let vertices = those(&vertices, |&vertex| island[vertex as usize].cmp(&own));
+            let triangles = those(&triangles, |&triangle| of_triangle(triangle).cmp(&own));
+            let at = |known: &[u32], one: u32| known.partition_point(|&other| other < one) as u32;
+            let corners = |&t: &u32| topology.triangles[t as usize].map(|vertex| at(vertices, vertex));
+            let positions: Vec<DVec3> = vertices.iter().map(|&vertex| topology.positions[vertex as usize]).collect();
+            let own = as_they_are(&positions, &triangles.iter().map(corners).collect::<Vec<_>>());
+            let place =
+                |&point: &usize| SurfacePlace { triangle: at(triangles, places[point].triangle), ..places[point] };
+            relaxations.push(Self {
+                ground: Ground::new(&own, |_| true),
+                topology: own,
+                weights: weights.map(|weights| vertices.iter().map(|&vertex| weights[vertex as usize]).collect()),
+                numbers: numbers.to_vec(),
+                places: numbers.iter().map(place).collect(),
+            });
+        }
+        // Those that take longest first.
+        relaxations.sort_by_key(|one| std::cmp::Reverse(one.topology.triangles.len()));
+        relaxations
     }
 
     /// Moves each point by `step` times its way to the middle of its cell.
@@ -106,15 +148,16 @@ impl Relaxation {
         }
     }
 
-    /// Where the points are, with the normals of the surface that they are on.
-    pub fn points(&self) -> Vec<(DVec3, DVec3)> {
+    /// The numbers of the points, where they are, and the normals of the surface that they are on.
+    pub fn points(&self) -> impl Iterator<Item = (usize, (DVec3, DVec3))> {
         let normal = |place: &SurfacePlace| area_vector(self.topology.corners(place.triangle)).normalize_or_zero();
-        self.places.iter().map(|place| (place.position(&self.topology), normal(place))).collect()
+        let at = move |place: &SurfacePlace| (place.position(&self.topology), normal(place));
+        self.numbers.iter().copied().zip(self.places.iter().map(at))
     }
 
     fn moments(&self) -> Vec<Moment> {
         let topology = &self.topology;
-        let mut marched = Marched::new(topology, |_| true, f64::INFINITY);
+        let mut marched = Marched::new(topology, &self.ground, f64::INFINITY);
         let mut within: Vec<(u32, Candidate)> = Vec::with_capacity(self.places.len());
         for (site, place) in (0..).zip(&self.places) {
             let start = Start::new(topology, *place, DVec3::X);
@@ -169,6 +212,31 @@ impl Relaxation {
         moment.weight += weight;
         moment.sum += (a + b + c) * (weight / 3.0);
     }
+}
+
+/// Those of `sorted` that `order` says to be equal.
+fn those(sorted: &[u32], order: impl Fn(&u32) -> Ordering) -> &[u32] {
+    let first = sorted.partition_point(|one| order(one).is_lt());
+    &sorted[first..sorted.partition_point(|one| order(one).is_le())]
+}
+
+/// Per vertex of `topology` the lowest one that triangles connect it with.
+fn islands(topology: &Topology) -> Vec<u32> {
+    let mut lower: Vec<u32> = (0..topology.positions.len() as u32).collect();
+    let lowest = |lower: &mut Vec<u32>, mut vertex: u32| {
+        while lower[vertex as usize] != vertex {
+            lower[vertex as usize] = lower[lower[vertex as usize] as usize];
+            vertex = lower[vertex as usize];
+        }
+        vertex
+    };
+    for &[a, b, c] in &topology.triangles {
+        for other in [b, c] {
+            let ends = [a, other].map(|vertex| lowest(&mut lower, vertex));
+            lower[ends[0].max(ends[1]) as usize] = ends[0].min(ends[1]);
+        }
+    }
+    (0..lower.len() as u32).map(|vertex| lowest(&mut lower, vertex)).collect()
 }
 
 /// The topology of triangles whose vertices are welded already: those of different parts at one place stay apart.
@@ -230,9 +298,10 @@ mod tests {
         let seated = places(topology, &seeds);
         let points: Vec<(u32, DVec3)> = seated.iter().map(|place| (place.triangle, place.position(topology))).collect();
         let spacing_m = (4.0 * std::f64::consts::PI / f64::from(count) * 2.0 / 3.0_f64.sqrt()).sqrt();
-        let mut relaxation = Relaxation::new(topology, &points, spacing_m, None);
-        (0..rounds).for_each(|_| relaxation.round(1.0));
-        let moved: Vec<DVec3> = relaxation.points().into_iter().map(|(position, _)| position).collect();
+        let mut relaxation = Relaxation::of_points(topology, &points, spacing_m, None);
+        assert_eq!(relaxation.len(), 1);
+        (0..rounds).for_each(|_| relaxation[0].round(1.0));
+        let moved: Vec<DVec3> = relaxation[0].points().map(|(_, (position, _))| position).collect();
         let mut areas = Cells::new(topology, &places(topology, &moved)).areas;
         assert_eq!(areas.len(), count as usize);
         areas.sort_by(f64::total_cmp);
@@ -266,10 +335,45 @@ mod tests {
         let points: Vec<(u32, DVec3)> =
             seated.iter().map(|place| (place.triangle, place.position(&topology))).collect();
         let weight = |p: DVec3, _: DVec3| if p.z > 0.0 { 16.0 } else { 1.0 };
-        let mut relaxation = Relaxation::new(&topology, &points, 0.25, Some(&weight));
-        (0..200).for_each(|_| relaxation.round(1.0));
-        let above = relaxation.points().iter().filter(|(p, _)| p.z > 0.0).count();
+        let mut relaxation = Relaxation::of_points(&topology, &points, 0.25, Some(&weight));
+        (0..200).for_each(|_| relaxation[0].round(1.0));
+        let above = relaxation[0].points().filter(|(_, (p, _))| p.z > 0.0).count();
         // The density of points is the square root of the weight: four times as many above, if rounds went on for ever.
         assert!((135..=165).contains(&above), "{above} of 200 above");
+    }
+
+    #[test]
+    fn points_on_surfaces_apart_are_moved_as_if_each_were_alone() {
+        let ball = sphere(3);
+        let far = DVec3::X * 5.0;
+        let vertices = ball.positions.len() as u32;
+        let positions: Vec<DVec3> =
+            ball.positions.iter().copied().chain(ball.positions.iter().map(|&p| p + far)).collect();
+        let others = ball.triangles.iter().map(|corners| corners.map(|corner| corner + vertices));
+        let both = Topology::new(&positions, &ball.triangles.iter().copied().chain(others).collect::<Vec<_>>());
+        let seeds: Vec<DVec3> = (0..40_u32)
+            .map(|i| DVec3::new((f64::from(i) * 1.7).sin(), 0.3, (f64::from(i) * 2.9).cos()).normalize())
+            .collect();
+        let on = |surface: &Topology, seeds: &[DVec3]| -> Vec<(u32, DVec3)> {
+            places(surface, seeds).iter().map(|place| (place.triangle, place.position(surface))).collect()
+        };
+        // Each second point is on the second ball.
+        let mixed: Vec<DVec3> = seeds.iter().flat_map(|&seed| [seed, seed + far]).collect();
+        let mut relaxations = Relaxation::of_points(&both, &on(&both, &mixed), 0.4, None);
+        let mut alone = Relaxation::of_points(&ball, &on(&ball, &seeds), 0.4, None);
+        assert_eq!((relaxations.len(), alone.len()), (2, 1));
+        for _ in 0..5 {
+            relaxations.iter_mut().chain(&mut alone).for_each(|one| one.round(1.0));
+        }
+        let expected: Vec<DVec3> = alone[0].points().map(|(_, (position, _))| position).collect();
+        for relaxation in &relaxations {
+            let moved: Vec<(usize, (DVec3, DVec3))> = relaxation.points().collect();
+            let second = moved[0].0 % 2;
+            assert!(moved.iter().map(|(number, _)| *number).eq((0..seeds.len()).map(|i| 2 * i + second)));
+            for ((_, (position, _)), expected) in moved.iter().zip(&expected) {
+                assert!((position - far * second as f64).distance(*expected) < 1e-9, "{position} {expected}");
+            }
+        }
+        assert!(expected.iter().zip(&seeds).any(|(moved, seed)| moved.distance(*seed) > 0.05));
     }
 }

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 pub use self::divided::{CellPoint, Divided};
-use self::marched::Marched;
+use self::marched::{Ground, Marched};
 pub use self::middles::Relaxation;
 use self::parts::{Parts, corner_at};
 use self::polygon::{Candidate, Side, nearest_part, share, squared_at};
@@ -208,7 +208,8 @@ impl Cells {
     ) {
         let mut waves = Waves::extending(topology, reach_m, most_windows);
         let mut is_reached = vec![false; topology.parts()];
-        let mut marched = Marched::new(topology, &is_fine, reach_m);
+        let mut ground = Ground::new(topology, &is_fine);
+        let mut marched = Marched::new(topology, &ground, reach_m);
         let mut is_marched = vec![false; topology.parts()];
         for (triangle, &part) in (0..).zip(&topology.part) {
             is_marched[part as usize] |= is_fine(triangle);
@@ -233,7 +234,8 @@ impl Cells {
         marched.run();
         if !waves.run() {
             is_marched.fill(true);
-            marched = Marched::new(topology, |_| true, reach_m);
+            ground = Ground::new(topology, |_| true);
+            marched = Marched::new(topology, &ground, reach_m);
             for (point, place) in starts {
                 marched.add(&Start::new(topology, place.inward(), DVec3::X), point as u32);
             }

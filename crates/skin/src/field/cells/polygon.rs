@@ -15,6 +15,14 @@ pub(super) struct Candidate {
     pub(super) squared: [f64; 3],
 }
 
+impl Candidate {
+    /// Whether all of the triangle is nearer to `other`, by more than rounding: nothing of it would be left by a cut.
+    fn is_beaten_by(&self, other: &Self) -> bool {
+        let (mine, others) = (DVec3::from_array(self.squared), DVec3::from_array(other.squared));
+        (mine - others).min_element() > 2.0 * ROUNDING * (mine + others).max_element()
+    }
+}
+
 /// A side of a polygon: its start, in the triangle's barycentric coordinates, and the point whose cell is beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side {
@@ -25,6 +33,9 @@ pub(super) struct Side {
 /// The part of the triangle that is nearer to `own` than to any other of `all`, as a convex polygon; empty if there is none.
 pub(super) fn nearest_part(own: &Candidate, all: &[Candidate], polygon: &mut Vec<Side>, spare: &mut Vec<Side>) {
     polygon.clear();
+    if all.iter().any(|other| other.site != own.site && own.is_beaten_by(other)) {
+        return;
+    }
     polygon.extend(DVec3::AXES.map(|from| Side { from, beyond: None }));
     for other in all.iter().filter(|other| other.site != own.site) {
         cut(polygon, spare, own, other);

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use serde::Deserialize;
-use toml::Spanned;
+use toml::{Spanned, Value};
 
-use super::senses::{Curves, curve_called, curve_index, range_of};
+use super::senses::{Curves, codes_of, curve_called, curve_index, range_of};
 use super::shear_keys::{Gains, OwnShear, scaled};
 use super::{Onset, Sensors, TaxelCalibration};
 use crate::error::{Error, Result};
@@ -15,9 +15,6 @@ use crate::signal::fsr::FsrCircuit;
 use crate::signal::response::{FsrResponse, GAIN_RANGE, MAX_MAGNITUDE, Response};
 use crate::signal::sense::{SenseCalibration, SenseResponse, ShearCalibration};
 use crate::signal::unit::UnitOfP;
-
-/// Most raw values that `missing` may list: every value of every frame is compared with each.
-const MAX_MISSING: usize = 16;
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,22 +45,13 @@ pub(super) struct Keys {
     shear_gain: Option<Spanned<Gains>>,
     #[serde(default, deserialize_with = "whole")]
     shear_raw_range: Option<Spanned<[f64; 2]>>,
-    shear_noise: Option<Spanned<f64>>,
+    shear_noise: Option<Spanned<Value>>,
 }
 
 impl Keys {
     /// The raw values that are not readings, in single precision as raw values are; `None` if the key is not given.
     pub(super) fn missing(&self, text: Text<'_>) -> Result<Option<Vec<f32>>> {
-        let Some(codes) = &self.missing else { return Ok(None) };
-        if codes.get_ref().len() > MAX_MISSING {
-            let what = format!("`missing` has {} values; it may have {MAX_MISSING}", codes.get_ref().len());
-            return Err(text.wrong(codes.span(), what));
-        }
-        let code = |code: &Spanned<f64>| match *code.get_ref() {
-            raw if raw.abs() <= MAX_MAGNITUDE => Ok(raw as f32),
-            raw => Err(text.wrong(code.span(), format!("`missing` has {raw}; its values must be finite raw values"))),
-        };
-        codes.get_ref().iter().map(code).collect::<Result<_>>().map(Some)
+        self.missing.as_ref().map(|codes| codes_of(codes, text)).transpose()
     }
 
     /// The keys that only a taxel that feels pressure has, and where they are.

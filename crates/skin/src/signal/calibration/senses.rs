@@ -19,6 +19,9 @@ const B_K: RangeInclusive<f64> = 500.0..=20_000.0;
 /// Resistances of thermistors at 25 °C and beside them, Ω: some Ω to some MΩ. As their ratio alone counts, some write them in MΩ.
 const OHMS: RangeInclusive<f64> = 1e-6..=1e9;
 
+/// Most raw values that `missing` may list: every value of every frame is compared with each.
+const MAX_MISSING: usize = 16;
+
 /// Units of temperature: the name, °C of one of it, °C at 0 of it.
 const TEMPERATURES: [(&str, f64, f64); 3] =
     [("°C", 1.0, 0.0), ("K", 1.0, -ZERO_CELSIUS_K), ("°F", 5.0 / 9.0, -160.0 / 9.0)];
@@ -37,7 +40,7 @@ pub(super) struct TemperatureKeys {
     ntc: Option<Spanned<NtcKeys>>,
     #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
-    missing: Option<Vec<f64>>,
+    missing: Option<Spanned<Vec<Spanned<f64>>>>,
     window_s: Option<Spanned<f64>>,
 }
 
@@ -52,7 +55,7 @@ pub(super) struct ProximityKeys {
     curve: Option<Spanned<String>>,
     #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
-    missing: Option<Vec<f64>>,
+    missing: Option<Spanned<Vec<Spanned<f64>>>>,
     window_s: Option<Spanned<f64>>,
     range: Option<Spanned<f64>>,
 }
@@ -99,7 +102,7 @@ struct Common<'a> {
     invert: Option<bool>,
     curve: Option<&'a Spanned<String>>,
     raw_range: Option<&'a Spanned<[f64; 2]>>,
-    missing: &'a [f64],
+    missing: Option<&'a Spanned<Vec<Spanned<f64>>>>,
 }
 
 /// The file's curves and their names.
@@ -139,6 +142,19 @@ pub(super) fn range_of(key: &str, range: &Spanned<[f64; 2]>, text: Text<'_>) -> 
     Err(text.wrong(range.span(), format!("`{key}` is [{low}, {high}]; give the lowest and the highest raw value")))
 }
 
+/// What `missing` lists, in single precision.
+pub(super) fn codes_of(codes: &Spanned<Vec<Spanned<f64>>>, text: Text<'_>) -> Result<Vec<f32>> {
+    if codes.get_ref().len() > MAX_MISSING {
+        let what = format!("`missing` has {} values; it may have {MAX_MISSING}", codes.get_ref().len());
+        return Err(text.wrong(codes.span(), what));
+    }
+    let code = |code: &Spanned<f64>| match *code.get_ref() {
+        raw if raw.abs() <= MAX_MAGNITUDE => Ok(raw as f32),
+        raw => Err(text.wrong(code.span(), format!("`missing` has {raw}; its values must be finite raw values"))),
+    };
+    codes.get_ref().iter().map(code).collect()
+}
+
 impl Common<'_> {
     /// The conversion, with units `units`.
     fn read(&self, units: &[(&str, f64, f64)], curves: Curves<'_>, text: Text<'_>) -> Result<Sense> {
@@ -169,7 +185,9 @@ impl Common<'_> {
         if let Some(range) = self.raw_range {
             sense.raw_range = range_of("raw_range", range, text)?;
         }
-        sense.missing = self.missing.iter().map(|&raw| raw as f32).collect();
+        if let Some(codes) = self.missing {
+            sense.missing = codes_of(codes, text)?;
+        }
         Ok(sense)
     }
 }
@@ -196,7 +214,7 @@ impl TemperatureKeys {
             invert: self.invert,
             curve: self.curve.as_ref(),
             raw_range: self.raw_range.as_ref(),
-            missing: self.missing.as_deref().unwrap_or_default(),
+            missing: self.missing.as_ref(),
         };
         let mut all = common.read(&TEMPERATURES, curves, text)?;
         if let Some(ntc) = &self.ntc {
@@ -221,7 +239,7 @@ impl ProximityKeys {
             invert: self.invert,
             curve: self.curve.as_ref(),
             raw_range: self.raw_range.as_ref(),
-            missing: self.missing.as_deref().unwrap_or_default(),
+            missing: self.missing.as_ref(),
         };
         let all = common.read(&DISTANCES, curves, text)?;
         let usual = SenseCalibration::of_proximity();
@@ -287,6 +305,11 @@ mod tests {
         let both = "[temperature]\nunit = \"K\"\nntc = { ohm_at_25 = 1, b_k = 1000, series_ohm = 1, full_raw = 1 }";
         assert!(why(both).starts_with("line 3: `ntc` gives °C by itself"));
         assert!(why("[temprature]\ngain = 1").contains("did you mean `temperature`"));
+        let many = format!("[temperature]\nmissing = {:?}", [1; 17]);
+        assert_eq!(why(&many), "line 2: `missing` has 17 values; it may have 16");
+        assert!(
+            why("[proximity]\nmissing = [1, inf]").starts_with("line 2: `missing` has inf; its values must be finite")
+        );
     }
 
     #[test]

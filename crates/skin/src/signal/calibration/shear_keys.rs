@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use serde::Deserialize;
-use toml::Spanned;
+use toml::{Spanned, Value};
 
 use super::senses::{gain_of, range_of};
 use crate::error::Result;
@@ -24,7 +24,7 @@ pub(super) struct ShearKeys {
     gain: Option<Spanned<Gains>>,
     #[serde(default, deserialize_with = "whole")]
     raw_range: Option<Spanned<[f64; 2]>>,
-    noise: Option<Spanned<f64>>,
+    noise: Option<Spanned<Value>>,
     #[serde(default, deserialize_with = "whole")]
     cross_axis: Option<Spanned<Matrix>>,
     slips_at: Option<Spanned<f64>>,
@@ -101,7 +101,7 @@ pub(super) struct OwnShear<'a> {
     pub(super) baseline: Option<&'a Spanned<[f64; 2]>>,
     pub(super) gain: Option<&'a Spanned<Gains>>,
     pub(super) raw_range: Option<&'a Spanned<[f64; 2]>>,
-    pub(super) noise: Option<&'a Spanned<f64>>,
+    pub(super) noise: Option<&'a Spanned<Value>>,
 }
 
 impl OwnShear<'_> {
@@ -147,9 +147,17 @@ fn gains_of(key: &str, gains: &Spanned<Gains>, text: Text<'_>) -> Result<[f64; 2
     Ok(both)
 }
 
-/// A standard deviation of raw values.
-fn noise_of(key: &str, noise: &Spanned<f64>, text: Text<'_>) -> Result<f64> {
-    let number = *noise.get_ref();
+/// A standard deviation of raw values, of u and v alike.
+fn noise_of(key: &str, noise: &Spanned<Value>, text: Text<'_>) -> Result<f64> {
+    let number = match noise.get_ref() {
+        Value::Float(number) => *number,
+        Value::Integer(number) => *number as f64,
+        other => {
+            let kind = if other.is_array() { "list" } else { other.type_str() };
+            let what = format!("`{key}` is a {kind}; give one number of raw units, which holds for u and v alike");
+            return Err(text.wrong(noise.span(), what));
+        }
+    };
     if (0.0..=MAX_MAGNITUDE).contains(&number) {
         return Ok(number);
     }
@@ -259,6 +267,9 @@ mod tests {
         }
         assert!(why("[shear]\nnoise = -1").starts_with("line 2: `noise` is -1; it must be 0 or more raw units"));
         assert!(why("[taxel.7]\nshear_noise = nan").starts_with("line 2: `shear_noise` is NaN"));
+        let one = "give one number of raw units, which holds for u and v alike";
+        assert_eq!(why("[shear]\nnoise = [1, 2]"), format!("line 2: `noise` is a list; {one}"));
+        assert_eq!(why("[taxel.7]\nshear_noise = \"low\""), format!("line 2: `shear_noise` is a string; {one}"));
         assert!(why("[shear]\nslips_at = 0").starts_with("line 2: `slips_at` is 0"));
         assert!(why("[shear]\ngain = [1, 0]").starts_with("line 2: `gain` is 0; it must be between"));
         assert_eq!(why("[shear]\ngain = \"much\""), "line 2: expected a number, or a list of two: of u and of v");

@@ -8,6 +8,10 @@ use crate::signal::{FsrCircuit, Sensors};
 /// Width of a dead band, standard deviations of the noise: one value in 10⁹ exceeds it.
 const DEAD_BAND_SIGMAS: f64 = 6.0;
 
+/// A dead band without noise, N: what single precision tells of the firmest presses. What the tails of a layer's spread leave of them, far
+/// from a press, is no touch.
+const LEAST_NEWTON: f64 = 1e-6;
+
 impl Sensor {
     /// The calibration file for sensors of the taxels `ids` on the body called `body`, which cover what `sensors` says.
     pub(super) fn calibration(&self, body: &str, ids: &[u32], sensors: Sensors) -> String {
@@ -51,14 +55,14 @@ impl Sensor {
     fn keys(&self) -> Vec<(&'static str, String)> {
         let noise = DEAD_BAND_SIGMAS * self.noise_sigma;
         match self.kind {
-            Kind::Ideal => vec![("dead_band", noise.to_string())],
+            Kind::Ideal => vec![("dead_band", noise.max(LEAST_NEWTON).to_string())],
             Kind::Linear { offset, gain, bits } => {
                 let rounding = if bits.is_some() { 0.5 } else { 0.0 };
                 vec![
                     ("baseline", offset.to_string()),
                     ("gain", (1.0 / gain.abs()).to_string()),
                     ("invert", (gain < 0.0).to_string()),
-                    ("dead_band", ((noise + rounding) / gain.abs()).to_string()),
+                    ("dead_band", ((noise + rounding) / gain.abs()).max(LEAST_NEWTON).to_string()),
                 ]
             }
             Kind::Fsr { circuit, output } => {
