@@ -21,9 +21,9 @@ pub(super) fn describe(sinks: &[SinkSpec], session: &Session<'_>, wide: bool) ->
     }
     let mut text = match wide {
         true if !session.recordings.is_empty() => {
-            "one row per frame: recording, t and frame, then, for each field and called by it, the columns from contact on\n"
+            "one row per frame: recording, t and frame, then, for each field and called by it, the columns from contact on that its letter has\n"
         }
-        true => "one row per frame: t and frame, then, for each field and called by it, the columns from contact on\n",
+        true => "one row per frame: t and frame, then, for each field and called by it, the columns from contact on that its letter has\n",
         false if session.all_fields => "one row per frame and field\n",
         false => "one row per frame and field in contact\n",
     }

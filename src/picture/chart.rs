@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::colour::{PAPER, linear};
 use super::labels::{self, Labels, PlacedId, half_of_id};
-use super::shape::{Disc, Dots};
+use super::shape::{Disc, Dots, RIM};
 use super::touch::Moment;
 use super::view::{Arrangement, View};
 use super::{FieldColours, Options, Picture, arranged, arrows, checked, counted, fan};
@@ -41,7 +41,10 @@ pub struct ChartPicture<'a> {
     modalities: Vec<Modality>,
     /// By place in the chart, the axes x, y and z of the taxel's link along u and v, as its tangents lie in the chart.
     link_axes: Vec<[DVec2; 3]>,
+    /// For the colours of fields.
     dots: Dots,
+    /// For what taxels read, each as large as its own kind leaves room for; with ids, as any kind.
+    dots_by_kind: Dots,
     /// What is in sight, m.
     around: Vec<DVec3>,
     /// By place in the chart, what is written there.
@@ -75,11 +78,17 @@ impl<'a> ChartPicture<'a> {
         let side = held.iter().map(|&taxel| body.taxels[taxel].area.sqrt()).fold(0.0, f64::max);
         let extent = field.radius_m().max(10.0 * side);
         let dots = Dots::at(held.iter().map(|&taxel| places[taxel]).collect(), vec![DVec3::Z; held.len()], extent);
+        // No disc may cover the id of another.
+        let kinds = held.iter().map(|&taxel| &body.taxels[taxel]);
+        let dots_by_kind = if ids { dots.clone() } else { dots.clone().by_kind(kinds) };
         let kind = format!("{:?}", chart.kind).to_lowercase();
         let taxels = counted(field.members.len(), "taxel");
         let about = format!(" · {taxels}, {kind} chart, distortion {:.1} %", 100.0 * chart.distortion);
-        let reach = |(&p, &r): (&DVec3, &f64)| [p - MARGIN_RADII * r, p + MARGIN_RADII * r];
-        let around = dots.places.iter().zip(&dots.radii).flat_map(reach).chain([DVec3::ZERO]).collect();
+        let reach = |(place, &p): (usize, &DVec3)| {
+            let around = (MARGIN_RADII * dots.radii[place]).max(RIM * dots_by_kind.radii[place]);
+            [p - around, p + around]
+        };
+        let around = dots.places.iter().enumerate().flat_map(reach).chain([DVec3::ZERO]).collect();
         let labelled = held.iter().filter(|_| ids).map(|&taxel| body.taxels[taxel].id.to_string());
         Ok(Self {
             options,
@@ -90,6 +99,7 @@ impl<'a> ChartPicture<'a> {
             ids: labelled.collect(),
             held,
             dots,
+            dots_by_kind,
             around,
         })
     }
@@ -117,7 +127,7 @@ impl<'a> ChartPicture<'a> {
         let shown = FieldColours::for_fields(&within, &self.options.fields, &self.dots);
         let slices = |rims: bool| self.dots.slices(&shown.coloured(&within), DVec3::ZERO, rims);
         let title = format!("{}{}", self.name, self.about);
-        Ok(self.drawn(&title, shown.key(&within), slices, |_| PAPER, |_, _| {})?.0)
+        Ok(self.drawn(&title, shown.key(&within), (&self.dots, slices), |_| (PAPER, false), |_, _| {})?.0)
     }
 
     /// With what taxels read at `moment`, and arrows of tangential forces; taxels of a touch have a rim of its colour.
@@ -128,22 +138,24 @@ impl<'a> ChartPicture<'a> {
         let of_body = moment.discs(self.modalities.iter().copied(), !self.ids.is_empty());
         let discs: Vec<Disc> = self.held.iter().map(|&taxel| of_body[taxel]).collect();
         let time = moment.t_s.map_or(String::new(), |t_s| format!("{t_s:.2} s"));
-        let slices = |rims: bool| self.dots.flat_slices(&discs, DVec3::ZERO, rims);
-        let radius_m = self.dots.mean_radius();
+        let dots = &self.dots_by_kind;
+        let slices = |rims: bool| dots.flat_slices(&discs, DVec3::ZERO, rims);
+        let radius_m = dots.mean_radius();
         let held = |&&(taxel, _): &&(usize, DVec3)| self.held.binary_search(&taxel).is_ok();
         let pulled: Vec<(usize, DVec3)> = moment.shear.iter().filter(held).copied().collect();
         let moment = &Moment { shear: &pulled, ..moment.clone() };
         let label = |labels: &mut Labels, arrangement: &Arrangement| {
-            moment.legend().into_iter().for_each(|legend| labels.colours(legend));
+            moment.legend(&discs).into_iter().for_each(|legend| labels.colours(legend));
             moment.arrow_key(radius_m * arrangement.scale).into_iter().for_each(|key| labels.arrow(key));
         };
         // The colours of what taxels read replace those of fields.
         let (title, key) = (moment.titled(&self.name), vec![(None, time)]);
-        let (mut picture, arrangement) = self.drawn(&title, key, slices, |place| discs[place].colour, label)?;
+        let on = |place: usize| (discs[place].colour, discs[place].is_other);
+        let (mut picture, arrangement) = self.drawn(&title, key, (dots, slices), on, label)?;
         let Some(most) = moment.shear_ends() else { return Ok(picture) };
         let arrow = |&(taxel, force): &(usize, DVec3)| {
             let place = self.held.binary_search(&taxel).ok()?;
-            let from = self.dots.places[place];
+            let from = dots.places[place];
             let along: DVec2 = force.to_array().into_iter().zip(self.link_axes[place]).map(|(x, axis)| x * axis).sum();
             let to = from + along.extend(0.0) * arrows::length(1.0, radius_m, most);
             Some([from, to].map(|end| arrangement.pixel(0, end)))
@@ -152,20 +164,20 @@ impl<'a> ChartPicture<'a> {
         Ok(picture)
     }
 
-    /// The discs that `slices` gives, with or without rims, over a legend of `key` and what else `label` adds; ids stand on `colour` of
-    /// their place.
+    /// The discs of `dots` that `slices` gives, with or without rims, over a legend of `key` and what else `label` adds; `on` has by place
+    /// the colour that its id stands on, and whether that is behind.
     fn drawn(
         &self,
         title: &str,
         key: Vec<(Option<[u8; 3]>, String)>,
-        slices: impl Fn(bool) -> Vec<Slice>,
-        colour: impl Fn(usize) -> [u8; 3],
+        (dots, slices): (&Dots, impl Fn(bool) -> Vec<Slice>),
+        on: impl Fn(usize) -> ([u8; 3], bool),
         label: impl Fn(&mut Labels, &Arrangement),
     ) -> Result<(Picture, Arrangement)> {
         let mut labels = Labels::new(title, self.options.size[0]);
         let views = [View::Front.axes()];
         let (arrangement, size) = arranged(&mut labels, key, self.options.size, &views, &self.around)?;
-        let usual = self.dots.mean_radius() * arrangement.scale;
+        let usual = dots.mean_radius() * arrangement.scale;
         let drawing = Drawing {
             size,
             background: linear(PAPER),
@@ -179,10 +191,11 @@ impl<'a> ChartPicture<'a> {
         labels.bar(arrangement.scale);
         label(&mut labels, &arrangement);
         labels.draw(&mut pixels, size)?;
-        let placed = self.ids.iter().enumerate();
-        let placed =
-            placed.map(|(place, id)| PlacedId { id, at: self.place_of_id(&arrangement, place), on: colour(place) });
-        labels::write_ids(&mut pixels, size, &placed.collect::<Vec<_>>())?;
+        let placed = self.ids.iter().enumerate().map(|(place, id)| {
+            let (on, is_behind) = on(place);
+            PlacedId { id, at: self.place_of_id(&arrangement, place), on, is_behind }
+        });
+        labels::write_ids(&mut pixels, size, placed.collect())?;
         Ok((Picture { size, pixels }, arrangement))
     }
 

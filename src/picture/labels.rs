@@ -1,5 +1,7 @@
 //! Labels of a picture: title, captions, legend and scale bar.
 
+use std::collections::BTreeMap;
+
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -311,18 +313,37 @@ pub(super) fn half_of_id(id: &str) -> [f64; 2] {
     [ink::width(id, ID_SIZE).unwrap_or_default(), ID_SIZE].map(|side| f64::from(side) / 2.0)
 }
 
-/// An id of a taxel in a picture: the pixel that it is about, right and down, and the colour that it stands on.
+/// An id of a taxel in a picture: the pixel that it is about, right and down, the colour that it stands on, and whether that is behind
+/// others at the same place.
 pub(super) struct PlacedId<'a> {
     pub(super) id: &'a str,
     pub(super) at: [f64; 2],
     pub(super) on: [u8; 3],
+    pub(super) is_behind: bool,
+}
+
+/// Puts ids that are about one pixel one below the other, on the colour that is seen there.
+fn stack(ids: &mut [PlacedId<'_>]) {
+    let mut at_pixel: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
+    for (index, placed) in ids.iter().enumerate() {
+        at_pixel.entry(placed.at.map(|pixel| pixel.round() as i64)).or_default().push(index);
+    }
+    for mut stack in at_pixel.into_values().filter(|stack| stack.len() > 1) {
+        stack.sort_by_key(|&index| ids[index].is_behind);
+        let (on, middle) = (ids[stack[0]].on, (stack.len() - 1) as f64 / 2.0);
+        for (line, index) in stack.into_iter().enumerate() {
+            ids[index].on = on;
+            ids[index].at[1] += (line as f64 - middle) * f64::from(ID_SIZE);
+        }
+    }
 }
 
 /// Writes `ids` on a picture of `size`, light on dark colours.
-pub(super) fn write_ids(pixels: &mut [u8], [width, height]: [u32; 2], ids: &[PlacedId<'_>]) -> Result<()> {
+pub(super) fn write_ids(pixels: &mut [u8], [width, height]: [u32; 2], mut ids: Vec<PlacedId<'_>>) -> Result<()> {
     ink::font()?;
+    stack(&mut ids);
     let area = BitMapBackend::with_buffer(pixels, (width, height)).into_drawing_area();
-    for &PlacedId { id, at, on } in ids {
+    for PlacedId { id, at, on, .. } in ids {
         let [r, g, b] = linear(on);
         let ink = if 0.2126 * r + 0.7152 * g + 0.0722 * b < DARK { WHITE } else { INK };
         let style = (FAMILY, ID_SIZE).into_font().color(&ink).pos(Pos::new(HPos::Center, VPos::Center));
@@ -392,6 +413,16 @@ mod tests {
             // Only where it would not fit, a title is smaller for it.
             assert_eq!(size < alone, width < 500, "{width}");
         }
+    }
+
+    #[test]
+    fn ids_of_taxels_at_one_point_are_below_each_other_on_the_colour_that_is_seen() {
+        let id = |id, x: f64, on: u8, is_behind| PlacedId { id, at: [x, 20.0], on: [on; 3], is_behind };
+        let mut ids = [id("13", 10.0, 0xD6, true), id("14", 40.0, 0xD6, true), id("200", 10.2, 0x20, false)];
+        stack(&mut ids);
+        let found = ids.map(|placed| (placed.at[1], placed.on[0]));
+        let half = f64::from(ID_SIZE) / 2.0;
+        assert_eq!(found, [(20.0 + half, 0x20), (20.0, 0xD6), (20.0 - half, 0x20)]);
     }
 
     #[test]

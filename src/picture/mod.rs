@@ -65,8 +65,8 @@ pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Pictu
     let dots = Dots::from_body(body);
     let shown = FieldColours::for_fields(fields, &options.fields, &dots);
     let title = format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel"));
-    let prepared = Prepared::new(body, fields, options, &title, shown.key(fields))?;
-    let Prepared { size, middle, arrangement, views, .. } = &prepared;
+    let prepared = Prepared::new(body, dots, (fields, options), &title, shown.key(fields))?;
+    let Prepared { dots, size, middle, arrangement, views, .. } = &prepared;
     let mut drawing = prepared.drawing(linear(PAPER));
     drawing.slices = dots.slices(&shown.coloured(fields), *middle, prepared.usual_radius() > 2.0);
     let mut pixels = raster::draw(&drawing)?;
@@ -102,24 +102,28 @@ struct Prepared {
 }
 
 impl Prepared {
-    /// For a picture with this title and key.
+    /// For a picture of `body` and its `dots` with this title and key.
     fn new(
         body: &Body,
-        fields: &[Field],
-        options: &Options,
+        dots: Dots,
+        (fields, options): (&[Field], &Options),
         title: &str,
         key: Vec<(Option<[u8; 3]>, String)>,
     ) -> Result<Self> {
         let size = checked(options.size)?;
         let triangles = body.triangles_at_rest();
-        let dots = Dots::from_body(body);
         let bounds = || triangles.iter().flat_map(|(_, corners)| *corners).chain(dots.places.iter().copied());
         let (low, high) = bounds().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
         if !(low.is_finite() && high.is_finite()) {
             return Err(Error::failed("it has neither surface nor taxels to draw").at(&body.name));
         }
         let middle = (low + high) / 2.0;
-        let views = if options.views.is_empty() { View::best(&dots.normals) } else { options.views.clone() };
+        let looked_at = options.look_at.as_deref().map(|name| look_at(body, fields, name)).transpose()?;
+        let views = match &looked_at {
+            _ if !options.views.is_empty() => options.views.clone(),
+            Some(taxels) => best_of(body, &dots, taxels),
+            None => View::best(&dots.normals),
+        };
         let axes: Vec<[DVec3; 3]> = views.iter().map(|view| view.axes()).collect();
         // Include the discs and their rims.
         let reach = |taxel: usize| {
@@ -131,12 +135,12 @@ impl Prepared {
         };
         let all = (0..dots.places.len()).flat_map(reach);
         let points: Vec<DVec3> = triangles.iter().flat_map(|(_, c)| c.map(|p| p - middle)).chain(all).collect();
-        let looked_at = match &options.look_at {
+        let in_sight = match looked_at {
             None => points.clone(),
-            Some(name) => look_at(body, fields, name)?.into_iter().flat_map(reach).collect(),
+            Some(taxels) => taxels.into_iter().flat_map(reach).collect(),
         };
         let mut labels = Labels::new(title, size[0]);
-        let (arrangement, size) = arranged(&mut labels, key, size, &axes, &looked_at)?;
+        let (arrangement, size) = arranged(&mut labels, key, size, &axes, &in_sight)?;
         let radius_m = 1.1 * points.iter().map(|p| p.length()).fold(0.0, f64::max).max(1e-9);
         let (corners, faces) = shape::surface(&triangles, middle);
         let outlines = Outlines::new(body, &dots, &views, &arrangement, middle);
@@ -181,6 +185,21 @@ fn look_at(body: &Body, fields: &[Field], name: &str) -> Result<Vec<usize>> {
     let names = fields.iter().map(|field| field.name.as_str()).chain(body.links.iter().map(|link| link.name.as_str()));
     let hint = nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(Error::usage(format!("there is no field or link `{name}` with taxels{hint}")).at(&body.name))
+}
+
+/// The views that show most of these `taxels`: those that nothing hides, or if all are hidden those that look at them.
+fn best_of(body: &Body, dots: &Dots, taxels: &[usize]) -> Vec<View> {
+    let seen = edges::seen(body, dots, View::ALL);
+    let shows = |view: View| {
+        let Some(index) = View::ALL.iter().position(|other| *other == view) else { return 0.0 };
+        let in_view = taxels.iter().filter(|&&taxel| seen[index][taxel]);
+        view.seen(&in_view.map(|&taxel| dots.normals[taxel]).collect::<Vec<_>>())
+    };
+    let best = View::best_of(shows);
+    if !best.is_empty() {
+        return best;
+    }
+    View::best(&taxels.iter().map(|&taxel| dots.normals[taxel]).collect::<Vec<_>>())
 }
 
 /// Views of `points` above a legend of `key` in a picture of at most `size`, and the picture's size.

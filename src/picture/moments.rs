@@ -162,8 +162,8 @@ impl Moments {
         Ok(Self { shown, letter, ends, quantity })
     }
 
-    /// Draws them on `body`, by default from the one or two sides that show most of the touch, or of what is shown; `progress` gets the share that is done and
-    /// says whether to go on.
+    /// Draws them on `body`, by default from the one or two sides that show most of the touch, or of what is shown, or as a body without a
+    /// recording if that is nothing; `progress` gets the share that is done and says whether to go on.
     ///
     /// # Errors
     /// As [`super::of_body`]; or `progress` has ended it.
@@ -176,21 +176,31 @@ impl Moments {
         progress: impl FnMut(f64) -> bool,
     ) -> Result<Vec<Picture>> {
         let mut options = options.clone();
-        if options.views.is_empty() {
-            let is_force = !matches!(self.letter, Receptor::Temperature | Receptor::Proximity);
-            let is_to_see = |shown: &Shown, taxel: usize| match is_force {
-                true => shown.pressed[taxel],
-                false => shown.values[taxel].is_some_and(f64::is_finite),
-            };
-            let looks = |taxel: &usize| self.shown.iter().any(|shown| is_to_see(shown, *taxel));
-            let normals = (0..body.taxels.len()).filter(looks).map(|taxel| {
-                let taxel = &body.taxels[taxel];
-                body.links[taxel.link].body_from_link.transform_vector3(taxel.normal_in_link)
-            });
-            options.views = View::two_best(&normals.collect::<Vec<_>>());
+        // A part of a body has the views that show it.
+        if options.views.is_empty() && options.look_at.is_none() {
+            options.views = self.views(body);
         }
         let picture = TouchPicture::new(body, fields, &options, ids)?;
         self.drawn(|moment| picture.draw(moment), progress)
+    }
+
+    /// The views of `body` that show most of what there is to see; if that is nothing, of the taxels of the letter.
+    fn views(&self, body: &Body) -> Vec<View> {
+        let is_force = !matches!(self.letter, Receptor::Temperature | Receptor::Proximity);
+        let is_to_see = |shown: &Shown, taxel: usize| match is_force {
+            true => shown.pressed[taxel],
+            false => shown.values[taxel].is_some_and(f64::is_finite),
+        };
+        let normals = |is_of: &dyn Fn(usize) -> bool| {
+            let taxels = body.taxels.iter().enumerate().filter(|&(taxel, _)| is_of(taxel));
+            let normal = |link: usize, in_link: DVec3| body.links[link].body_from_link.transform_vector3(in_link);
+            taxels.map(|(_, taxel)| normal(taxel.link, taxel.normal_in_link)).collect::<Vec<_>>()
+        };
+        let to_see = normals(&|taxel| self.shown.iter().any(|shown| is_to_see(shown, taxel)));
+        if to_see.is_empty() {
+            return View::best(&normals(&|taxel| self.letter.reads(body.taxels[taxel].modality)));
+        }
+        View::two_best(&to_see)
     }
 
     /// Draws them on the chart of field `index` of `fields`; else as [`Moments::draw`].

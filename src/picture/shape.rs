@@ -9,7 +9,7 @@ use rstar::primitives::GeomWithData;
 
 use super::colour::{self, linear};
 use crate::backend::gpu::raster::{Corner, Slice};
-use crate::body::{Body, Topology};
+use crate::body::{Body, Modality, Taxel, Topology};
 use crate::field::Field;
 
 /// Faces that meet at less than 45° are shaded as one smooth surface.
@@ -22,8 +22,10 @@ const MAX_RADIUS_RATIO: f64 = 2.0;
 pub(super) const RIM: f64 = 1.16;
 /// Radius of the rim of a taxel that is part of a touch, in radii.
 const TOUCHED_RIM: f64 = 1.32;
-/// Offset of discs towards the eye, in radii, so that a curved surface does not hide them.
+/// Offset of discs towards the eye, in radii, so that a curved surface does not hide them; of discs of another kind, which are
+/// behind.
 const LIFT: f64 = 0.6;
+const OTHER_LIFT: f64 = 0.3;
 /// Fields with taxels nearer than this many typical distances are neighbours.
 const NEIGHBOUR_SPACINGS: f64 = 1.6;
 /// Maximum number of slices of a disc.
@@ -37,17 +39,22 @@ pub(super) struct Disc {
     pub(super) colour: [u8; 3],
     /// The colour of the wide rim of a taxel that is part of a touch.
     pub(super) touched: Option<[u8; 3]>,
+    /// Whether it measures something else than what is shown: it is behind, and as large as the nearest of any kind leaves room for.
+    pub(super) is_other: bool,
     /// The share of its radius that is drawn.
     pub(super) share: f64,
 }
 
 /// The discs of taxels.
+#[derive(Clone)]
 pub(super) struct Dots {
     /// In the body at rest, m.
     pub(super) places: Vec<DVec3>,
     pub(super) normals: Vec<DVec3>,
     /// m.
     pub(super) radii: Vec<f64>,
+    /// Those that the nearest of any kind leaves room for, m.
+    narrow_radii: Vec<f64>,
     /// Typical distance of neighbours, m.
     spacing_m: f64,
 }
@@ -64,26 +71,52 @@ impl Dots {
             .flat_map(|(_, corners)| *corners)
             .fold(0.0, |most: f64, p| most.max(p.abs().max_element()));
         let mut dots = Self::at(places, normals, extent);
-        for (radius, taxel) in dots.radii.iter_mut().zip(&body.taxels).filter(|(_, taxel)| taxel.area > 0.0) {
-            *radius = radius.min((taxel.area / std::f64::consts::PI).sqrt());
+        for (radius, taxel) in dots.radii.iter_mut().zip(&body.taxels) {
+            *radius = radius.min(largest_radius(taxel));
         }
+        dots.narrow_radii.clone_from(&dots.radii);
         dots
     }
 
     /// At `places`; a single one is drawn as if its neighbours were a tenth of `extent_m` away.
     pub(super) fn at(places: Vec<DVec3>, normals: Vec<DVec3>, extent_m: f64) -> Self {
-        let tree = RTree::bulk_load(places.iter().map(DVec3::to_array).collect());
-        let gap = |place: &DVec3| {
-            let near = tree.nearest_neighbor_iter_with_distance_2(place.to_array()).take(32);
-            near.map(|(_, squared)| squared.sqrt()).find(|&distance| distance > COINCIDENT_M)
-        };
-        let gaps: Vec<Option<f64>> = places.iter().map(gap).collect();
-        let mut known: Vec<f64> = gaps.iter().flatten().copied().collect();
-        known.sort_by(f64::total_cmp);
-        let spacing_m = known.get(known.len() / 2).copied().unwrap_or((0.1 * extent_m).max(1e-3));
-        let radii =
-            gaps.iter().map(|gap| RADIUS_SHARE * gap.unwrap_or(spacing_m).min(MAX_RADIUS_RATIO * spacing_m)).collect();
-        Self { places, normals, radii, spacing_m }
+        let gaps = gaps(&places);
+        let spacing_m = median(&gaps).unwrap_or((0.1 * extent_m).max(1e-3));
+        let radii: Vec<f64> = gaps.iter().map(|gap| radius(*gap, spacing_m)).collect();
+        Self { places, normals, narrow_radii: radii.clone(), radii, spacing_m }
+    }
+
+    /// The same of these `taxels`, each as large as the nearest of its own kind leaves room for, where others are drawn small.
+    pub(super) fn by_kind<'a>(mut self, taxels: impl Iterator<Item = &'a Taxel>) -> Self {
+        // What is pressed is one skin, with one axis or three.
+        let is_skin = |kind: Modality| kind.is_pressed();
+        let taxels: Vec<&Taxel> = taxels.collect();
+        let mut kinds: Vec<Modality> = Vec::new();
+        for taxel in &taxels {
+            let is_known = |kind: &Modality| *kind == taxel.modality || is_skin(*kind) && is_skin(taxel.modality);
+            if !kinds.iter().any(is_known) {
+                kinds.push(taxel.modality);
+            }
+        }
+        if kinds.len() < 2 {
+            return self;
+        }
+        let mut own_gaps = vec![None; taxels.len()];
+        for kind in &kinds {
+            let is_own = |index: &usize| {
+                let modality = taxels[*index].modality;
+                modality == *kind || is_skin(modality) && is_skin(*kind)
+            };
+            let own: Vec<usize> = (0..taxels.len()).filter(is_own).collect();
+            let places: Vec<DVec3> = own.iter().map(|&index| self.places[index]).collect();
+            own.iter().zip(gaps(&places)).for_each(|(&index, gap)| own_gaps[index] = gap);
+        }
+        let spacing_m = median(&own_gaps).unwrap_or(self.spacing_m);
+        for (index, gap) in own_gaps.into_iter().enumerate() {
+            let wide = radius(gap, spacing_m).min(largest_radius(taxels[index]));
+            self.radii[index] = wide.max(self.narrow_radii[index]);
+        }
+        self
     }
 
     /// Typical distance of neighbours, m.
@@ -120,25 +153,28 @@ impl Dots {
     /// The `discs` relative to `middle`, unlit: a colour is what the legend says.
     pub(super) fn flat_slices(&self, discs: &[Disc], middle: DVec3, rims: bool) -> Vec<Slice> {
         let mut slices = Vec::with_capacity(2 * discs.len());
-        for (taxel, &Disc { colour, touched, share }) in discs.iter().enumerate() {
+        for (taxel, &Disc { colour, touched, is_other, share }) in discs.iter().enumerate() {
+            let (whole, lift) =
+                if is_other { (self.narrow_radii[taxel], OTHER_LIFT) } else { (self.radii[taxel], LIFT) };
+            let radius = share * whole;
             // A lift is in radii of the slice: the disc stays in front.
             match touched {
                 Some(rim) => {
-                    let wide = TOUCHED_RIM * share;
-                    slices.push(self.slice(taxel, middle, (wide, LIFT / wide), rim, (0.0, TAU)));
+                    let (wide, lift) = (TOUCHED_RIM * radius, lift / (TOUCHED_RIM * share));
+                    slices.push(self.slice(taxel, middle, (wide, lift), rim, (0.0, TAU)));
                 }
                 None if rims => {
-                    slices.push(self.slice(taxel, middle, (RIM * share, LIFT / share), colour::RIM, (0.0, TAU)));
+                    slices.push(self.slice(taxel, middle, (RIM * radius, lift / share), colour::RIM, (0.0, TAU)));
                 }
                 None => {}
             }
-            let slice = self.slice(taxel, middle, (share, (LIFT + 0.1) / share), colour, (0.0, TAU));
+            let slice = self.slice(taxel, middle, (radius, (lift + 0.1) / share), colour, (0.0, TAU));
             slices.push(Slice { colour: [slice.colour[0], slice.colour[1], slice.colour[2], 0.0], ..slice });
         }
         slices
     }
 
-    /// A piece of the disc of a taxel, relative to `middle`: radius and lift in its radii, start and sweep in rad.
+    /// A piece of the disc of a taxel, relative to `middle`: its radius in m and its lift in radii, start and sweep in rad.
     fn slice(
         &self,
         taxel: usize,
@@ -150,7 +186,7 @@ impl Dots {
         let [r, g, b] = linear(colour).map(|part| part as f32);
         Slice {
             middle: (self.places[taxel] - middle).as_vec3().to_array(),
-            radius: (radius * self.radii[taxel]) as f32,
+            radius: radius as f32,
             normal: self.normals[taxel].as_vec3().to_array(),
             lift: lift as f32,
             colour: [r, g, b, 1.0],
@@ -167,7 +203,7 @@ impl Dots {
         let mut slices = Vec::with_capacity(2 * self.places.len());
         for (taxel, colours) in of_taxel.iter_mut().enumerate() {
             if rims {
-                slices.push(self.slice(taxel, middle, (RIM, LIFT), colour::RIM, (0.0, TAU)));
+                slices.push(self.slice(taxel, middle, (RIM * self.radii[taxel], LIFT), colour::RIM, (0.0, TAU)));
             }
             if colours.is_empty() {
                 colours.push(colour::REST);
@@ -177,11 +213,38 @@ impl Dots {
             for (number, &colour) in colours.iter().enumerate() {
                 // Above the rim by more than the depth resolution.
                 let piece = (number as f64 * sweep, sweep);
-                slices.push(self.slice(taxel, middle, (1.0, LIFT + 0.1), colour, piece));
+                slices.push(self.slice(taxel, middle, (self.radii[taxel], LIFT + 0.1), colour, piece));
             }
         }
         slices
     }
+}
+
+/// By place, how far the nearest other one is, m.
+fn gaps(places: &[DVec3]) -> Vec<Option<f64>> {
+    let tree = RTree::bulk_load(places.iter().map(DVec3::to_array).collect());
+    let gap = |place: &DVec3| {
+        let near = tree.nearest_neighbor_iter_with_distance_2(place.to_array()).take(32);
+        near.map(|(_, squared)| squared.sqrt()).find(|&distance| distance > COINCIDENT_M)
+    };
+    places.iter().map(gap).collect()
+}
+
+/// The median of the gaps that are known.
+fn median(gaps: &[Option<f64>]) -> Option<f64> {
+    let mut known: Vec<f64> = gaps.iter().flatten().copied().collect();
+    known.sort_by(f64::total_cmp);
+    known.get(known.len() / 2).copied()
+}
+
+/// The radius of a disc that has its nearest neighbour at `gap` where they usually are `spacing_m` apart, m.
+fn radius(gap: Option<f64>, spacing_m: f64) -> f64 {
+    RADIUS_SHARE * gap.unwrap_or(spacing_m).min(MAX_RADIUS_RATIO * spacing_m)
+}
+
+/// The radius of the disc of the area of a taxel, m; infinite if it has none.
+fn largest_radius(taxel: &Taxel) -> f64 {
+    if taxel.area > 0.0 { (taxel.area / std::f64::consts::PI).sqrt() } else { f64::INFINITY }
 }
 
 /// The surface of `triangles` relative to `middle`: corners with normals, and triangles. A corner's normal is the

@@ -7,7 +7,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::colour::{PALETTE, PAPER, RIM, linear};
 use super::edges::{Lines, seen};
 use super::labels::{INK, Labels, Legend, PlacedId, half_of_id, short, write_ids};
-use super::shape::Disc;
+use super::shape::{Disc, Dots};
 use super::{Options, Picture, Prepared, arrows, stem};
 use crate::backend::gpu::raster;
 use crate::body::{Body, Modality};
@@ -95,7 +95,10 @@ impl<'a> TouchPicture<'a> {
     /// As [`super::of_body`].
     pub fn new(body: &'a Body, fields: &'a [Field], options: &Options, ids: bool) -> Result<Self> {
         let key = vec![(None, "0.00 s".to_owned())];
-        let prepared = Prepared::new(body, fields, options, &title(body), key)?;
+        let narrow = Dots::from_body(body);
+        // No disc may cover the id of another.
+        let dots = if ids { narrow } else { narrow.by_kind(body.taxels.iter()) };
+        let prepared = Prepared::new(body, dots, (fields, options), &title(body), key)?;
         let edges = options.edges.then(|| prepared.edges(body));
         let labelled = if ids { seen(body, &prepared.dots, &prepared.views) } else { Vec::new() };
         Ok(Self { body, prepared, labelled, edges })
@@ -125,7 +128,7 @@ impl<'a> TouchPicture<'a> {
             labels.caption(view.word(), [left + width / 2, top.saturating_sub(labels.above_view() / 2)]);
         }
         labels.bar(arrangement.scale);
-        moment.legend().into_iter().for_each(|legend| labels.colours(legend));
+        moment.legend(&discs).into_iter().for_each(|legend| labels.colours(legend));
         moment.arrow_key(usual).into_iter().for_each(|key| labels.arrow(key));
         labels.draw(&mut pixels, *size)?;
         self.write_ids(&discs, &mut pixels)?;
@@ -143,11 +146,12 @@ impl<'a> TouchPicture<'a> {
             for taxel in (0..ids.len()).filter(|&taxel| labelled[taxel]) {
                 let at = arrangement.pixel(index, dots.places[taxel] - *middle);
                 if arrangement.views[index].holds_all(at, half_of_id(&ids[taxel])) {
-                    placed.push(PlacedId { id: &ids[taxel], at, on: discs[taxel].colour });
+                    let Disc { colour, is_other, .. } = discs[taxel];
+                    placed.push(PlacedId { id: &ids[taxel], at, on: colour, is_behind: is_other });
                 }
             }
         }
-        write_ids(pixels, *size, &placed)
+        write_ids(pixels, *size, placed)
     }
 
     /// Draws an arrow for each tangential force, on the taxels that look towards the eye.
@@ -233,7 +237,7 @@ impl Moment<'_> {
     }
 
     /// By the body's taxels, which measure `modalities`, what is drawn of each. One that measures something else than the letter is a
-    /// small grey dot, unless its id `is_labelled`.
+    /// small grey dot behind, unless its id `is_labelled`.
     pub(super) fn discs(&self, modalities: impl Iterator<Item = Modality>, is_labelled: bool) -> Vec<Disc> {
         let colours = self.map();
         let [least, most] = self.ends.unwrap_or([0.0, 1.0]);
@@ -247,9 +251,10 @@ impl Moment<'_> {
         };
         let disc = |(value, modality): (&Option<f64>, Modality)| {
             if self.letter.reads(modality) {
-                return Disc { colour: colour(*value), touched: None, share: 1.0 };
+                return Disc { colour: colour(*value), touched: None, is_other: false, share: 1.0 };
             }
-            Disc { colour: IDLE, touched: None, share: if is_labelled { 1.0 } else { OTHER_SHARE } }
+            let share = if is_labelled { 1.0 } else { OTHER_SHARE };
+            Disc { colour: IDLE, touched: None, is_other: true, share }
         };
         let mut discs: Vec<Disc> = self.values.iter().zip(modalities).map(disc).collect();
         for marked in self.touches {
@@ -263,11 +268,15 @@ impl Moment<'_> {
         if self.letter.is_of_pressure() { name.to_owned() } else { format!("{name} · {}", self.letter) }
     }
 
-    /// The legend of the colours, if there is one.
-    pub(super) fn legend(&self) -> Option<Legend> {
-        let is_distance = self.letter == Receptor::Proximity;
-        let note = if is_distance { "grey: nothing in range".to_owned() } else { String::new() };
-        Some(Legend { colours: self.map(), ends: self.ends?, unit: self.unit.to_owned(), note })
+    /// The legend of the colours, if there is one, and of what else `discs` look like.
+    pub(super) fn legend(&self, discs: &[Disc]) -> Option<Legend> {
+        let note = match discs.iter().find(|disc| disc.is_other) {
+            _ if self.letter != Receptor::Proximity => "",
+            None => "grey: nothing in range",
+            Some(disc) if disc.share < 1.0 => "grey: nothing in range; small: taxels of another kind",
+            Some(_) => "grey: nothing in range, or of another kind",
+        };
+        Some(Legend { colours: self.map(), ends: self.ends?, unit: self.unit.to_owned(), note: note.to_owned() })
     }
 
     /// If there are arrows of forces, one that stands for a round force: its length, pixels, on taxels of `radius` pixels, and the force.
@@ -387,5 +396,22 @@ mod tests {
         let still = Mark { motion: Some(DVec3::new(0.0, 0.002, 0.0)), ..mark() };
         assert_eq!(still.lines().len(), 2);
         assert!(Mark { half_axes: None, motion: None, ..mark() }.lines().is_empty());
+    }
+
+    #[test]
+    fn a_legend_says_what_grey_means() {
+        let values = [Some(f64::INFINITY), None];
+        let moment = Moment { letter: Receptor::Proximity, ends: Some([0.0, 80.0]), ..Moment::of_pressures(&values) };
+        let note = |kinds: &[Modality], are_labelled: bool| {
+            let discs = moment.discs(kinds.iter().copied(), are_labelled);
+            assert!(discs.iter().all(|disc| disc.colour == IDLE || disc.colour == UNUSED));
+            moment.legend(&discs).unwrap().note
+        };
+        let mixed = [Modality::Proximity, Modality::Pressure];
+        assert_eq!(note(&[Modality::Proximity; 2], false), "grey: nothing in range");
+        assert_eq!(note(&mixed, false), "grey: nothing in range; small: taxels of another kind");
+        assert_eq!(note(&mixed, true), "grey: nothing in range, or of another kind");
+        let pressures = Moment { letter: Receptor::Sustained, ..moment.clone() };
+        assert!(pressures.legend(&pressures.discs(mixed.into_iter(), false)).unwrap().note.is_empty());
     }
 }

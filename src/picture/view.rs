@@ -6,8 +6,12 @@ use crate::backend::gpu::raster::Eye;
 
 /// Pixels around each view.
 const MARGIN: f64 = 14.0;
+/// The outer part of that margin, pixels, which stays empty: what a view shows beside a part of a body ends before the next view.
+const GAP: f64 = 5.0;
 /// A view is left out if it shows less than this share of the best one.
 const MIN_VISIBLE_SHARE: f64 = 0.02;
+/// The same of a view of a part of a body, which the rest of the body fills.
+const MIN_SHARE_OF_PART: f64 = 0.1;
 /// A second view of a touch shows at least this share of what the first one does.
 const SECOND_SHARE: f64 = 0.3;
 
@@ -51,39 +55,53 @@ impl View {
     /// Without taxels front, back, left and right.
     #[must_use]
     pub fn best(normals: &[DVec3]) -> Vec<Self> {
-        let sides = Self::by_seen(normals);
-        let most = sides[0].0;
-        if most == 0.0 {
+        let sides = Self::most_first(|view| view.seen(normals));
+        if sides[0].0 == 0.0 {
             return Self::ALL[..4].to_vec();
         }
-        let best: Vec<Self> =
-            sides[..4].iter().filter(|(seen, _)| *seen > MIN_VISIBLE_SHARE * most).map(|&(_, view)| view).collect();
+        let best = Self::worth(&sides[..4], MIN_VISIBLE_SHARE * sides[0].0);
         let room = best.len() < 4;
         Self::ALL.iter().copied().filter(|view| best.contains(view) || (room && *view == Self::ThreeQuarter)).collect()
     }
 
+    /// At most four views, of those that show something of what `shows` measures by view: the sides that show most of it, and if they
+    /// are fewer three-quarter.
+    pub(super) fn best_of(shows: impl Fn(Self) -> f64) -> Vec<Self> {
+        let mut sides = Self::most_first(&shows);
+        let enough = MIN_SHARE_OF_PART * sides[0].0;
+        sides.truncate(4);
+        let aslant = (shows(Self::ThreeQuarter), Self::ThreeQuarter);
+        let mut best = Self::worth(&sides, enough);
+        best.extend(Self::worth(&[aslant], enough));
+        best.truncate(4);
+        Self::ALL.iter().copied().filter(|view| best.contains(view)).collect()
+    }
+
     /// The side that shows most of the taxels with these normals, and a second one, also three-quarter, if that shows a good part of
-    /// them. Without taxels front and back.
+    /// them.
     #[must_use]
     pub(super) fn two_best(normals: &[DVec3]) -> Vec<Self> {
-        let sides = Self::by_seen(normals);
-        if sides[0].0 == 0.0 {
-            return Self::ALL[..2].to_vec();
-        }
+        let sides = Self::most_first(|view| view.seen(normals));
         let is_second = |&(seen, _): &(f64, Self)| seen >= SECOND_SHARE * sides[0].0;
         let aslant = (Self::ThreeQuarter.seen(normals), Self::ThreeQuarter);
         let second = [sides[1], aslant].into_iter().find(is_second);
         std::iter::once(sides[0].1).chain(second.map(|(_, view)| view)).collect()
     }
 
-    /// The six sides with how much each shows of the taxels with these normals, the most first.
-    fn by_seen(normals: &[DVec3]) -> Vec<(f64, Self)> {
-        let mut sides: Vec<(f64, Self)> = Self::ALL[..6].iter().map(|&view| (view.seen(normals), view)).collect();
+    /// The six sides with how much each shows, by what `shows` measures, the most first.
+    fn most_first(shows: impl Fn(Self) -> f64) -> Vec<(f64, Self)> {
+        let mut sides: Vec<(f64, Self)> = Self::ALL[..6].iter().map(|&view| (shows(view), view)).collect();
         sides.sort_by(|a, b| b.0.total_cmp(&a.0));
         sides
     }
 
-    fn seen(self, normals: &[DVec3]) -> f64 {
+    /// Those of `views` that show more than `enough`.
+    fn worth(views: &[(f64, Self)], enough: f64) -> Vec<Self> {
+        views.iter().filter(|&&(seen, _)| seen > enough).map(|&(_, view)| view).collect()
+    }
+
+    /// How much it shows of taxels with these normals.
+    pub(super) fn seen(self, normals: &[DVec3]) -> f64 {
         let towards = self.axes()[2];
         normals.iter().map(|normal| normal.dot(towards).max(0.0)).sum()
     }
@@ -164,7 +182,8 @@ impl Arrangement {
                 let size = [wide * scale + 2.0 * MARGIN + spare, tall * scale + 2.0 * MARGIN];
                 placed.push(PlacedView {
                     axes: *axes,
-                    part: [x, y + caption, size[0], size[1]].map(|pixels| pixels.round().max(1.0) as u32),
+                    part: [x + GAP, y + caption + GAP, size[0] - 2.0 * GAP, size[1] - 2.0 * GAP]
+                        .map(|pixels| pixels.round().max(1.0) as u32),
                     middle: [(across[0] + across[1]) / 2.0, (up[0] + up[1]) / 2.0],
                 });
                 x += size[0];
@@ -173,7 +192,7 @@ impl Arrangement {
         }
         // Rounding may exceed the edge by one.
         for PlacedView { part, .. } in &mut placed {
-            part[2] = part[2].min(width.saturating_sub(part[0])).max(1);
+            part[2] = part[2].min((width - GAP as u32).saturating_sub(part[0])).max(1);
         }
         Self { views: placed, scale, height: (y - f64::from(top)).ceil() as u32 }
     }
@@ -244,7 +263,12 @@ mod tests {
         assert_eq!(View::two_best(&[DVec3::NEG_Y, DVec3::NEG_Y, DVec3::X]), [View::Bottom, View::Left]);
         assert_eq!(View::two_best(&[DVec3::NEG_Y; 9]), [View::Bottom]);
         assert_eq!(View::two_best(&[DVec3::Y; 9]), [View::Top, View::ThreeQuarter]);
-        assert_eq!(View::two_best(&[]), [View::Front, View::Back]);
+        // Of a part of a body nothing but what shows it, not even from aslant.
+        let shows = |seen: &'static [View]| move |view: View| if seen.contains(&view) { 1.0 } else { 0.0 };
+        assert_eq!(View::best_of(shows(&[View::Bottom])), [View::Bottom]);
+        assert_eq!(View::best_of(shows(&[View::Top, View::ThreeQuarter])), [View::Top, View::ThreeQuarter]);
+        assert_eq!(View::best_of(shows(View::ALL)), View::ALL[..4]);
+        assert!(View::best_of(shows(&[])).is_empty());
     }
 
     #[test]
@@ -257,6 +281,16 @@ mod tests {
             assert!(arrangement.height <= 701);
             for (eye, placed) in arrangement.eyes(20.0).iter().zip(&arrangement.views) {
                 let [left, top, width, height] = placed.part;
+                let is_apart = |other: &PlacedView| {
+                    let [x, y, wide, high] = other.part;
+                    let gap = GAP as u32;
+                    other.part == placed.part
+                        || x >= left + width + gap
+                        || left >= x + wide + gap
+                        || y >= top + height + gap
+                        || top >= y + high + gap
+                };
+                assert!(arrangement.views.iter().all(is_apart) && left >= 5 && left + width <= 895);
                 assert!(left + width <= 900 && top >= 40 && top + height <= 742, "{:?}", placed.part);
                 assert!(placed.holds((left as i32, top as i32)) && !placed.holds(((left + width) as i32, top as i32)));
                 for point in &points {

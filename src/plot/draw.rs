@@ -37,6 +37,8 @@ const LINES: [RGBColor; 7] = [
 /// Of the line of a field that holds all others: under theirs, and seen beside them.
 const WHOLE: RGBColor = RGBColor(176, 184, 192);
 const WHOLE_WIDTH: f64 = 4.0;
+/// Width of an axis's numbers, pixels: beside them is the axis's name.
+const NUMBERS: i32 = LEFT - 27;
 /// Quantities that a map shows.
 const PEAK: usize = 0;
 const INTEGRAL: usize = 1;
@@ -210,10 +212,12 @@ impl<'a> Plot<'a> {
             |value: f64| f64::from(area.bottom()) - (value - range[0]) / (range[1] - range[0]) * f64::from(area.height);
         let marks = ticks(range, 4);
         let step = if marks.len() > 1 { marks[1] - marks[0] } else { range[1] - range[0] };
-        for &mark in &marks {
+        let numbers: Vec<String> = marks.iter().map(|&mark| shown(mark, step)).collect();
+        let size = pen.fitting_size(&numbers, 11, NUMBERS)?;
+        for (&mark, number) in marks.iter().zip(&numbers) {
             let level = y(mark).round() as i32;
             pen.line(&[(area.left, level), (area.right(), level)], FAINT, 1.0)?;
-            pen.text(&shown(mark, step), 11, GREY, HPos::Right, (area.left - 7, level))?;
+            pen.text(number, size, GREY, HPos::Right, (area.left - 7, level))?;
         }
         let seconds = ticks(span, (area.width / 90) as usize);
         let step_s = if seconds.len() > 1 { seconds[1] - seconds[0] } else { span[1] - span[0] };
@@ -245,7 +249,8 @@ impl<'a> Plot<'a> {
         }
         if panel.column.components > 1 {
             let names = if panel.column.components == 2 { "u, paler v" } else { "x, paler y, palest z" };
-            pen.text(names, 10, GREY, HPos::Right, (area.right(), area.top + 6))?;
+            // Above the panel, where no line is.
+            pen.text(names, 10, GREY, HPos::Right, (area.right(), area.top - 6))?;
         }
         Ok(())
     }

@@ -10,6 +10,8 @@ use crate::ink::{FAMILY, cannot};
 /// Dots drawn for each pixel of the arrangement: plotters has whole dots only.
 pub(super) const SCALE: i32 = 2;
 pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
+/// The least size of a text, pixels.
+const MIN_SIZE: i32 = 6;
 
 /// Pixels as dots.
 pub(super) fn scaled(pixels: f64) -> i32 {
@@ -47,6 +49,17 @@ impl<B: DrawingBackend> Pen<'_, B> {
     pub(super) fn width(&self, text: &str, pixels: i32) -> Result<i32> {
         let style = Self::style(pixels, INK, HPos::Left);
         Ok(self.area.estimate_text_size(text, &style).map_err(cannot)?.0 as i32 / SCALE)
+    }
+
+    /// The size at which all `texts` fit into `width`, at most `pixels`.
+    pub(super) fn fitting_size(&self, texts: &[String], pixels: i32, width: i32) -> Result<i32> {
+        for size in (MIN_SIZE..=pixels).rev() {
+            let widths = texts.iter().map(|text| self.width(text, size)).collect::<Result<Vec<_>>>()?;
+            if widths.into_iter().all(|wide| wide <= width) {
+                return Ok(size);
+            }
+        }
+        Ok(MIN_SIZE)
     }
 
     /// `text` cut off at its beginning where it is wider than `width`: the end of a path says more.

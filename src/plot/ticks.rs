@@ -15,8 +15,14 @@ pub(super) fn ticks([low, high]: [f64; 2], count: usize) -> Vec<f64> {
     (first..=last).map(|index| index as f64 * step).collect()
 }
 
-/// `[low, high]` widened to round numbers, with 0 if it is near.
+/// What differs by less than this share of its size is alike: values are in single precision, and quantities are made of several.
+const RESOLUTION: f64 = 4e-6;
+
+/// `[low, high]` widened to round numbers, with 0 if it is near. Rounding noise is no range: what is constant but for that is around the
+/// middle.
 pub(super) fn rounded([low, high]: [f64; 2]) -> [f64; 2] {
+    let is_constant = high - low <= RESOLUTION * low.abs().max(high.abs());
+    let [low, high] = if is_constant { [(low + high) / 2.0; 2] } else { [low, high] };
     let low = if low > 0.0 && low < 0.5 * high { 0.0 } else { low };
     let high = if high < 0.0 && high > 0.5 * low { 0.0 } else { high };
     if low == high {
@@ -52,6 +58,13 @@ mod tests {
         assert_eq!(ticks([5.0, 5.0], 3), [5.0]);
         assert_eq!(rounded([3.0, 97.0]), [0.0, 100.0]);
         assert_eq!(rounded([0.0, 0.0]), [0.0, 1.0]);
+        // Noise is no range, and what is larger is one.
+        for noise in [0.0, 1e-6, 3e-5] {
+            let [low, high] = rounded([20.0 - noise, 20.0 + noise]);
+            assert!((low - 18.0).abs() < 1e-3 && (high - 22.0).abs() < 1e-3, "{noise}: {low} to {high}");
+        }
+        let [low, high] = rounded([20.0, 20.001]);
+        assert!((19.9..=20.0).contains(&low) && (20.001..20.1).contains(&high), "{low} to {high}");
         let [low, high] = rounded([-3.2, 7.1]);
         assert!(low <= -3.2 && (7.1..10.0).contains(&high));
     }

@@ -25,6 +25,7 @@ mod exports;
 mod fields;
 mod formats;
 mod inspect;
+mod kinds_drawn;
 mod letters_asked;
 mod letters_oracle;
 mod limbs;

@@ -146,3 +146,64 @@ fn a_noisy_line_stays_in_its_panel() {
     let longest = points.map(|points| points.split_whitespace().count()).max();
     assert!(longest.unwrap() <= 4 * 760 + 8, "{longest:?} points");
 }
+
+/// A plot of `outputs` of one distance taxel, 29 mm beside the middle of its field, over which something comes nearer at 20 mm/s.
+fn coming(folder: &Path, outputs: &str) -> String {
+    let at = |name: &str| folder.join(name);
+    let skin = "id,link,x,y,z,nx,ny,nz,area,modality\n300,pad,0.029,0,0,0,0,1,1.6e-5,proximity\n";
+    std::fs::write(at("skin.csv"), skin).unwrap();
+    std::fs::write(at("fields.toml"), "[[fields]]\nname = \"pad\"\ntaxels = [300]\n").unwrap();
+    std::fs::write(at("near.toml"), "[proximity]\nunit = \"mm\"\nrange = 300\n").unwrap();
+    let rows: String = (0..100).map(|n| format!("{},{}\n", 0.05 * f64::from(n), 200 - n)).collect();
+    std::fs::write(at("near.csv"), format!("t,300\n{rows}")).unwrap();
+    let [skin, bare, fields, body, near, known] =
+        ["skin.csv", "bare.glb", "fields.toml", "pad.glb", "near.csv", "near.toml"].map(at);
+    done(&["author", "--csv-skin", text_of(&skin), "-o", text_of(&bare)]);
+    done(&["author", text_of(&bare), "--recipe", text_of(&fields), "-o", text_of(&body)]);
+    let how = ["--body", text_of(&body), "--calibration", text_of(&known), "--outputs", outputs];
+    String::from_utf8(drawn(folder, "a.svg", &[&[text_of(&near)][..], &how].concat())).unwrap()
+}
+
+/// The value of `key` in a tag of an SVG.
+fn attribute<'a>(tag: &'a str, key: &str) -> &'a str {
+    tag.split_once(&format!(" {key}=\"")).and_then(|(_, rest)| rest.split('"').next()).unwrap()
+}
+
+#[test]
+fn a_constant_is_a_flat_line_whatever_its_rounding_and_numbers_leave_the_name_of_their_axis_free() {
+    let folder = tempfile::tempdir().unwrap();
+    let svg = coming(folder.path(), "approach_speed");
+    let texts = texts(svg.as_bytes());
+    assert!(texts.iter().any(|text| text == "20") && texts.iter().all(|text| !text.contains("0.00000")), "{texts:?}");
+    let lines = svg.lines().filter(|line| line.contains("<polyline"));
+    let longest = lines.max_by_key(|line| attribute(line, "points").len()).unwrap();
+    let heights: Vec<f64> = attribute(longest, "points")
+        .split_whitespace()
+        .map(|point| point.split_once(',').unwrap().1.parse().unwrap())
+        .collect();
+    assert!(heights.len() > 20 && heights.iter().all(|height| (height - heights[0]).abs() <= 1.0), "{heights:?}");
+}
+
+#[test]
+fn the_words_about_components_are_beside_their_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let svg = coming(folder.path(), "nearest_position");
+    let text = svg.split("<text").find(|text| text.contains("paler")).unwrap();
+    let [right, middle] = ["x", "y"].map(|key| attribute(text, key).parse::<f64>().unwrap());
+    // In dots: 10 pixels high, and about 120 wide.
+    let is_at = |[x, y]: [f64; 2]| (right - 240.0..=right).contains(&x) && (middle - 9.0..=middle + 9.0).contains(&y);
+    let mut segments = 0;
+    for line in svg.lines().filter(|line| line.contains("<polyline")) {
+        let point = |text: &str| {
+            let (x, y) = text.split_once(',').unwrap();
+            [x.parse::<f64>().unwrap(), y.parse().unwrap()]
+        };
+        let points: Vec<[f64; 2]> = attribute(line, "points").split_whitespace().map(point).collect();
+        for ends in points.windows(2) {
+            let along = |share: f64| [0, 1].map(|axis| ends[0][axis] + share * (ends[1][axis] - ends[0][axis]));
+            assert!((0..=100).all(|step| !is_at(along(f64::from(step) / 100.0))), "{line}");
+            segments += 1;
+        }
+    }
+    assert!(segments > 10);
+}

@@ -56,7 +56,8 @@ const ORANGE: [u8; 3] = [0xE6, 0x9F, 0x00];
 
 #[test]
 fn edges_connect_neighbours_that_a_view_sees() {
-    let arguments = ["mat", "--view", "top", "--size", "900"];
+    // With the middle of the mat on a pixel, diagonals are even.
+    let arguments = ["mat", "--view", "top", "--size", "901x900"];
     let Some(plain) = render(&arguments) else { return };
     let lined = render(&[&arguments[..], &["--edges"]].concat()).unwrap();
     let pairs = plain.pixels.chunks_exact(3).zip(lined.pixels.chunks_exact(3));
@@ -267,4 +268,18 @@ fn words_grow_with_the_picture() {
     };
     let (Some(small), Some(large)) = (title("1000"), title("3000")) else { return };
     assert!((3 * small).abs_diff(large) <= 4, "{small} {large} pixels");
+}
+
+#[test]
+fn a_part_of_a_body_is_drawn_from_where_it_is_seen_and_its_views_stand_apart() {
+    let of = |more: &[&str]| render(&[&["sensing-hand", "--look-at", "hand/palm", "--size", "600"], more].concat());
+    let (Some(usual), Some(below)) = (of(&[]), of(&["--view", "bottom"])) else { return };
+    assert!(usual.pixels == below.pixels && usual.height == below.height, "the palm looks down");
+    // Views that are asked for are drawn, each with paper around it: also where the rest of the hand goes on beyond its view.
+    let two = of(&["--view", "bottom,top"]).unwrap();
+    let paper = two.at(0, 0);
+    let filled = |x: u32| (60..two.height - 60).filter(|&y| two.at(x, y) != paper).count();
+    let bands: Vec<bool> = (0..600).map(|x| filled(x) > 0).collect();
+    let begins = bands.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+    assert!(begins == 2 && bands[..3].iter().chain(&bands[597..]).all(|filled| !filled), "{begins}");
 }

@@ -72,7 +72,7 @@ impl Skin {
 }
 
 /// The colours of the picture that `arguments` draw at `to`, or none where no adapter answers.
-fn drawn(arguments: &[&str], to: &Path) -> Option<Vec<[u8; 3]>> {
+pub(super) fn drawn(arguments: &[&str], to: &Path) -> Option<Vec<[u8; 3]>> {
     let output = output(arguments);
     let said = stderr(&output);
     if said.contains("no GPU driver answers") {
@@ -92,7 +92,7 @@ fn pixels(path: &Path) -> Vec<[u8; 3]> {
 }
 
 /// Pixels of a colour, as near as an adapter rounds: of discs, which are flat, and a column of the legend.
-fn count(picture: &[[u8; 3]], colour: [u8; 3]) -> usize {
+pub(super) fn count(picture: &[[u8; 3]], colour: [u8; 3]) -> usize {
     let is_of = |pixel: &&[u8; 3]| pixel.iter().zip(colour).all(|(&one, other)| one.abs_diff(other) <= 2);
     picture.iter().filter(is_of).count()
 }
@@ -273,6 +273,8 @@ fn a_skin_of_temperatures_alone_is_planned_compared_drawn_and_has_nothing_to_tra
         let bill = done(&[&["plan", "--json", "--body", body][..], source].concat());
         let bill: serde_json::Value = serde_json::from_str(&bill).unwrap();
         assert_eq!([&bill["taxels"], &bill["of_taxels"], &bill["fields"], &bill["of_fields"]], [4, 4, 1, 1]);
+        let text = done(&[&["plan", "--body", body][..], source].concat());
+        assert!(text.contains("memberships 4\n") && text.contains("1 of 1\n") && !text.contains("pressed"), "{text}");
         let timed = bill["stages"].as_array().unwrap().iter().filter(|stage| stage["us"].is_number());
         assert_eq!(timed.map(|stage| stage["stage"].as_str().unwrap()).collect::<Vec<_>>(), ["temperature"]);
     }
@@ -324,6 +326,9 @@ fn a_plan_and_a_trade_tell_what_each_letter_costs() {
         assert!(stage(&all, letter)["us"].is_number(), "{letter}: {all}");
     }
     assert_eq!((&all["taxels"], &all["fields"], &all["of_fields"]), (&53.into(), &28.into(), &28.into()));
+    // In words, fields of the body are told apart from their percepts, and memberships of pressures from others.
+    let text = done(&["plan", "--body", "sensing-hand", "--backend", "cpu"]);
+    assert!(text.contains("13 of 13, 28 percepts of 4 letters") && text.contains(" of other letters\n"), "{text}");
     // A letter that is not asked for does not run, and it is not said that there are no taxels.
     let two = bill(&["--letters", "sustained,temperature"]);
     assert!(stage(&two, "temperature")["us"].is_number() && stage(&two, "shear")["runs"] == false);

@@ -133,6 +133,44 @@ fn a_wide_table_has_a_row_for_every_frame() {
 }
 
 #[test]
+fn a_wide_table_has_of_a_field_what_its_letter_gives() {
+    let folder = tempfile::tempdir().unwrap();
+    let [wide, long] = ["wide.csv", "long.csv"].map(|name| folder.path().join(name));
+    let flags = ["run", "--body", "sensing-hand", "--backend", "cpu", "--sink"];
+    done(&[&flags[..], &[text_of(&wide), "--wide"]].concat());
+    done(&[&flags[..], &[text_of(&long), "--all-fields"]].concat());
+    let (titles, rows) = table(&wide);
+    let has = |title: &str| titles.iter().any(|other| other == title);
+    assert!(has("hand/palm sustained total [N]") && has("hand/palm temperature warmest [°C]"), "{titles:?}");
+    for other in
+        ["hand/palm sustained warmest [°C]", "hand/palm temperature total [N]", "hand/palm proximity shear_u [N]"]
+    {
+        assert!(!has(other), "{other}");
+    }
+    // What is left out is empty in the long table, and all else is in both.
+    let (columns, lines) = table(&long);
+    let fields = lines.len() / rows.len();
+    let of_letters = columns.iter().position(|column| column == "letter").unwrap();
+    let first = columns.iter().position(|column| column == "contact").unwrap();
+    for (row, lines) in rows.iter().zip(lines.chunks(fields)) {
+        let mut known = 2;
+        for line in lines {
+            for (column, value) in columns.iter().zip(line).skip(first) {
+                let title = format!("{} {} {column}", line[2], line[of_letters]);
+                match titles.iter().position(|other| *other == title) {
+                    Some(at) => {
+                        assert_eq!(row[at], *value, "{title}");
+                        known += 1;
+                    }
+                    None => assert!(value.is_empty(), "{title}: {value}"),
+                }
+            }
+        }
+        assert_eq!(known, titles.len());
+    }
+}
+
+#[test]
 fn names_that_need_it_are_quoted() {
     let folder = tempfile::tempdir().unwrap();
     let (body, path) = (folder.path().join("a, \"b\".glb"), folder.path().join("a.csv"));

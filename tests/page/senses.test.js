@@ -73,6 +73,18 @@ test("the coldest of a scale has a colour, and what is beyond an end has that of
   assert.deepEqual([shown(40), shown(99)], [1, 1]);
 });
 
+test("the largest tangential force so far has a round scale", () => {
+  const senses = new Senses(about, 6);
+  const take = (u, v) => {
+    const frame = { pressure: new Float32Array(6), health: new Uint8Array(6), shear: Float32Array.of(u, v) };
+    senses.take(frame);
+    return senses.shearScale;
+  };
+  const scales = [take(0, 0), take(0.03, 0.04), take(0, -0.19), take(0.1, 0), take(6, 6)];
+  const rounded = scales.map((scale) => scale && Number(scale.toPrecision(6)));
+  assert.deepEqual(rounded, [null, 0.05, 0.2, 0.2, 10]);
+});
+
 test("the letter of pressure is called so where it is the only one", () => {
   const fields = (...letters) =>
     letters.map((letter) => ({ letter, sense: letter === "shear" ? "shear" : "pressure" }));
@@ -254,6 +266,74 @@ test("arrows of tangential forces point where they pull", async () => {
   assert.ok(Math.abs(arrows[0][1] - 1.5) < 1e-4, String(arrows[0]));
   assert.deepEqual([lengths[2], lengths[3]], [0, null]);
   await page.close();
+});
+
+/** A temperature taxel at the place of a pressed one, and a recording without ends of its scales: first it is pressed and pulled, then
+ * something is only near. */
+async function mixed() {
+  const at = (name) => join(folder, name);
+  const rows = ["1,pad,0,0,0,0,0,1,1.6e-5,force3,1,0,0", "2,pad,0.005,0,0,0,0,1,1.6e-5,force3,1,0,0"];
+  rows.push("11,pad,0,0,0,0,0,1,1.6e-5,temperature,,,", "21,pad,0.012,0,0,0,0,1,1.6e-5,proximity,,,");
+  writeFileSync(at("mixed.csv"), `id,link,x,y,z,nx,ny,nz,area,modality,tx,ty,tz\n${rows.join("\n")}\n`);
+  writeFileSync(at("mixed-fields.toml"), '[[fields]]\nname = "pad"\ntaxels = ["0..=99"]\n');
+  const calibration =
+    '[all]\nunit = "N"\n[temperature]\nraw_range = [0, 60]\n[proximity]\nunit = "mm"\nrange = 80\n';
+  writeFileSync(at("mixed.toml"), calibration);
+  execFileSync(SOMATIC, ["author", "--csv-skin", at("mixed.csv"), "-o", at("mixed-bare.glb")]);
+  const recipe = ["--recipe", at("mixed-fields.toml")];
+  execFileSync(SOMATIC, ["author", at("mixed-bare.glb"), ...recipe, "-o", at("mixed.glb")]);
+  const frames = ["0,1.4,0.7,50,70,0.3,0.15,0,0", "1,0,0,50,20,0,0,0,0"];
+  writeFileSync(at("mixed-touch.csv"), `t,1,2,11,21,1.u,2.u,1.v,2.v\n${frames.join("\n")}\n`);
+  return view("--body", at("mixed.glb"), "--calibration", at("mixed.toml"), at("mixed-touch.csv"));
+}
+
+test("what is shown lies above, is on its own scale, and says nothing of what was shown before", async () => {
+  const own = await mixed();
+  const { page, problems } = await open(own.url);
+  const choose = async (letter) => {
+    await page.locator(".legend-letters button", { hasText: new RegExp(`^${letter}$`) }).click();
+    await settled(page);
+  };
+  await pause(page);
+  await page.keyboard.press("0");
+  await seek(page, 0);
+  while ((await page.locator("#marks-choice").inputValue()) !== "none") await page.keyboard.press("m");
+  // The thermistor itself is covered as long as pressures are shown.
+  const [place, maps] = await page.evaluate(() => {
+    const { welcome, pressureColours, mesh } = window.somatic.model;
+    const [x, y] = window.somatic.pixelOfTaxel(mesh.taxelId.indexOf(1));
+    return [[x, y + 5], { pressure: pressureColours, temperature: welcome.senses.temperature_colours }];
+  });
+  await choose("temperature");
+  const [warm] = await coloursAt(page, [place]);
+  await picture(page, "senses-above.png");
+  assert.ok(near(warm, maps.temperature[Math.round((255 * 50) / 60)]), String(warm));
+  await choose("pressure");
+  const [pressed] = await coloursAt(page, [place]);
+  assert.ok(near(pressed, maps.pressure[255]), String(pressed));
+  // The recording's most pressure is 1.4 N, and 0.3 N pull.
+  const [title, source] = [page.locator(".legend-title"), page.locator(".legend-source")];
+  const last = async () => Number((await page.locator(".legend-ticks span").allInnerTexts()).at(-1));
+  assert.deepEqual([await last(), await source.textContent()], [1.4, "fixed to the recording’s maximum"]);
+  await choose("shear");
+  assert.equal(await title.textContent(), "Shear of a taxel, N");
+  assert.deepEqual([await last(), await source.textContent()], [0.5, "grown with the data so far"]);
+  // An autoscale is of what is shown.
+  await page.locator(".legend-head button").click();
+  assert.equal(await last(), 0.3);
+  await choose("pressure");
+  assert.equal(await last(), 1.4);
+  await page.locator(".legend-head button").click();
+
+  await seek(page, 1);
+  await choose("proximity");
+  const caption = page.locator("#bar-scale");
+  assert.equal(await caption.textContent(), "full bar: 20.0 mm");
+  await choose("shear");
+  assert.equal(await caption.textContent(), "");
+  assert.deepEqual(problems, []);
+  await page.close();
+  await own.stop();
 });
 
 test("a body of pressures alone has no such buttons, arrows or bytes", async () => {

@@ -20,6 +20,8 @@ pub(super) struct Bill {
     pub(super) body: String,
     /// Of how many.
     pub(super) taxels: [usize; 2],
+    /// Of how many of the body that have taxels of a letter.
+    pub(super) named_fields: [usize; 2],
     /// Once for each letter that they have taxels of.
     pub(super) fields: [usize; 2],
     pub(super) letters: usize,
@@ -105,11 +107,14 @@ impl Bill {
             }
             None => None,
         };
+        let names: BTreeSet<&str> = plan.fields().map(|field| field.name).collect();
+        let of_letters = letters_by_field(&plan, body)?;
         let agreement = compared.as_mut().map(|engine| played.compared(engine)).transpose()?;
         Ok(Self {
             body: body.name.clone(),
             taxels: [taxels_read(&plan, body), body.taxels.len()],
-            fields: [plan.fields().len(), fields_of_letters(&plan, body)?],
+            named_fields: [names.len(), of_letters.iter().filter(|letters| **letters > 0).count()],
+            fields: [plan.fields().len(), of_letters.iter().sum()],
             letters: plan.letters().len(),
             memberships: plan.memberships(),
             bytes: [plan.bytes_up(), plan.bytes_down()],
@@ -133,13 +138,14 @@ fn taxels_read(plan: &Plan, body: &Body) -> usize {
     read.len()
 }
 
-/// How many fields of `body` have taxels of each letter of `plan`, all letters together.
-fn fields_of_letters(plan: &Plan, body: &Body) -> Result<usize> {
+/// By field of `body`, of how many letters of `plan` it has taxels.
+fn letters_by_field(plan: &Plan, body: &Body) -> Result<Vec<usize>> {
     let set = FieldSet::new(body)?;
     let has = |field: &Field, letter: &Letter| {
         field.members.iter().any(|member| letter.receptor.reads(body.taxels[member.taxel].modality))
     };
-    Ok(plan.letters().iter().map(|letter| set.fields.iter().filter(|field| has(field, letter)).count()).sum())
+    let letters = |field: &Field| plan.letters().iter().filter(|letter| has(field, letter)).count();
+    Ok(set.fields.iter().map(letters).collect())
 }
 
 /// The frames that `engines` are measured on, and what they are, in words.
@@ -151,7 +157,13 @@ fn played(
     engines: &mut [Engine],
 ) -> Result<(Played, String)> {
     let mut frames = Vec::new();
-    let mut on = "with every taxel pressed".to_owned();
+    let pressed = body.taxels.iter().filter(|taxel| taxel.modality.is_pressed()).count();
+    let mut on = match pressed {
+        0 => "with every taxel read",
+        _ if pressed < body.taxels.len() => "with every taxel pressed or read",
+        _ => "with every taxel pressed",
+    }
+    .to_owned();
     if let Some(input) = recorded {
         let mut source = input.open_posed(body, asked)?;
         let mut frame = Frame::missing(0.0, source.taxels().len());

@@ -9,15 +9,24 @@ use super::bill::{Bill, Stage};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{count, one_line, title};
 
+/// Stages of letters that are not made of pressures.
+const LETTERS: [&str; 3] = ["shear", "temperature", "proximity"];
+
 impl Bill {
     pub(super) fn text(&self) -> String {
         let mut text = format!("{}\n", title(&self.body));
         let mut line = |what: &str, value: String| text += &format!("  {what:<12}{}\n", one_line(&value));
-        let each =
-            if self.letters > 1 { format!(", once for each of {} letters", self.letters) } else { String::new() };
-        line("fields", format!("{} of {}{each}", self.fields[0], self.fields[1]));
+        let [named, of_named] = self.named_fields;
+        let each = match self.letters {
+            0 | 1 => String::new(),
+            letters => format!(
+                ", {} of {letters} letters: one for each that its taxels have",
+                count(self.fields[0] as u64, "percept")
+            ),
+        };
+        line("fields", format!("{named} of {of_named}{each}"));
         line("taxels", format!("{} of {} are read", self.taxels[0], self.taxels[1]));
-        line("memberships", self.memberships.to_string());
+        line("memberships", self.memberships_in_words());
         let moved = format!("{} B up, {} B down", self.bytes[0], self.bytes[1]);
         line("a frame", format!("{moved}, {:.2} µs {}", self.measured.whole_us, self.measured.on));
         #[cfg(feature = "zenoh")]
@@ -34,6 +43,21 @@ impl Bill {
             line("accuracy", accuracy(agreement));
         }
         text + "\n" + &self.table()
+    }
+
+    /// The memberships of pressures, which are also fields' in shear, and of what the host makes of other values.
+    fn memberships_in_words(&self) -> String {
+        let of_others: usize = self
+            .stages
+            .iter()
+            .filter(|stage| LETTERS.contains(&stage.planned.name))
+            .map(|stage| stage.planned.memberships)
+            .sum();
+        match [self.memberships, of_others] {
+            [pressures, 0] => pressures.to_string(),
+            [0, others] => others.to_string(),
+            [pressures, others] => format!("{pressures} of pressures, {others} of other letters"),
+        }
     }
 
     fn table(&self) -> String {

@@ -74,6 +74,7 @@ export class Fields {
     this.rows.clear();
     this.coloured.count = -1;
     this.largest = 0;
+    setText(this.caption, "");
     const list = document.createDocumentFragment();
     const indices = fields.map((_, i) => i).filter((i) => fields[i].letter === this.choices.letter);
     /** @type {Map<number | null, number[]>} */

@@ -140,7 +140,7 @@ export class Legend {
     this.showTicks(endedTicks(most * by.factor));
     const auto = model.autoscale !== null;
     if (peaks) setText(this.source, `from ${seconds(peaks.from)} to ${seconds(peaks.to)}`);
-    else setText(this.source, auto ? `autoscale since ${this.since}` : this.sourceText(model.scale.from));
+    else setText(this.source, auto ? `autoscale since ${this.since}` : this.sourceText(model.scaleFrom));
     this.root.classList.toggle("auto", auto);
     setText(this.auto, auto ? "Fixed scale" : "Autoscale");
   }

@@ -84,7 +84,18 @@ export class Model extends Reported {
   get scaleMax() {
     // Shares of a scale of their own.
     if (this.sense === "temperature" || this.sense === "proximity") return 1;
-    return this.autoscale ?? this.scale.max;
+    return this.autoscale ?? this.grownShear ?? this.scale.max;
+  }
+
+  /** Where the scale comes from. */
+  get scaleFrom() {
+    return this.grownShear === null ? this.scale.from : "grown";
+  }
+
+  /** The upper end of the scale of tangential forces, where the one of pressures is of what was read; else null. */
+  get grownShear() {
+    const isOfData = this.scale.from === "recording" || this.scale.from === "grown";
+    return this.sense === "shear" && isOfData ? (this.senses?.shearScale ?? null) : null;
   }
 
   /** Whether a body without a source is shown. */
@@ -171,8 +182,10 @@ export class Model extends Reported {
     if (frame.pressure && frame.health) {
       this.pressure = frame.pressure;
       this.health = frame.health;
+      const before = this.grownShear;
       this.senses?.take(frame);
       this.showSense();
+      if (this.grownShear !== before) this.tell("scale");
       if (this.autoscale !== null) this.autoscale = Math.max(this.autoscale, this.largestPressure());
     }
     if (frame.pose) this.pose(frame.pose);
@@ -203,7 +216,7 @@ export class Model extends Reported {
     this.letter = letter;
     if (sense === this.sense) return;
     this.sense = sense;
-    if (sense !== "pressure" && sense !== "shear") this.autoscale = null;
+    const isAuto = this.autoscale !== null && (sense === "pressure" || sense === "shear");
     const { senses } = welcome;
     if (senses)
       welcome.colours =
@@ -213,7 +226,8 @@ export class Model extends Reported {
             ? senses.distance_colours
             : this.pressureColours;
     this.showSense();
-    this.tell("scale");
+    // From now on, and of what is shown now.
+    this.setAutoscale(isAuto);
   }
 
   /** Colours taxels by what is shown of them. */

@@ -4,8 +4,8 @@ import { LinkTrees } from "./box_tree.js";
 import { add, cross, dot, scale, subtract, toWorld } from "./math.js";
 import { taxelInWorld } from "./places.js";
 import { Surface } from "./surface.js";
-import { CONE } from "./taxels.js";
-import { NO_LINK } from "./wire.js";
+import { CONE, unsentBehind } from "./taxels.js";
+import { HEALTH, NO_LINK } from "./wire.js";
 
 /** @typedef {import("./math.js").Vec3} Vec3 */
 
@@ -13,6 +13,8 @@ import { NO_LINK } from "./wire.js";
 const REACH_PX = 4;
 /** The radius up to which a disc with its rim covers others, of the disc's own. */
 const RIM = 1.05;
+const NOT_SENT = HEALTH.indexOf("not sent");
+
 export class Picker {
   /**
    * @param {import("./model.js").Model} model
@@ -30,6 +32,7 @@ export class Picker {
       corners: new Uint32Array(0),
     });
     this.taxels = new LinkTrees(new Float32Array(0), []);
+    this.behind = 0;
   }
 
   /** Takes the newest body and poses. */
@@ -40,6 +43,7 @@ export class Picker {
       this.mesh = mesh;
       this.surface = new Surface(mesh);
       this.taxels = new LinkTrees(discBoxes(mesh), mesh.taxelLink);
+      this.behind = unsentBehind(mesh);
     }
     this.version = poseVersion;
     this.surface.pose(rows);
@@ -116,6 +120,14 @@ export class Picker {
   }
 
   /**
+   * How far behind others a taxel is drawn, m.
+   * @param {number} taxel
+   */
+  behindOf(taxel) {
+    return this.model.health?.[taxel] === NOT_SENT ? this.behind : 0;
+  }
+
+  /**
    * Whether the disc of another taxel is drawn over the middle of this one.
    * @param {number} taxel
    * @param {Vec3} point its middle
@@ -126,6 +138,7 @@ export class Picker {
     const { model, camera } = this;
     const way = subtract(point, camera.eye);
     const depth = -dot(way, camera.back);
+    const behind = this.behindOf(taxel);
     let isCovered = false;
     this.taxels.along(model.rows, camera.eye, way, 1, (other, until) => {
       const place = other === taxel ? null : taxelInWorld(model, other);
@@ -137,8 +150,8 @@ export class Picker {
       const s = dot(place.normal, subtract(place.point, camera.eye)) / dot(place.normal, way);
       const off = subtract(add(camera.eye, scale(way, s)), place.point);
       const distance = Math.hypot(...off);
-      isCovered =
-        dot(place.normal, way) < 0 && distance < place.radius * RIM && s * depth + CONE * distance < depth;
+      const height = s * depth + CONE * distance + this.behindOf(other);
+      isCovered = dot(place.normal, way) < 0 && distance < place.radius * RIM && height < depth + behind;
       return isCovered ? -1 : until;
     });
     return isCovered;
@@ -166,7 +179,8 @@ export class Picker {
       const off = cross(toEye, ray);
       const depth = -dot(toEye, ray);
       const reach = Math.max(place.radius, REACH_PX / camera.pixelsPerMetre(Math.max(depth, 1e-9)));
-      if (depth > 0 && dot(off, off) < reach * reach) found.push({ taxel, depth });
+      if (depth > 0 && dot(off, off) < reach * reach)
+        found.push({ taxel, depth: depth + this.behindOf(taxel) });
       return until;
     };
     this.taxels.along(model.rows, camera.eye, ray, Infinity, look, REACH_PX / camera.pixelsPerMetre(1));

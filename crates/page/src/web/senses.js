@@ -34,6 +34,8 @@ export class Senses {
     this.health = new Uint8Array(taxels).fill(HEALTH.indexOf("missing"));
     /** Along both tangents. @type {Float32Array} */
     this.shear = new Float32Array(2 * about.shear.length);
+    /** The largest tangential force of all frames so far. */
+    this.largestShear = 0;
   }
 
   /** @param {import("./wire.js").Frame} frame */
@@ -41,6 +43,18 @@ export class Senses {
     if (frame.pressure) this.values = frame.pressure;
     if (frame.health) this.health = frame.health;
     if (frame.shear) this.shear = frame.shear;
+    for (const taxel of this.pulled.keys()) {
+      const shear = this.shownShear(taxel);
+      if (shear > this.largestShear) this.largestShear = shear;
+    }
+  }
+
+  /** The upper end of a scale of what was pulled so far, in steps of 1, 2 and 5; null where nothing was. */
+  get shearScale() {
+    if (!(this.largestShear > 0)) return null;
+    const power = 10 ** Math.floor(Math.log10(this.largestShear));
+    const steps = [1, 2, 5, 10].map((digit) => digit * power);
+    return steps.find((step) => step >= this.largestShear) ?? this.largestShear;
   }
 
   /**

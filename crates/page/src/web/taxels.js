@@ -12,6 +12,18 @@ export const CONE = 1.5;
 
 /** Of taxels that no source sends: they have the colours of their fields, or that of the body. */
 const NOT_SENT = HEALTH.indexOf("not sent");
+/** Taxels that are not sent, or measure something else than what is shown, are so far behind others, of the largest radius: more than cones
+ * are high, so that no disc of theirs covers one that is shown. */
+const BEHIND = 2;
+
+/**
+ * How far behind others taxels are drawn that are not sent, m.
+ * @param {import("./wire.js").Mesh} mesh
+ */
+export function unsentBehind({ taxelRadius }) {
+  return BEHIND * taxelRadius.reduce((most, radius) => Math.max(most, radius), 0);
+}
+
 /** In place of a state: a good taxel that feels nothing. */
 const REST = 15;
 /** How much darker than the body a taxel is that no source sends. */
@@ -81,11 +93,13 @@ uniform vec3 u_ink;
 uniform vec3 u_paper;
 uniform bool u_through;
 uniform vec2 u_planes;
+uniform float u_behind;
 out vec4 o_colour;
 // Discs are cones to the depth test: where two overlap, each pixel shows the one whose middle is nearer, and no
-// disc covers the middle of another.
+// disc covers the middle of another. Those that are not sent are behind.
 float coneDepth(float d) {
   float away = 1.0 / gl_FragCoord.w + ${CONE.toFixed(1)} * d * v_metres;
+  if (v_state == ${NOT_SENT}) away += u_behind;
   float near = u_planes.x;
   float far = u_planes.y;
   return clamp(far / (far - near) * (1.0 - near / away), 0.0, 1.0);
@@ -237,6 +251,7 @@ export class Taxels {
     this.gl = gl;
     this.count = mesh.taxelId.length;
     this.hasBody = mesh.corners.length > 0;
+    this.behind = unsentBehind(mesh);
     this.plain = makeProgram(gl, VERTEX, PLAIN);
     /** Made when first needed. @type {import("./gl.js").Program | null} */
     this.special = null;
@@ -308,9 +323,10 @@ export class Taxels {
   choose(spots, rect) {
     const { gl, corners } = this;
     let end = 0;
-    const add = (/** @type {boolean} */ special) => {
+    const add = (/** @type {boolean} */ special, /** @type {boolean} */ unsent) => {
       for (let i = 0; i < this.count; i++) {
-        if (!spots.isIn(i, rect) || this.isSpecial(i) !== special) continue;
+        const isUnsent = this.fill[4 * i + 3] === NOT_SENT;
+        if (isUnsent !== unsent || !spots.isIn(i, rect) || this.isSpecial(i) !== special) continue;
         const first = 4 * i;
         corners[end] = first;
         corners[end + 1] = corners[end + 4] = first + 1;
@@ -319,9 +335,10 @@ export class Taxels {
         end += 6;
       }
     };
-    add(false);
+    // Without depths, later ones are above.
+    for (const unsent of [true, false]) add(false, unsent);
     const plain = end;
-    add(true);
+    for (const unsent of [true, false]) add(true, unsent);
     if (end) gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, corners, 0, end);
     return { plain, special: end - plain };
   }
@@ -396,6 +413,7 @@ export class Taxels {
     gl.uniform3fv(at("u_eye"), camera.eye);
     gl.uniform1f(at("u_pixels"), pixels);
     gl.uniform2f(at("u_planes"), camera.near, camera.far);
+    gl.uniform1f(at("u_behind"), this.behind);
     gl.uniform1i(at("u_through"), through ? 1 : 0);
     gl.uniform3fv(at("u_ink"), theme.ink);
     gl.uniform3fv(at("u_paper"), theme.albedo);

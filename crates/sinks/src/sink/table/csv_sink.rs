@@ -14,6 +14,8 @@ use super::{
 use crate::error::{Error, Result, failed};
 use crate::output::{OutputFile, OutputPath};
 use crate::percept::Percepts;
+use crate::scene::receptor_of;
+use crate::signal::Receptor;
 use crate::sink::{FieldNames, Flow, Session, Sink};
 
 /// Between the words of a list.
@@ -34,8 +36,8 @@ somatic_skin::debug_by_name!(CsvSink);
 enum Rows {
     /// One for each field in contact, or for each.
     PerField { all_fields: bool },
-    /// One for each frame, with these columns of each field.
-    PerFrame(Vec<TableColumn>),
+    /// One for each frame: by letter the columns of a field in it, and by field its letter.
+    PerFrame { columns: Vec<Vec<TableColumn>>, letters: Vec<usize> },
 }
 
 /// A file and its columns.
@@ -72,17 +74,19 @@ impl CsvSink {
         let titles_of = |file: &CsvFile| file.columns.iter().map(TableColumn::title).collect::<Vec<_>>();
         if let Some(percepts) = sink.percepts.as_mut().filter(|_| wide) {
             let columns = wide_columns(session);
+            let letter_of = |field: usize| session.plan.map_or(0, |plan| plan.letter_of(field));
+            let letters: Vec<usize> = (0..sink.words.names.len()).map(letter_of).collect();
             // Which frame it is of; what follows is of each field.
             percepts
                 .columns
                 .retain(|column| matches!(column.value, ValueOf::Recording | ValueOf::Time | ValueOf::Frame));
             let titles = percepts.columns.iter().map(TableColumn::title);
-            let of_field = |name: &FieldNames| {
+            let of_field = |(name, &letter): (&FieldNames, &usize)| {
                 let head = head_of(name);
-                columns.iter().map(|column| format!("{head} {}", column.title())).collect::<Vec<_>>()
+                columns[letter].iter().map(|column| format!("{head} {}", column.title())).collect::<Vec<_>>()
             };
-            let titles: Vec<String> = titles.chain(sink.words.names.iter().flat_map(of_field)).collect();
-            sink.rows = Rows::PerFrame(columns);
+            let titles: Vec<String> = titles.chain(sink.words.names.iter().zip(&letters).flat_map(of_field)).collect();
+            sink.rows = Rows::PerFrame { columns, letters };
             percepts.record(titles)?;
         } else if let Some(percepts) = &mut sink.percepts {
             percepts.record(titles_of(percepts))?;
@@ -116,13 +120,13 @@ impl CsvSink {
                         file.writer.write_record(None::<&[u8]>)?;
                     }
                 }
-                (Rows::PerFrame(columns), Some(file)) => {
+                (Rows::PerFrame { columns, letters }, Some(file)) => {
                     let first = Row { percepts, frame, field: 0, on_skin: None, contact: None };
                     for column in 0..file.columns.len() {
                         file.field(&first, file.columns[column].kind, file.columns[column].value, words)?;
                     }
                     for row in rows(percepts, frame, true) {
-                        for column in columns {
+                        for column in &columns[letters[row.field]] {
                             file.field(&row, column.kind, column.value, words)?;
                         }
                     }
@@ -144,12 +148,27 @@ impl CsvSink {
     }
 }
 
-/// The columns that each field has in a table with one row per frame.
-fn wide_columns(session: &Session<'_>) -> Vec<TableColumn> {
+/// By letter, the columns that a field in it has in a table with one row per frame: not those that only other letters give. Without a
+/// plan, all.
+fn wide_columns(session: &Session<'_>) -> Vec<Vec<TableColumn>> {
     let all = percept_columns(session);
     let column_of = |value: ValueOf| all.iter().find(|column| column.value == value).cloned();
     let outputs = output_columns(session);
-    column_of(ValueOf::Contact).into_iter().chain(outputs).chain(column_of(ValueOf::Flags)).collect()
+    let of_letter = |receptor: Option<Receptor>| {
+        let is_given = |column: &&TableColumn| match (column.value, receptor) {
+            (ValueOf::Output(output, _), Some(receptor)) if receptor.is_of_pressure() => {
+                receptor_of(output).is_of_pressure()
+            }
+            (ValueOf::Output(output, _), Some(receptor)) => receptor_of(output) == receptor,
+            _ => true,
+        };
+        let own = outputs.iter().filter(is_given).cloned();
+        column_of(ValueOf::Contact).into_iter().chain(own).chain(column_of(ValueOf::Flags)).collect()
+    };
+    match session.plan {
+        Some(plan) => plan.letters().iter().map(|letter| of_letter(Some(letter.receptor))).collect(),
+        None => vec![of_letter(None)],
+    }
 }
 
 /// What the columns of a field begin with.
