@@ -57,7 +57,7 @@ fn limbs_with_three_axes_are_felt_along_the_skin_by_their_host() {
     };
     let pulls = |line: &str| line.matches("\"friction\":").count() == FINGERS.len();
     let row = play_by(&mut limbs, 0, send, |_| head.running.out.all().last().is_some_and(|line| pulls(line)));
-    let rows = play_by(&mut limbs, row, send, |now| now == row + 60);
+    let rows = play_by(&mut limbs, row, send, |now| now == row + 120);
     limbs.into_iter().for_each(|limb| drop(limb.end()));
     wait_for("the end of both", || {
         FINGERS.iter().all(|(_, key)| head.running.reported.has(&format!("zenoh:{key}: the limb has ended")))
@@ -69,7 +69,7 @@ fn limbs_with_three_axes_are_felt_along_the_skin_by_their_host() {
             let right = undistributed(&place, field, letter, rows);
             assert!(right.keys().all(|percept| percept.contains(&format!("\"{output}\":"))), "{letter}: {right:?}");
             let seen = compared(&of_letter(&lines, letter), field, &right);
-            // Of the 60 a few are replaced, as where limbs are merged.
+            // Of the 120 many are replaced on a busy machine, as where limbs are merged.
             assert!(seen.rows.len() >= 40, "{field}, {letter}: {seen:?}");
         }
     }

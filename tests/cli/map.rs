@@ -212,7 +212,7 @@ fn what_a_map_does_not_fit_is_refused_in_a_line() {
         ("values = 'press_sensor_state[*].presure'\nmessage = '/dex3/left/state'", "did you mean `pressure`?"),
         ("values = 'power_v'\nmessage = '/dex3/right/state'", "there is no topic /dex3/right/state: it has"),
         ("values = 'press_sensor_state[9].pressure'", "`press_sensor_state` has 9 items, and [9] is asked for"),
-        ("values = 'press_sensor_state[*].pressure'\ngrid = '3x4'", "grid: 3 × 4 are 12 sensors"),
+        ("values = 'press_sensor_state[*].pressure'\ngrid = '3x5'", "grid: 3 × 5 are 15 sensors"),
     ] {
         fs::write(&map, text).unwrap();
         let why = refused(1, &["run", "--source", &source, "--map", text_of(&map), "--sink", "-"]);

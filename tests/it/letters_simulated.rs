@@ -310,7 +310,7 @@ fn recordings_have_all_channels_and_the_truth_of_each_letter() {
             .unwrap()
             .ends_with(",depth,shear_x,shear_y,shear_z,shear_u,shear_v,torsion,slips,gap,celsius")
     );
-    assert!(truth.lines().nth(1).unwrap().ends_with(",0,0,0,0,0,0,0,,30"), "{truth}");
+    assert!(truth.lines().nth(1).unwrap().ends_with(",0,0,0,0,0,0,0,0,30"), "{truth}");
     let [frames, truth] = written(1, touch);
     assert!(!frames.lines().next().unwrap().contains("1000"));
     assert!(truth.lines().next().unwrap().ends_with(",depth,shear_x,shear_y,shear_z,shear_u,shear_v,torsion,slips"));

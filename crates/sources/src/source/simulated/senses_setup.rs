@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn what_presses_is_seen_also_without_a_gap() {
-        let mut nearest = |text: &str| {
+        let nearest = |text: &str| {
             let mut simulation = on("sensing-hand", text);
             let (mut frame, mut all) = (Frame::default(), Vec::new());
             while simulation.next_frame(&mut frame).unwrap() {
