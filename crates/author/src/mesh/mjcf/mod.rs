@@ -139,7 +139,7 @@ fn place(places: &mut Places<'_>, sensor: &MjSensor, first_id: u32, skin: &mut S
     let (count, placed) = match &sensor.kind {
         SensorKind::Tactile { geom, mesh } => on_vertices(places, sensor, geom, mesh)?,
         SensorKind::TouchGrid { site, grid } => {
-            let (count, placed, aside) = in_bins(places, sensor, site, grid)?;
+            let (placed, aside) = in_bins(places, sensor, site, grid)?;
             if grid.has_axes() && aside > 0 {
                 skin.notes.push(format!(
                     "sensor `{}`: its forces are along its site's axes; {aside} of its taxels look over 30° away from its z, where \
@@ -147,7 +147,7 @@ fn place(places: &mut Places<'_>, sensor: &MjSensor, first_id: u32, skin: &mut S
                     sensor.name
                 ));
             }
-            (count, placed)
+            placed
         }
     };
     let mut links: BTreeMap<String, usize> = BTreeMap::new();
@@ -249,12 +249,7 @@ fn on_vertices(places: &Places<'_>, sensor: &MjSensor, geom: &str, mesh: &str) -
 
 /// A taxel for each bin of `grid`, where its middle leaves the shapes that move with the site's body; and how many of them look over
 /// 30° away from the site's −z.
-fn in_bins(
-    places: &mut Places<'_>,
-    sensor: &MjSensor,
-    site: &str,
-    grid: &TouchGrid,
-) -> Result<(u32, Vec<(u32, usize, Taxel)>, usize)> {
+fn in_bins(places: &mut Places<'_>, sensor: &MjSensor, site: &str, grid: &TouchGrid) -> Result<(PlacedTaxels, usize)> {
     let model = places.model;
     let &(body, index) = places
         .sites
@@ -308,7 +303,7 @@ fn in_bins(
     if placed.is_empty() {
         return Err(failed!("sensor `{}`: no shape of its body is visible from its site along −z", sensor.name));
     }
-    Ok((grid.taxels(), placed, aside))
+    Ok(((grid.taxels(), placed), aside))
 }
 
 /// What of `geoms` is shown, in their body's frame; all if its colliding shapes have taxels.
