@@ -108,7 +108,8 @@ impl Wish<'_> {
             let mut engine = Engine::new(body, options_of_engine)?;
             engine.set_channels(&read.channels)?;
             let frames = read.frames(raised);
-            let moments = Moments::compute(&mut engine, body, (letter, times), &read.name, frames)?;
+            let part = picture::part_of(body, &set.fields, None, self.look_at.as_deref())?;
+            let moments = Moments::compute(&mut engine, body, (letter, times, &part), &read.name, frames)?;
             return moments.draw(body, &set.fields, &options, self.ids, |_| goes_on(raised));
         }
         let picture = match &self.uv {

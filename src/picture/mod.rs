@@ -172,6 +172,18 @@ impl Prepared {
     }
 }
 
+/// The taxels that a picture is of: those of the field whose chart it is, or of what it looks at; all if neither is asked for.
+///
+/// # Errors
+/// There is no such field or link with taxels.
+pub fn part_of(body: &Body, fields: &[Field], charted: Option<usize>, looked_at: Option<&str>) -> Result<Vec<usize>> {
+    match (charted, looked_at) {
+        (Some(index), _) => Ok(fields[index].members.iter().map(|member| member.taxel).collect()),
+        (None, Some(name)) => look_at(body, fields, name),
+        (None, None) => Ok((0..body.taxels.len()).collect()),
+    }
+}
+
 /// The taxels of the field or the link called `name`.
 fn look_at(body: &Body, fields: &[Field], name: &str) -> Result<Vec<usize>> {
     if let Some(field) = fields.iter().find(|field| field.name == name) {

@@ -79,14 +79,15 @@ somatic_skin::debug_by_name!(Moments);
 impl Moments {
     /// Runs all `frames` of the recording called `name` through `engine`, which looks for touches of `body` ([`crate::Scene::touches`])
     /// and leaves them in their links' frames, and keeps what is shown of `times`: of taxels what `letter` is made of, which the engine
-    /// reads ([`letters_of`]).
+    /// reads ([`letters_of`]). There is most to see when there is most of `part`, the taxels that pictures are of
+    /// ([`part_of`](super::part_of)).
     ///
     /// # Errors
     /// What reading and computing say; there is no frame at these times, or there are too many.
     pub fn compute(
         engine: &mut Engine,
         body: &Body,
-        (letter, times): (Receptor, Times),
+        (letter, times, part): (Receptor, Times, &[usize]),
         name: &str,
         frames: impl Iterator<Item = Result<Frame>>,
     ) -> Result<Self> {
@@ -95,6 +96,8 @@ impl Moments {
         let (mut sensed, mut ranges) = (Vec::new(), SenseRanges::default());
         engine.keep_touch_taxels(true);
         let is_of_skin = |taxel: &usize| body.taxels[*taxel].modality.is_pressed();
+        let mut is_part = vec![false; body.taxels.len()];
+        part.iter().for_each(|&taxel| is_part[taxel] = true);
         let of_skin: Vec<usize> = (0..body.taxels.len()).filter(is_of_skin).collect();
         let mut trails = TouchTrails::default();
         let (from_s, to_s) = match times {
@@ -113,11 +116,11 @@ impl Moments {
             engine.pressures(&frame, &mut list);
             engine.sensed(&frame, &senses, &mut sensed);
             sensed.iter().for_each(|value| ranges.see(value));
-            let forces = || forces_of(letter, &list, &sensed);
-            max_force = forces().fold(max_force, f64::max);
+            let forces = || forces_of(body, letter, &list, &sensed);
+            max_force = forces().map(|(_, force)| force).fold(max_force, f64::max);
             let to_see = match letter {
-                Receptor::Temperature | Receptor::Proximity => extreme(letter, &sensed),
-                _ => forces().sum(),
+                Receptor::Temperature | Receptor::Proximity => extreme(letter, &sensed, &is_part),
+                _ => forces().filter(|(taxel, _)| is_part[*taxel]).map(|(_, force)| force).sum(),
             };
             if !(from_s..=to_s).contains(&frame.t_s) {
                 continue;
@@ -289,21 +292,24 @@ pub fn letters_of(body: &Body, fields: &[Field], letter: Receptor) -> Vec<Letter
     read.into_iter().filter(is_read).map(|receptor| Letter { receptor, ..Letter::default() }).collect()
 }
 
-/// The sizes of the forces that `letter` is made of: `list` has pressures by id, `sensed` all else.
+/// The sizes of the forces that `letter` is made of, each with its taxel: `list` has pressures by id, `sensed` all else.
 fn forces_of<'a>(
+    body: &'a Body,
     letter: Receptor,
     list: &'a [(u32, f64)],
     sensed: &'a [SensedValue],
-) -> impl Iterator<Item = f64> + 'a {
+) -> impl Iterator<Item = (usize, f64)> + 'a {
     let is_shear = letter == Receptor::Shear;
-    let pressures = list.iter().filter(move |_| !is_shear).map(|&(_, pressure)| pressure);
+    let pressures = list.iter().filter(move |_| !is_shear);
     let pulls = sensed.iter().filter(move |value| is_shear && value.receptor == letter);
-    pressures.chain(pulls.map(|value| libm::hypot(value.shear[0], value.shear[1])))
+    let pressures = pressures.filter_map(|&(id, pressure)| Some((body.taxel_index(id)?, pressure)));
+    pressures.chain(pulls.map(|value| (value.taxel, libm::hypot(value.shear[0], value.shear[1]))))
 }
 
-/// How warm the warmest of `sensed` is, or how near the nearest, in a number that grows with it.
-fn extreme(letter: Receptor, sensed: &[SensedValue]) -> f64 {
-    let own = sensed.iter().filter(|value| value.receptor == letter).filter_map(|value| match value.reading {
+/// How warm the warmest of `sensed` is, of taxels that are part of the picture, or how near the nearest, in a number that grows with it.
+fn extreme(letter: Receptor, sensed: &[SensedValue], is_part: &[bool]) -> f64 {
+    let own = sensed.iter().filter(|value| value.receptor == letter && is_part[value.taxel]);
+    let own = own.filter_map(|value| match value.reading {
         Reading::Value(number, _) if letter == Receptor::Temperature => Some(number),
         Reading::Value(number, true) => Some(-number),
         _ => None,

@@ -246,6 +246,10 @@ fn pictures_are_of_the_time_at_which_there_is_most_to_see_of_their_letter() {
             assert_eq!(usual == drawn, at == other, "{letter} at {other}");
         }
     }
+    // The finger is dragged after the palm, which is pulled harder.
+    let [usual, drawn] = [&[][..], &["--at", "2.54s"]].map(|at| chart("hand/midhand/index", "shear", at).unwrap());
+    let black = |picture: &[[u8; 3]]| picture.iter().filter(|pixel| **pixel == BLACK).count();
+    assert!(black(&usual) > 3 * black(&drawn), "{} and {} pixels", black(&usual), black(&drawn));
 }
 
 /// A skin of temperature taxels alone, and a recording in which they warm up.

@@ -8,7 +8,7 @@ use somatic::internal::scene_file::{hertz, seconds};
 use somatic::internal::setup::Setup;
 use somatic::internal::signal::{Channel, Receptor};
 use somatic::picture::{
-    Moment, Moments, Options, Picture, Times, TouchPicture, letters_of, shown_letter, usual_letter,
+    Moment, Moments, Options, Picture, Times, TouchPicture, letters_of, part_of, shown_letter, usual_letter,
 };
 use somatic::scene::Coordinates;
 use somatic::scene::file::SceneFile;
@@ -110,6 +110,7 @@ impl Flags {
             },
         };
         times.check().map_err(|e| e.at("--rate"))?;
+        let part = part_of(body, fields, chart, options.look_at.as_deref())?;
         let taxels: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
         let input = crate::cli::scene::input(asked)?;
         if !input.is_recording() {
@@ -134,7 +135,8 @@ impl Flags {
             bar.show(source.progress().unwrap_or(0.0));
             source.next_frame(&mut frame).map(|is_there| is_there.then_some(frame)).transpose()
         });
-        let moments = Moments::compute(&mut engine, body, (letter, times), &input.name, frames)?;
+        let shown = (letter, times, &part[..]);
+        let moments = Moments::compute(&mut engine, body, shown, &input.name, frames)?;
         source.notices().iter().for_each(|notice| say(notice));
         let mut bar = Bar::new("drawing");
         let progress = |share| {
