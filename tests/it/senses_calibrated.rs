@@ -1,34 +1,10 @@
 //! What calibrations make of temperatures and distances: values beyond the ends of ranges and curves, and flags of what is asked for alone.
 
-use glam::DVec3;
-use somatic::body::{ChartKind, ChartSpec, FieldSpec, MemberSpec, Modality, Taxel};
-use somatic::internal::body::Glb;
+use somatic::body::Modality;
 use somatic::{BackendKind, Body, Calibration, Engine, Flags, Options, Outputs, Percept, RawValue, Receptor, Scene};
 
 use crate::common::backends;
-use crate::senses::PITCH;
-
-/// A row of `modality` in one field that has a chart; ids from 0.
-fn row(modality: Modality, taxels: u32) -> Body {
-    let mut glb = Glb::new();
-    let link = glb.node("row", None, DVec3::ZERO);
-    let taxel = |id: u32| Taxel {
-        id,
-        link: 0,
-        position_in_link: DVec3::new(PITCH * f64::from(id), 0.0, 0.0),
-        normal_in_link: DVec3::Y,
-        area: PITCH * PITCH,
-        modality,
-        tangent_in_link: (modality == Modality::Force3).then_some(DVec3::X),
-    };
-    glb.taxels("taxels", Some(link), &(0..taxels).map(taxel).collect::<Vec<_>>(), None);
-    let chart =
-        ChartSpec { kind: ChartKind::Plane, origin_in_anchor: Some([0.0; 3]), u_in_anchor: Some([1.0, 0.0, 0.0]) };
-    let members = (0..taxels).map(|id| (id, MemberSpec::default())).collect();
-    let spec = FieldSpec { name: "row".into(), parent: None, members, chart: Some(chart) };
-    glb.field(&spec, Some(link), DVec3::ZERO);
-    Body::from_bytes("row", &glb.to_bytes().unwrap()).unwrap()
-}
+use crate::senses_extremes::row;
 
 /// What the frame that has `values` gives by `calibration` in the letter `receptor`, of `outputs` if they are given.
 fn percept(
@@ -57,7 +33,7 @@ const ENDS: Flags = Flags::OUT_OF_RANGE.union(Flags::SATURATED).union(Flags::FAU
 
 #[test]
 fn what_is_beyond_the_raw_range_of_a_distance_is_kept_and_said_and_what_is_far_is_neither() {
-    let body = row(Modality::Proximity, 3);
+    let body = row(&[Modality::Proximity; 3]);
     let of = |calibration: &str, raw: [f64; 3]| {
         let values = [("0", raw[0]), ("1", raw[1]), ("2", raw[2])];
         let felt = backends()
@@ -81,7 +57,7 @@ fn what_is_beyond_the_raw_range_of_a_distance_is_kept_and_said_and_what_is_far_i
 
 #[test]
 fn beyond_the_far_end_of_a_curve_nothing_is_near_and_beyond_the_near_one_it_is_held() {
-    let body = row(Modality::Proximity, 3);
+    let body = row(&[Modality::Proximity; 3]);
     let of = |keys: &str, curve: &str, raw: [f64; 3]| {
         let text = format!("[curve.infrared]\n{curve}\n[proximity]\ncurve = \"infrared\"\n{keys}");
         let values = [("0", raw[0]), ("1", raw[1]), ("2", raw[2])];
@@ -114,7 +90,7 @@ fn beyond_the_far_end_of_a_curve_nothing_is_near_and_beyond_the_near_one_it_is_h
 
 #[test]
 fn a_temperature_beyond_a_curve_is_that_of_its_end_and_one_under_absolute_zero_is_none() {
-    let body = row(Modality::Temperature, 2);
+    let body = row(&[Modality::Temperature; 2]);
     for kind in backends() {
         let of = |text: &str, raw: [f64; 2]| {
             let felt = percept((&body, kind), text, (Receptor::Temperature, None), &[("0", raw[0]), ("1", raw[1])]);
@@ -135,10 +111,12 @@ fn a_temperature_beyond_a_curve_is_that_of_its_end_and_one_under_absolute_zero_i
 
 #[test]
 fn flags_say_why_what_is_asked_for_is_absent_and_nothing_else() {
-    let given = |modality: Modality, taxels: u32, (receptor, outputs): (Receptor, Outputs), values: &[(&str, f64)]| {
-        let felt = percept((&row(modality, taxels), BackendKind::Cpu), "", (receptor, Some(outputs)), values);
-        felt.flags - Flags::INCOMPLETE
-    };
+    let given =
+        |modality: Modality, taxels: usize, (receptor, outputs): (Receptor, Outputs), values: &[(&str, f64)]| {
+            let felt =
+                percept((&row(&vec![modality; taxels]), BackendKind::Cpu), "", (receptor, Some(outputs)), values);
+            felt.flags - Flags::INCOMPLETE
+        };
     let warm = |outputs: Outputs| {
         given(Modality::Temperature, 2, (Receptor::Temperature, outputs), &[("0", 20.0), ("1", 21.0)])
     };

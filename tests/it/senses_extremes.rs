@@ -21,7 +21,7 @@ fn with_touches() -> Scene {
 }
 
 /// Taxels of `kinds` in a row 5 mm apart, ids from 0, and two fields: over all, and over all but the first with the weight 3.
-fn row(kinds: &[Modality]) -> Body {
+pub fn row(kinds: &[Modality]) -> Body {
     let mut glb = Glb::new();
     let link = glb.node("row", None, DVec3::ZERO);
     let taxels: Vec<Taxel> = (0..)

@@ -107,8 +107,9 @@ impl Plan {
     #[must_use]
     pub fn explain(&self) -> Vec<PlannedStage> {
         let stages = self.stages();
-        let all = |_: &PlanField| true;
-        let charted = |field: &PlanField| field.charted;
+        // The other letters have stages of their own.
+        let all = |field: &PlanField| self.letters[field.letter].receptor.is_of_pressure();
+        let charted = |field: &PlanField| field.charted && all(field);
         let counts = |which: &dyn Fn(&PlanField) -> bool| {
             let chosen = self.fields.iter().filter(|field| which(field));
             chosen.fold((0, 0), |(fields, memberships), field| (fields + 1, memberships + field.count))
