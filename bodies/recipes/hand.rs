@@ -30,7 +30,8 @@ const MIDHAND_CHANNEL: u32 = 32;
 pub(crate) enum Senses {
     /// 40 force-sensing resistors.
     Pressure,
-    /// Those of the palm and the fingers measure along three axes; the palm has nine thermometers and four distance sensors between its own.
+    /// Those of the palm and the fingers measure along three axes; the palm has nine thermometers and four distance sensors between its
+    /// own.
     All,
 }
 

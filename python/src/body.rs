@@ -172,8 +172,8 @@ impl PyBody {
         body_tables::taxels(py, &self.inner)
     }
 
-    /// The names of a frame's values, in the order in which `Engine.process` takes them: of each taxel its id, by ascending id, then of those
-    /// with three axes `4.u`, their forces along t, and `4.v`, along n × t.
+    /// The names of a frame's values, in the order in which `Engine.process` takes them: of each taxel its id, by ascending id, then of
+    /// those with three axes `4.u`, their forces along t, and `4.v`, along n × t.
     ///
     /// >>> import somatic_touch as st
     /// >>> st.Body.grid(1, 3, 0.01).channels

@@ -146,12 +146,13 @@ impl PyEngine {
     /// metres, where links move. However a recording is cut into calls, its percepts are the same bits.
     ///
     /// `t` may have dates too: NumPy's, pandas', or a list of `datetime`; they become seconds since 1970, and those without a time zone are
-    /// in UTC. `values` may be a table whose columns are named as `channels`, in any order, or a list of dicts, by taxel its value: what a dict does not have is missing. `joints` are positions of the body's
-    /// joints by name, in rad or m, [] or [frames], which say where links are, as `Body.forward` does; poses of links come before them.
+    /// in UTC. `values` may be a table whose columns are named as `channels`, in any order, or a list of dicts, by taxel its value: what a
+    /// dict does not have is missing. `joints` are positions of the body's joints by name, in rad or m, [] or [frames], which say where
+    /// links are, as `Body.forward` does; poses of links come before them.
     ///
-    /// If all taxels have three axes, `values` may be [frames, taxels, 3]: the forces along the normal, t and n × t, and a `mask` of the same
-    /// shape or of taxels. Of other bodies with such taxels it is [frames, channels], in the order of `channels`. A dict has
-    /// `{4: [n, u, v]}`, or `{4: n, "4.u": u}` with v missing.
+    /// If all taxels have three axes, `values` may be [frames, taxels, 3]: the forces along the normal, t and n × t, and a `mask` of the
+    /// same shape or of taxels. Of other bodies with such taxels it is [frames, channels], in the order of `channels`. A dict has `{4: [n,
+    /// u, v]}`, or `{4: n, "4.u": u}` with v missing.
     ///
     /// Python's lock is free while it computes. Ctrl-C ends a long call, and leaves the engine as it was before. `progress` is
     /// called with the number of frames done, about ten times a second; True shows a bar of tqdm.
@@ -216,8 +217,8 @@ impl PyEngine {
         }
     }
 
-    /// The same for one frame, as in a control loop: `t` in seconds, or a date; `values` [taxels], [taxels, 3], or a dict. Its percepts have
-    /// one frame.
+    /// The same for one frame, as in a control loop: `t` in seconds, or a date; `values` [taxels], [taxels, 3], or a dict. Its percepts
+    /// have one frame.
     ///
     /// >>> import numpy as np
     /// >>> import somatic_touch as st
@@ -364,7 +365,8 @@ impl PyEngine {
         self.run.letters.iter().map(String::as_str).collect()
     }
 
-    /// The names of a frame's values, in their order: of a taxel its id, and of one with three axes `4.u` and `4.v` too, after all of these.
+    /// The names of a frame's values, in their order: of a taxel its id, and of one with three axes `4.u` and `4.v` too, after all of
+    /// these.
     ///
     /// >>> import somatic_touch as st
     /// >>> pad = st.Body.from_arrays([[0, 0, 0], [0.01, 0, 0]], [[0, 0, 1]] * 2, modality="force3")
@@ -398,8 +400,8 @@ impl PyEngine {
         py.import("json")?.call_method1("loads", (text,))
     }
 
-    /// The columns of the table `table` of its percepts: 'fields', 'touches' or 'self_contacts'; a `Table` of `name`, `unit`, `type`, `absent`,
-    /// whether a value may be, and `what` it is, as `somatic run --describe` tells them.
+    /// The columns of the table `table` of its percepts: 'fields', 'touches' or 'self_contacts'; a `Table` of `name`, `unit`, `type`,
+    /// `absent`, whether a value may be, and `what` it is, as `somatic run --describe` tells them.
     ///
     /// >>> import somatic_touch as st
     /// >>> engine = st.Engine(st.Body.bundled("hand"), {"outputs": ["centroid"]}, backend="cpu")

@@ -85,8 +85,8 @@ pub(crate) fn values<'py>(
     }))
 }
 
-/// Which channel each column of a table such as pandas' is of, or each entry of a `Series`: None where they are in order, or have no names of
-/// channels.
+/// Which channel each column of a table such as pandas' is of, or each entry of a `Series`: None where they are in order, or have no names
+/// of channels.
 ///
 /// # Errors
 /// They are named as channels, and others than the engine's.

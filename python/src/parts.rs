@@ -22,8 +22,8 @@ const MOST_VALUES: usize = 1 << 24;
 
 /// A recording that is read in stretches, from its first frame to its last: a loop over it has a `Recording` for each.
 ///
-/// Memory has one of them, however long the file is: as many seconds as were asked for, and 64 MiB of values at most. An engine goes on from
-/// one to the next, so that percepts are those of the whole. It is made by `open`, and closed by `with` or at its end.
+/// Memory has one of them, however long the file is: as many seconds as were asked for, and 64 MiB of values at most. An engine goes on
+/// from one to the next, so that percepts are those of the whole. It is made by `open`, and closed by `with` or at its end.
 ///
 /// >>> import somatic_touch as st
 /// >>> with st.open("hand", seconds=2) as parts:

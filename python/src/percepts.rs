@@ -30,8 +30,8 @@ use crate::touches::PyTouches;
 /// `p["centroid"]` is an array [frames, fields, components], without the last axis where there is one component. It is float32
 /// with backends `cpu` and `gpu` (float64 for what is computed in double precision everywhere), float64 with `reference`; `active` is
 /// uint32. What is absent is NaN (0 in `active`), and `p.present(name)` says it. A field of taxels of several kinds is there once for each
-/// letter that they have, as `p.letters` says: `p["shear"]` is NaN in fields of another letter. Arrays are made when first asked for, read-only,
-/// and own their memory: they outlive the percepts and the engine.
+/// letter that they have, as `p.letters` says: `p["shear"]` is NaN in fields of another letter. Arrays are made when first asked for,
+/// read-only, and own their memory: they outlive the percepts and the engine.
 ///
 /// >>> import numpy as np
 /// >>> import somatic_touch as st

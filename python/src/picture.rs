@@ -104,9 +104,10 @@ pub(crate) enum SizeOfPicture {
 ///
 /// `what` is a `Body`, or a `Recording` whose body is known. Of a body the taxels have the colours of their `fields` (globs); `uv` draws
 /// the chart of one field instead; `ids` labels taxels, `edges` connects neighbours on the skin. Of a recording they have the colours of
-/// their pressures under `calibration` (by default its own), or of `letter`: 'shear', 'temperature' or 'proximity'; and each touch of the body has its mark: at the time `at_s`, by default where
-/// there is most to see, or from `from_s` to `to_s` as an animation with `rate_hz` pictures a second. `views` are sides, such as 'front' and
-/// 'top', or 'all'; `look_at` is a field or link that fills the picture; `size` is the width, or width and height at most, in pixels.
+/// their pressures under `calibration` (by default its own), or of `letter`: 'shear', 'temperature' or 'proximity'; and each touch of the
+/// body has its mark: at the time `at_s`, by default where there is most to see, or from `from_s` to `to_s` as an animation with `rate_hz`
+/// pictures a second. `views` are sides, such as 'front' and 'top', or 'all'; `look_at` is a field or link that fills the picture; `size`
+/// is the width, or width and height at most, in pixels.
 ///
 /// It needs a wheel with the GPU, and an adapter; a software one such as Mesa's lavapipe will do.
 ///

@@ -59,7 +59,8 @@ impl PyRecording {
         self.t.clone_ref(py)
     }
 
-    /// Raw values, float32 [frames, taxels], of taxels with three axes three each, as `channels` names them: NaN where faulty, and a NaN that `Engine.process` knows where missing.
+    /// Raw values, float32 [frames, taxels], of taxels with three axes three each, as `channels` names them: NaN where faulty, and a NaN
+    /// that `Engine.process` knows where missing.
     #[getter]
     fn values(&self, py: Python<'_>) -> Py<PyAny> {
         self.values.clone_ref(py)
@@ -345,11 +346,11 @@ fn gather(py: Python<'_>, source: &mut (dyn Source + Send), file: &Path) -> PyRe
 
 /// Reads a recording from a file: CSV, MCAP, or a pressure system's export, as `somatic run --source` does.
 ///
-/// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' and 'sensing-hand' are the bundled touches. `body` is the robot, for
-/// recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
-/// after its start. Of an HDF5 file `dataset` is the path of the values, such as 'tactile/left', and `time` that of their times; h5py
-/// reads it. With `skip_bad` bad rows of a CSV, an export or a bag are skipped and counted in `losses`; else the first is an error.
-/// `map` is a TOML file, or a name such as 'dex3', that says which arrays of messages are sensors. The other keywords are those of
+/// `source` is a path, or a text such as `csv:FILE` and `mcap:FILE`; 'hand' and 'sensing-hand' are the bundled touches. `body` is the
+/// robot, for recordings that bring none: a `Body`, or the name of a file or of a bundled one. `from_s` and `to_s` take a part, in seconds
+/// after its start. Of an HDF5 file `dataset` is the path of the values, such as 'tactile/left', and `time` that of their times; h5py reads
+/// it. With `skip_bad` bad rows of a CSV, an export or a bag are skipped and counted in `losses`; else the first is an error. `map` is a
+/// TOML file, or a name such as 'dex3', that says which arrays of messages are sensors. The other keywords are those of
 /// docs/reference/exports.md.
 ///
 /// >>> import somatic_touch as st

@@ -30,7 +30,8 @@ const BATCH: usize = 256;
 ///
 /// `source` and `sink` are paths or texts such as `mcap:FILE` and `parquet:FILE`; `body`, `scene`, `calibration` and `backend` as in
 /// `read` and `Engine`; what comes with the recording is used where nothing is given. The file's metadata has `label` as its
-/// source. `from_s`, `to_s`, `skip_bad` and how exports are read are as in `read`, `header` and `wide` as in `write`. `progress` is called with the number of frames done; True shows a bar of tqdm.
+/// source. `from_s`, `to_s`, `skip_bad` and how exports are read are as in `read`, `header` and `wide` as in `write`. `progress` is called
+/// with the number of frames done; True shows a bar of tqdm.
 ///
 /// Gives the number of frames, and what of the source was lost, a line each.
 ///

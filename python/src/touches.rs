@@ -172,8 +172,9 @@ impl PyTouches {
         self.column(py, 1, |(_, touch), to| to.push(touch.flags.bits()))
     }
 
-    /// What each touch does to each link that it lies on, an array of structures [parts]: `touch`, a row of this table; `link`, an index into
-    /// the body's `links`; `total`; `force` [3] and `torque` [3] about the link's origin, in its frame, in N and N m, NaN where unknown.
+    /// What each touch does to each link that it lies on, an array of structures [parts]: `touch`, a row of this table; `link`, an index
+    /// into the body's `links`; `total`; `force` [3] and `torque` [3] about the link's origin, in its frame, in N and N m, NaN where
+    /// unknown.
     ///
     /// Needs the output `touches.wrench` for forces; a table of pandas and polars has columns `force_x`, `torque_z` and so on.
     ///

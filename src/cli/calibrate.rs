@@ -96,7 +96,8 @@ pub(super) struct Arguments {
     /// Which arrays of messages are sensors: a TOML file, or contactile, dex3, inspire, mujoco, paxini, tactile-state,
     /// xela or xela-ros2.
     ///
-    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, Modbus and PaXini. All of them but tactile-state and mujoco are untested.
+    /// For ROS 2 bags and topics with messages of any type, NDJSON, lines of JSON, Modbus and PaXini. All of them but tactile-state and
+    /// mujoco are untested.
     #[arg(long, value_name = "FILE")]
     map: Option<String>,
 

@@ -1,8 +1,9 @@
 //! Runs: frames go from a source through an engine to sinks, while somebody watches.
 //!
 //! From a frame's bytes to the engine it is three hops: a [`Source`](crate::source::Source) reads them into a [`Frame`](crate::Frame), a
-//! a feed hands frames on from a thread of its own, and [`Run`] calls [`Engine::process`](crate::Engine::process). From percepts to bytes it is three,
-//! too: [`Run`] hands them to each [`Sink`](crate::sink::Sink), a sink makes lines, rows or messages of them, and [`output`](crate::output) writes these.
+//! a feed hands frames on from a thread of its own, and [`Run`] calls [`Engine::process`](crate::Engine::process). From percepts to bytes
+//! it is three, too: [`Run`] hands them to each [`Sink`](crate::sink::Sink), a sink makes lines, rows or messages of them, and
+//! [`output`](crate::output) writes these.
 
 pub(crate) mod feed;
 mod observer;

@@ -176,7 +176,8 @@ mod tests {
         Body::from_bytes("pad", &bytes).unwrap()
     }
 
-    /// What is found where each taxel that feels pressure is pressed `presses` times, harder and harder, by which all its values rise or fall.
+    /// What is found where each taxel that feels pressure is pressed `presses` times, harder and harder, by which all its values rise or
+    /// fall.
     fn pressed_in_turns(
         body: &Body,
         ids: &[u32],

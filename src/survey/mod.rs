@@ -1,9 +1,9 @@
 //! Surveys: what a robot's sensors deliver untouched and pressed, and the calibration that follows from it.
 //!
-//! At rest a sensor has a **baseline**, the mean of its values without those that stray, and **noise**, the distance from it that one value in a
-//! thousand exceeds. While it is pressed it has a **travel**, the farthest that it goes to its pressed side; a value counts
-//! as far as it is the middle one of three in succession, so that a single wrong value is not a press. Most of the
-//! sensors show which side is the pressed one.
+//! At rest a sensor has a **baseline**, the mean of its values without those that stray, and **noise**, the distance from it that one value
+//! in a thousand exceeds. While it is pressed it has a **travel**, the farthest that it goes to its pressed side; a value counts as far as
+//! it is the middle one of three in succession, so that a single wrong value is not a press. Most of the sensors show which side is the
+//! pressed one.
 //!
 //! A sensor has **moved** during the rest where it strays far, again by the middle ones of three values, and farther than
 //! chance explains: the steps from value to value tell how far chance goes, as what moves a sensor takes many values over

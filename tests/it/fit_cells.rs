@@ -150,8 +150,8 @@ impl Cell {
     }
 }
 
-/// What is found of the touches of the simulation `text` on the grid `body`, if its calibration has a layer with this σ and spread of gains;
-/// and by frame what is true.
+/// What is found of the touches of the simulation `text` on the grid `body`, if its calibration has a layer with this σ and spread of
+/// gains; and by frame what is true.
 pub(crate) fn found(body: &Body, text: &str, (sigma_m, gain_spread): (f64, f64)) -> (Percepts, Vec<Vec<Truth>>) {
     let mut source = SimulatedSource::on_body("grid", text, body.clone()).unwrap();
     let mut calibration = source.calibration();

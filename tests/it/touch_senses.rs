@@ -195,8 +195,8 @@ fn a_touch_says_what_is_lost_of_its_warmth() {
     assert!(touch.temperature_celsius.is_none() && touch.warmest_celsius.is_none() && touch.warmest_taxel.is_none());
 }
 
-/// Two links side by side under one surface: three pressure taxels on `near` and two on `far`, in a row 5 mm apart along x, each with one of
-/// temperature.
+/// Two links side by side under one surface: three pressure taxels on `near` and two on `far`, in a row 5 mm apart along x, each with one
+/// of temperature.
 fn pair() -> Body {
     let mut glb = Glb::new();
     let far_m = DVec3::new(3.0 * PITCH, 0.0, 0.0);

@@ -1,5 +1,5 @@
-//! What tests of all crates share: damage to bytes, and how they say what they leave out for want of something. `tests/run` says that at its
-//! end, as nobody sees what a passing test prints.
+//! What tests of all crates share: damage to bytes, and how they say what they leave out for want of something. `tests/run` says that at
+//! its end, as nobody sees what a passing test prints.
 
 use std::fmt::Display;
 use std::io::Write as _;

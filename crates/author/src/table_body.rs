@@ -16,8 +16,8 @@ use crate::limits::{self, MAX_TABLE_BYTES};
 const GAP_M: f64 = 0.05;
 
 /// A body of the table at `path` with the columns `id`, `x`, `y`, `z`, `nx`, `ny`, `nz`, and optionally `link`, `area`,
-/// `modality`, `tx`, `ty`, `tz`: a link for each that is named, else one called as the file, with fields as without rules. A table does not say
-/// how links stand to each other: they lie side by side.
+/// `modality`, `tx`, `ty`, `tz`: a link for each that is named, else one called as the file, with fields as without rules. A table does not
+/// say how links stand to each other: they lie side by side.
 ///
 /// # Errors
 /// The file cannot be read, is not such a table, or leaves out a normal; with the line.

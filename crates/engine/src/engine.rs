@@ -237,8 +237,8 @@ impl Engine {
         self.pick();
     }
 
-    /// From now on [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) has the taxels of touches, whatever [`Scene::touches`](crate::scene::Scene::touches) asks for, if `are_kept`. For
-    /// pages, which show them.
+    /// From now on [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) has the taxels of touches, whatever
+    /// [`Scene::touches`](crate::scene::Scene::touches) asks for, if `are_kept`. For pages, which show them.
     pub fn keep_touch_taxels(&mut self, are_kept: bool) {
         self.on_skin.iter_mut().filter(|_| are_kept).for_each(OnSkin::keep_taxels);
     }
@@ -313,8 +313,8 @@ impl Engine {
         self.plan.left_out.remark().into_iter().chain(drift).chain(on_skin).collect()
     }
 
-    /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`](crate::scene::Scene::touches) asks for them. Its nodes are what
-    /// [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) counts.
+    /// The skin that touches of the whole body are found on; `None` unless [`Scene::touches`](crate::scene::Scene::touches) asks for them.
+    /// Its nodes are what [`TouchFrame::taxels`](crate::percept::TouchFrame::taxels) counts.
     #[must_use]
     pub fn skin(&self) -> Option<&Skin> {
         self.on_skin.as_ref().map(OnSkin::skin)
@@ -351,8 +351,8 @@ impl Engine {
         }
     }
 
-    /// What has changed since about how percepts are computed, to be said once: a GPU that [`BackendKind::Auto`](crate::BackendKind::Auto) had chosen was
-    /// lost, and the CPU goes on.
+    /// What has changed since about how percepts are computed, to be said once: a GPU that [`BackendKind::Auto`](crate::BackendKind::Auto)
+    /// had chosen was lost, and the CPU goes on.
     pub fn notice(&mut self) -> Option<String> {
         self.backend.notice()
     }

@@ -56,8 +56,8 @@ impl Engine {
         raw
     }
 
-    /// What was wrong in the last frame with values that are corrected by others, or with these, by taxel of the body, ascending: as fields and
-    /// touches are flagged for it.
+    /// What was wrong in the last frame with values that are corrected by others, or with these, by taxel of the body, ascending: as fields
+    /// and touches are flagged for it.
     #[doc(hidden)]
     pub fn values_noted(&self) -> &[(usize, Reading)] {
         self.intake.notes().last().map_or(&[], Vec::as_slice)

@@ -68,8 +68,8 @@ impl DriftState {
         self.near = near;
     }
 
-    /// Takes what a touch reaches from `skin`, whose nodes are the channels, under a layer of `sigma_m`: from then on only the taxels around
-    /// pressed ones count as touched, whatever the fields.
+    /// Takes what a touch reaches from `skin`, whose nodes are the channels, under a layer of `sigma_m`: from then on only the taxels
+    /// around pressed ones count as touched, whatever the fields.
     pub(super) fn follow_touches(&mut self, skin: &Skin, sigma_m: Option<f64>) {
         let around = |node: u32| {
             let at = skin.taxels()[node as usize].position;

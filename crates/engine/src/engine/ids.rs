@@ -39,8 +39,8 @@ pub(super) fn checked_by_pressure(body: &Body, mut calibration: Calibration) -> 
     calibration
 }
 
-/// `calibration` whose codes of temperatures and distances that are no readings are those of their taxels, as what `[all]` and `[taxel.N]` have
-/// of them is: all are missing before values are held.
+/// `calibration` whose codes of temperatures and distances that are no readings are those of their taxels, as what `[all]` and `[taxel.N]`
+/// have of them is: all are missing before values are held.
 pub(super) fn with_codes_of_senses(body: &Body, mut calibration: Calibration) -> Calibration {
     for (index, taxel) in body.taxels.iter().enumerate() {
         let sense = match taxel.modality {

@@ -154,7 +154,8 @@ impl OnSkin {
     }
 
     /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `intake` has noted
-    /// what is stale, by frame of the call, and what is corrected in part; `sensed` has what is read beside pressures. With `check`, touches are compared with their definition.
+    /// what is stale, by frame of the call, and what is corrected in part; `sensed` has what is read beside pressures. With `check`,
+    /// touches are compared with their definition.
     pub(super) fn find(
         &mut self,
         (plan, links): (&Plan, &Links),

@@ -1,10 +1,10 @@
 //! Compares touches of the whole body with their definition.
 //!
 //! Touches are found in double precision from the backend's pressures. Here the same frame's right pressures go through the definition
-//! ([`crate::touch::reference`]), which starts from what the engine kept of the frame before: each frame is compared from the one before, and
-//! what was too close to call there does not go on. How far the backend's pressures may be off is the largest share of itself by which
-//! a taxel's P may be; from it follow the bounds of a touch (`touch/bound.rs`). A touch whose taxels or identity depend on a choice
-//! that is closer than this is counted, and not compared.
+//! ([`crate::touch::reference`]), which starts from what the engine kept of the frame before: each frame is compared from the one before,
+//! and what was too close to call there does not go on. How far the backend's pressures may be off is the largest share of itself by which
+//! a taxel's P may be; from it follow the bounds of a touch (`touch/bound.rs`). A touch whose taxels or identity depend on a choice that is
+//! closer than this is counted, and not compared.
 //!
 //! The normal, standard deviations and fits are not compared: `tests/it` holds them to their equations.
 

@@ -35,8 +35,8 @@ struct WarmTaxel {
 }
 
 impl WarmTaxel {
-    /// Where it is, in the world if the touch's link is posed, else in that link's frame: there, and if its own link is not posed, as on the
-    /// body at rest.
+    /// Where it is, in the world if the touch's link is posed, else in that link's frame: there, and if its own link is not posed, as on
+    /// the body at rest.
     fn in_frame_of(&self, touch: &Touch, skin: &Skin, poses: &[Option<DAffine3>]) -> DVec3 {
         let pose_of = |link: u32| poses.get(link as usize).copied().flatten();
         let (link, world_from_link) = match (pose_of(touch.link), pose_of(self.link)) {

@@ -299,7 +299,8 @@ impl Percepts {
         }
     }
 
-    /// The touches of the whole body in the batch's frame `frame`; `None` unless [`Scene::touches`](crate::scene::Scene::touches) asks for them.
+    /// The touches of the whole body in the batch's frame `frame`; `None` unless [`Scene::touches`](crate::scene::Scene::touches) asks for
+    /// them.
     #[must_use]
     pub fn touches(&self, frame: usize) -> Option<&TouchFrame> {
         self.touch_frames.as_ref().map(|frames| &frames[frame])

@@ -152,8 +152,8 @@ macro_rules! columns {
             )*
             /// Why quantities are absent, or in doubt.
             pub flags: Flags,
-            /// Whether position and normal are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the frame carried a pose, or
-            /// in the field's anchor.
+            /// Whether position and normal are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the
+            /// frame carried a pose, or in the field's anchor.
             pub in_world: bool,
         }
 

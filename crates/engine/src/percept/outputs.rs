@@ -3,8 +3,8 @@
 use super::columns::{COLUMNS, Column, Outputs};
 
 impl Outputs {
-    /// What is given unless something else is asked for: [`Outputs::USUAL_AND_MOTION`] without [`Outputs::MOTION`], which is from frame to frame:
-    /// between two frames noise moves a centroid more than a finger does.
+    /// What is given unless something else is asked for: [`Outputs::USUAL_AND_MOTION`] without [`Outputs::MOTION`], which is from frame to
+    /// frame: between two frames noise moves a centroid more than a finger does.
     pub const USUAL: Self = Self::USUAL_AND_MOTION.difference(Self::MOTION);
 
     /// What is computed from a frame and the one before it: all but [`Outputs::SELF_CONTACTS`], [`Outputs::FILTERED`],

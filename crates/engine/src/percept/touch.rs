@@ -161,8 +161,8 @@ pub struct Touch {
     pub temperature_gradient_kelvin_per_m: Option<[f64; 2]>,
     /// How fast their mean changes, K/s, over the window of the calibration.
     pub temperature_rate_kelvin_per_s: Option<f64>,
-    /// Whether its place and directions are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the frame carried a pose of its
-    /// link.
+    /// Whether its place and directions are in the world (or in [`Scene::relative_to`](crate::scene::Scene::relative_to)), because the
+    /// frame carried a pose of its link.
     pub in_world: bool,
     /// Why quantities are absent or in doubt.
     pub flags: TouchFlags,

@@ -15,8 +15,8 @@ use crate::stage::layout::Still;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MotionFilter {
-    /// The window's low end, m, where motion is measured by the window; `None` is a sixteenth of the spacing of each field's taxels, about what noise feigns, and
-    /// at most a third of the high end.
+    /// The window's low end, m, where motion is measured by the window; `None` is a sixteenth of the spacing of each field's taxels, about
+    /// what noise feigns, and at most a third of the high end.
     pub low_m: Option<f64>,
     /// The window's high end, m; `None` is three times that spacing, as far as a touch may leap and stay the same one, and
     /// at least three times the low end.

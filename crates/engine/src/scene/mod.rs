@@ -58,8 +58,8 @@ pub struct Scene {
     pub coordinates: Coordinates,
     /// The link in whose frame everything is given instead of the world: poses are taken from there on.
     pub relative_to: Option<String>,
-    /// What is asked of touches of the whole body ([`Percepts::touches`](crate::percept::Percepts::touches)): with it, every pressure taxel of the body is read,
-    /// also where `fields` names few. `None` looks for no touches.
+    /// What is asked of touches of the whole body ([`Percepts::touches`](crate::percept::Percepts::touches)): with it, every pressure taxel
+    /// of the body is read, also where `fields` names few. `None` looks for no touches.
     pub touches: Option<touch::Options>,
     /// How far the places of two touches may be apart that are one contact, m; for [`Outputs::SELF_CONTACTS`]. `None` is that of
     /// [`crate::field::ContactTolerance`].

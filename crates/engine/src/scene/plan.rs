@@ -203,8 +203,8 @@ impl Plan {
         self.onsets.get(channel).copied().unwrap_or_default()
     }
 
-    /// Calibrates the taxel at `channel` from now on with `baseline`, its raw value at rest, and leaves it out if it is `unfit`; `made` is how all
-    /// slots were before any drift compensation.
+    /// Calibrates the taxel at `channel` from now on with `baseline`, its raw value at rest, and leaves it out if it is `unfit`; `made` is
+    /// how all slots were before any drift compensation.
     pub(crate) fn keep_up(&mut self, channel: usize, baseline: f32, unfit: bool, made: &[layout::Taxel]) {
         let shift = self.onset(channel).shift;
         let baseline = if shift == 0.0 { baseline } else { (f64::from(baseline) + shift) as f32 };

@@ -1,8 +1,8 @@
 //! **calibrate**: raw values to pressures.
 //!
-//! P = gain · (raw − baseline), or P = c(raw − baseline) for a taxel with a curve; 0 unless over the dead band. A value that is not finite, over 2⁶⁰ in size (raw or P), or
-//! masked is left out; one under 2⁻⁶⁰ and not zero counts as 0; each puts `faulty_input` on its fields. All of these are
-//! decided by the bits, because shader compilers may assume that NaN and infinity never occur.
+//! P = gain · (raw − baseline), or P = c(raw − baseline) for a taxel with a curve; 0 unless over the dead band. A value that is not finite,
+//! over 2⁶⁰ in size (raw or P), or masked is left out; one under 2⁻⁶⁰ and not zero counts as 0; each puts `faulty_input` on its fields. All
+//! of these are decided by the bits, because shader compilers may assume that NaN and infinity never occur.
 //!
 //! **Constants.** The reference takes the calibration's as they are written, in f64; `cpu` and `gpu` have each rounded once
 //! to single precision. The limits of the raw range are single precision's everywhere, as raw values are.

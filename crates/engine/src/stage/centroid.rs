@@ -5,7 +5,8 @@
 //! **Bound.** With A = Σ wP|x| / S: a term of the numerator carries 2u (pressure), u (wP), u (x rounded), u (product)
 //! and r of the sum ([`super::Sums`]; n − 1 in one pass), the denominator (r + 3)u, the quotient 5u; |c| ≤ A. Together
 //! |δc| ≤ (2r + 13)u·A, each coordinate by itself. Pressures that are off by ε more than 2u move c by Σ wδ(x − c) / (S + Σ wδ), |δ| ≤ ε, exactly: at most
-//! Σ wε|x − c| / (S − Σ wε), and never out of the taxels' midst. Products that fall under the smallest normal number add less than 2⁻⁴⁶ of the unit.
+//! Σ wε|x − c| / (S − Σ wε), and never out of the taxels' midst. Products that fall under the smallest normal number add less than 2⁻⁴⁶ of
+//! the unit.
 
 use glam::DVec3;
 

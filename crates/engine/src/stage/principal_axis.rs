@@ -9,10 +9,9 @@
 //!
 //! **Bound.** About another centre the moments are M + S·δc δcᵀ, exactly: the centroid's own error counts only squared.
 //! With δ = u‖x‖ + u‖x − c‖ for coordinate and difference, every entry of M is off by at most
-//! E = Σ wP(2‖x − c‖δ + (δ + ‖δc‖)²) + (r + 9)u Σ wP‖x − c‖², with r of [`super::Sums`], and Σ wε‖x − c‖² where pressures are off by ε more than
-//! 2u, with P + ε for P; then |δ(a + d)| ≤ 1.5E, |δh| ≤ 2E + 12u·h (a square root
-//! may lose 9u), the quotient's error is (|δh| + κ|δ(a + d)|)/(a + d − |δ(a + d)|) + 8u, and the axis turns by at most
-//! ½ asin(δh/h).
+//! E = Σ wP(2‖x − c‖δ + (δ + ‖δc‖)²) + (r + 9)u Σ wP‖x − c‖², with r of [`super::Sums`], and Σ wε‖x − c‖² where pressures are off by ε more
+//! than 2u, with P + ε for P; then |δ(a + d)| ≤ 1.5E, |δh| ≤ 2E + 12u·h (a square root may lose 9u), the quotient's error is (|δh| + κ|δ(a
+//! + d)|)/(a + d − |δ(a + d)|) + 8u, and the axis turns by at most ½ asin(δh/h).
 
 use glam::DVec2;
 

@@ -3,17 +3,17 @@
 //! Over the pressed taxels, at x in the chart with weight w, normal part P > 0 and tangential force s = sᵤ t + sᵥ n × t: the sum
 //! s = Σ wᵢsᵢ, along u and v of the chart and as a vector in space; its direction; the torsion Σ wᵢ(xᵢ − c) × sᵢ · n about the
 //! centroid c = Σ wPx/Σ wP; the friction ‖s‖/Σ wP along the chart, and without a chart Σ w‖sᵢ‖/Σ wP, as a sum in space gets shorter
-//! where the skin is curved; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A taxel whose s is not known is in none of these but the force, with its normal
-//! part. A tangent comes into the chart by the smallest turn that takes its taxel's normal to the chart's, so that no length is lost,
-//! as a sum in space loses it where the skin is curved.
+//! where the skin is curved; and the force on the skin, Σ Aᵢ(−Pᵢnᵢ + sᵢ) with A = 1 where P is in N. A taxel whose s is not known is in
+//! none of these but the force, with its normal part. A tangent comes into the chart by the smallest turn that takes its taxel's normal to
+//! the chart's, so that no length is lost, as a sum in space loses it where the skin is curved.
 //!
 //! This stage is the host's, in f64 of raw values, so that it gives the same bits on every backend. Each sum goes over the taxels once,
 //! the torsion as Σ wx × s − c × Σ ws, and sums in space are turned into the world link by link.
 //!
-//! **Sigma.** A taxel's s along a direction e, that of the sum in the chart or without a chart its own, is e·C(P, u, v)ᵀ = aₚP + aᵤu + aᵥv, with C its `cross_axis` and u and v
-//! its tangential values. With σₚ and σ the standard deviations of P and of u and v, all of independent noise, that of the friction f is
-//! √(Σ w²((aₚ − f)²σₚ² + aᵤ²σᵤ² + aᵥ²σᵥ²))/Σ wP. Where P has bᵤu + bᵥv in it, by a third row of `cross_axis`, noise of P and of u goes
-//! together: then aᵤ(aᵤ + 2(aₚ − f)bᵤ) is in the place of aᵤ², and that of v alike.
+//! **Sigma.** A taxel's s along a direction e, that of the sum in the chart or without a chart its own, is e·C(P, u, v)ᵀ = aₚP + aᵤu + aᵥv,
+//! with C its `cross_axis` and u and v its tangential values. With σₚ and σ the standard deviations of P and of u and v, all of independent
+//! noise, that of the friction f is √(Σ w²((aₚ − f)²σₚ² + aᵤ²σᵤ² + aᵥ²σᵥ²))/Σ wP. Where P has bᵤu + bᵥv in it, by a third row of
+//! `cross_axis`, noise of P and of u goes together: then aᵤ(aᵤ + 2(aₚ − f)bᵤ) is in the place of aᵤ², and that of v alike.
 
 use glam::{DVec2, DVec3};
 

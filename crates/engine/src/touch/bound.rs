@@ -12,8 +12,8 @@
 //! * A point (wP/S)(x − c) is off by (wP/S)(2ρ‖x − c‖ + δc), and the line between two by the asin of both over its length.
 //!
 //! In doubt are: the base, if another taxel is at most 2 δc farther from c; the farthest points, if others may be as far; the link,
-//! if another's total is as near as both are off; `isotropic` and `coincident` within their bounds. Rounding in double precision counts as a
-//! share [`ROUNDING`] more.
+//! if another's total is as near as both are off; `isotropic` and `coincident` within their bounds. Rounding in double precision counts as
+//! a share [`ROUNDING`] more.
 
 use glam::DVec3;
 

@@ -163,8 +163,8 @@ impl Places {
         }
     }
 
-    /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `time` at which it came: one for each taxel, or
-    /// of those with three axes three side by side.
+    /// Puts the numbers of an array into `frame`, in place of what that holds, with the time `time` at which it came: one for each taxel,
+    /// or of those with three axes three side by side.
     ///
     /// # Errors
     /// It has another number of them.

@@ -50,8 +50,8 @@ impl<'a> Unroller<'a> {
         &mut self.surfaces
     }
 
-    /// `spec` with a geodesic chart, or with one by normals if it asks for that, and its own members' (u, v). The origin and the direction of +u are those of `spec`'s
-    /// chart, else the defaults of a plane chart. A parent needs its descendants' taxels among its own:
+    /// `spec` with a geodesic chart, or with one by normals if it asks for that, and its own members' (u, v). The origin and the direction
+    /// of +u are those of `spec`'s chart, else the defaults of a plane chart. A parent needs its descendants' taxels among its own:
     /// [`FieldSpec::with_members`].
     ///
     /// # Errors

@@ -19,8 +19,8 @@
 //! The baseline stays within `max_drift` of the file's.
 //!
 //! **Health.** *Stuck*: off its rest by more than the dead band, and not one raw unit of change for `stuck_s`. *Noisy*: the
-//! mean step between frames is over `noisy`, not held. *Saturated*: at or beyond an end of the raw range for `saturated_s`. *Dead*: no value, or
-//! none that is a number, for `dead_s`. A taxel that is found unfit is left out of every sum, and its fields flagged
+//! mean step between frames is over `noisy`, not held. *Saturated*: at or beyond an end of the raw range for `saturated_s`. *Dead*: no
+//! value, or none that is a number, for `dead_s`. A taxel that is found unfit is left out of every sum, and its fields flagged
 //! `faulty_input`, from the next epoch on and until the reason is gone.
 
 mod common_drift;
@@ -315,8 +315,8 @@ impl DriftCompensation {
         self.epoch_start_s.is_some_and(|start| t_s - start >= self.cadence_s() || t_s < start)
     }
 
-    /// Notes that the value of the taxel at `index` in the next frame was at an end of its range before it was corrected, which does not show
-    /// in what [`DriftCompensation::observe`] takes.
+    /// Notes that the value of the taxel at `index` in the next frame was at an end of its range before it was corrected, which does not
+    /// show in what [`DriftCompensation::observe`] takes.
     pub fn note_at_end(&mut self, index: usize) {
         self.taxels[index].was_at_end = true;
     }

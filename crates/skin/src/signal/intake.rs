@@ -116,20 +116,20 @@ impl Intake {
         self.stale = Some(Vec::new());
     }
 
-    /// Per frame since [`Intake::forget_notes`] its stale channels, ascending; empty if they are not tracked. A taxel whose value is corrected
-    /// is stale with each of those that correct it.
+    /// Per frame since [`Intake::forget_notes`] its stale channels, ascending; empty if they are not tracked. A taxel whose value is
+    /// corrected is stale with each of those that correct it.
     pub fn stale(&self) -> &[Vec<usize>] {
         self.stale.as_deref().unwrap_or_default()
     }
 
-    /// Per frame since [`Intake::forget_notes`] the taxels whose values are corrected in part, or are out of range as they are measured, and
-    /// with what reading; empty if none are corrected. The values count.
+    /// Per frame since [`Intake::forget_notes`] the taxels whose values are corrected in part, or are out of range as they are measured,
+    /// and with what reading; empty if none are corrected. The values count.
     pub fn notes(&self) -> &[Vec<(usize, Reading)>] {
         &self.notes
     }
 
-    /// Per frame since [`Intake::forget_notes`] the taxels, ascending, whose values were at an end of their range, or beyond, before they were
-    /// corrected; empty if none are corrected.
+    /// Per frame since [`Intake::forget_notes`] the taxels, ascending, whose values were at an end of their range, or beyond, before they
+    /// were corrected; empty if none are corrected.
     pub fn at_ends(&self) -> &[Vec<usize>] {
         &self.at_ends
     }

@@ -1,4 +1,5 @@
-//! What of the forces along the skin is in the normal values of taxels with three axes, by the first row of their calibration's `cross_axis`.
+//! What of the forces along the skin is in the normal values of taxels with three axes, by the first row of their calibration's
+//! `cross_axis`.
 //!
 //! The row [a, b, c] says that P is a·N + b·u + c·v, with N, u and v what is measured along the three axes, in the unit of P. Raw values
 //! are corrected for that before any backend reads them, so that all compute of the same bits: with g the gains,

@@ -19,7 +19,8 @@ pub enum Response {
     /// A straight line: P = gain · (raw − baseline).
     #[default]
     Linear,
-    /// P = |gain| · curve(±(raw − baseline)), with the sign of the gain; which of [`Calibration::curves`](crate::signal::Calibration::curves).
+    /// P = |gain| · curve(±(raw − baseline)), with the sign of the gain; which of
+    /// [`Calibration::curves`](crate::signal::Calibration::curves).
     Curve(usize),
     /// The same with the curve of the paper's circuit.
     Fsr(FsrResponse),

@@ -1,7 +1,7 @@
 //! Senses beside pressure: how raw values become temperatures, distances and tangential forces. In double precision.
 //!
-//! Temperature: T = gain · r(raw − baseline) + offset, in °C, or with r(baseline − raw) if it is inverted. Distance: the same in m. r is the raw value itself, a table, or
-//! the temperature of a thermistor in a divider, by its B parameter: 1/T = 1/298.15 K + ln(R/R₂₅)/B.
+//! Temperature: T = gain · r(raw − baseline) + offset, in °C, or with r(baseline − raw) if it is inverted. Distance: the same in m. r is
+//! the raw value itself, a table, or the temperature of a thermistor in a divider, by its B parameter: 1/T = 1/298.15 K + ln(R/R₂₅)/B.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;

@@ -125,8 +125,8 @@ impl Wiring {
         taxels.div_ceil(MAX_CHANNELS as usize)
     }
 
-    /// The default wiring: `boards` boards, numbered from `first_id`, share `taxels` evenly in ascending order of their ids; the values of a
-    /// taxel with three axes are side by side.
+    /// The default wiring: `boards` boards, numbered from `first_id`, share `taxels` evenly in ascending order of their ids; the values of
+    /// a taxel with three axes are side by side.
     ///
     /// # Errors
     /// There are fewer taxels than boards, or a board would have more than 256 channels or an id over 65534.

@@ -229,8 +229,8 @@ impl JointStates {
         self.index_of.get(name).copied()
     }
 
-    /// The position of `joint` at `time`, in seconds or a [`FrameTime`], linear between two states; of a joint that `is_continuous`, the shorter way around.
-    /// After the last state, its position; `None` before the first.
+    /// The position of `joint` at `time`, in seconds or a [`FrameTime`], linear between two states; of a joint that `is_continuous`, the
+    /// shorter way around. After the last state, its position; `None` before the first.
     #[must_use]
     pub fn at(&self, joint: usize, time: impl Into<FrameTime>, is_continuous: bool) -> Option<JointPosition> {
         let (track, time) = (&self.tracks[joint], time.into());

@@ -95,8 +95,8 @@ pub trait Source {
         None
     }
 
-    /// Has a read that waits for frames end once `stopped` is set, from any thread, as if there were no other one: nobody reads them then. What
-    /// reads to an end by itself does not heed it.
+    /// Has a read that waits for frames end once `stopped` is set, from any thread, as if there were no other one: nobody reads them then.
+    /// What reads to an end by itself does not heed it.
     fn stop_by(&mut self, stopped: &Arc<AtomicBool>) {
         if let Some(source) = self.wrapped_mut() {
             source.stop_by(stopped);
@@ -115,7 +115,8 @@ pub trait Source {
         }
     }
 
-    /// From now on delivers stale values as [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE) instead of as missing, for engines that track them.
+    /// From now on delivers stale values as [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE) instead of as missing, for engines
+    /// that track them.
     fn report_stale(&mut self) {
         if let Some(source) = self.wrapped_mut() {
             source.report_stale();

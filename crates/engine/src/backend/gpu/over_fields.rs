@@ -53,8 +53,8 @@ pub(super) fn most_members(device: &Device) -> usize {
     device.device.limits().max_storage_buffer_binding_size as usize / size_of::<layout::Member>()
 }
 
-/// Members of a wide field's part on `device`, at most unless it has very many, however many frames a call has, as sums depend on it: many parts keep a GPU's
-/// processors busy, few take less joining.
+/// Members of a wide field's part on `device`, at most unless it has very many, however many frames a call has, as sums depend on it: many
+/// parts keep a GPU's processors busy, few take less joining.
 pub(super) fn of_part(device: &Device) -> usize {
     if device.is_processor() { 8 * layout::WIDE } else { layout::WIDE }
 }

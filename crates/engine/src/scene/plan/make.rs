@@ -26,8 +26,8 @@ impl Plan {
     ///
     /// # Errors
     /// The body has no taxels or no fields; a glob is malformed or matches nothing; the calibration is for another body
-    /// or has a curve that cannot be computed with; a field mixes quantities; the scene asks for a signal that no sensor has, for no letter, for one
-    /// twice, or for a filter of motion that lets nothing pass.
+    /// or has a curve that cannot be computed with; a field mixes quantities; the scene asks for a signal that no sensor has, for no
+    /// letter, for one twice, or for a filter of motion that lets nothing pass.
     pub fn new(body: &Body, fields: &FieldSet, scene: &Scene, calibration: &Calibration) -> Result<Self> {
         check(body, fields, scene, calibration)?;
         let calibration = &*calibration.of_corrected(body);

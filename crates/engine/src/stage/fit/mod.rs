@@ -8,8 +8,8 @@
 //! rᵢ = (mᵢ − Pᵢ) / √(σᵢ² + (g·mᵢ)² + (f·max P)²)
 //!
 //! where m is what the contact would make a taxel feel, σᵢ the noise of P, g the spread of the sensors' gains, and f the kind's
-//! floor ([`kinds`]): layers have tails that a Gaussian lacks, and on quiet sensors these would leave no kind standing ([`objective`]). A taxel at 0 says only that m is not over its threshold: it counts
-//! where it is. A prior holds the contact's spread near what touches have.
+//! floor ([`kinds`]): layers have tails that a Gaussian lacks, and on quiet sensors these would leave no kind standing ([`objective`]). A
+//! taxel at 0 says only that m is not over its threshold: it counts where it is. A prior holds the contact's spread near what touches have.
 //!
 //! **Descent.** Levenberg and Marquardt's, from the touch's moments, for a fixed number of steps; a step that does not help
 //! is not taken ([`descent`]). A segment starts from the line. Nothing is kept from frame to frame, so that a recording that

@@ -33,8 +33,8 @@ pub struct LimbOptions {
 
 /// Frames of limbs on a network.
 ///
-/// Times count from its opening, s. Values of a silent limb are [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE); those of taxels that no limb has
-/// sent yet are missing.
+/// Times count from its opening, s. Values of a silent limb are [`RawValue::STALE`](somatic_skin::signal::RawValue::STALE); those of taxels
+/// that no limb has sent yet are missing.
 pub struct LimbSource {
     merged: Merged,
     taxels: Vec<u32>,

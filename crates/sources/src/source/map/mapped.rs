@@ -31,7 +31,8 @@ pub trait Messages {
     /// It cannot be read, or has not what the map says.
     fn next(&mut self, values: &mut Vec<RawValue>) -> Result<Came>;
 
-    /// Whether its last error is of what sends messages, and not of one message: the next ones would be errors too, so that it is never skipped.
+    /// Whether its last error is of what sends messages, and not of one message: the next ones would be errors too, so that it is never
+    /// skipped.
     fn has_failed(&self) -> bool {
         false
     }

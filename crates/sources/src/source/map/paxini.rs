@@ -450,7 +450,8 @@ mod tests {
         connected: [u8; 4],
         /// Of the tip of the thumb and the proximal part of the index finger.
         taxels: [u16; 2],
-        /// What is sent instead of the n-th frame since it was told to send. If that is nothing, the board has started again, and is silent.
+        /// What is sent instead of the n-th frame since it was told to send. If that is nothing, the board has started again, and is
+        /// silent.
         frame: fn(u16) -> Vec<u8>,
         refuses: Option<u16>,
         /// Whether the first answer about sensors, and every other one, breaks off after a wrong length.

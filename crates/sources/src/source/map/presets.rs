@@ -88,8 +88,8 @@ time = "time:s"
 /// so that n × t is −y.
 const TOUCH_GRID_AXES: &str = "n,u,-v";
 
-/// The names are those of the DDS messages of the maker's SDK, `inspire_hand_sdk`, and so are the registers, which it reads over Modbus TCP:
-/// addresses count bytes, so that the nine registers from 3000 on are followed by those from 3018 on.
+/// The names are those of the DDS messages of the maker's SDK, `inspire_hand_sdk`, and so are the registers, which it reads over Modbus
+/// TCP: addresses count bytes, so that the nine registers from 3000 on are followed by those from 3018 on.
 const INSPIRE: &str = r#"
 values = [
   "fingerone_tip_touch", "fingerone_top_touch", "fingerone_palm_touch",

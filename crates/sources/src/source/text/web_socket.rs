@@ -63,8 +63,9 @@ mod tests {
     use crate::signal::{Channel, Frame};
     use crate::source::{ArrayMap, Source as _, TextPlace, VendorOptions};
 
-    /// What a server of XELA sends of a number of sensors: of each sixteen taxels with three numbers each, as counts and as forces; of taxel
-    /// `at` these are `at`, −`at` and 2·`at`, 100 more for each sensor before, and half of one more as forces. Its sensors stand in the order of their names as texts.
+    /// What a server of XELA sends of a number of sensors: of each sixteen taxels with three numbers each, as counts and as forces; of
+    /// taxel `at` these are `at`, −`at` and 2·`at`, 100 more for each sensor before, and half of one more as forces. Its sensors stand in
+    /// the order of their names as texts.
     fn xela_line(message: usize, sensors: u16) -> String {
         let sensor = |number: u16| {
             let more = 100 * (number - 1);

@@ -1,6 +1,6 @@
-//! novel's loadsol, `.txt`: above the table a line with names, `DEVICE::ZONE`, and one with quantities and units; then a row for each frame.
-//! Of each device the forces of its zones are sensors. Its total is left out where there are zones, and so is what else it
-//! measures. Where the zones are is not in the file.
+//! novel's loadsol, `.txt`: above the table a line with names, `DEVICE::ZONE`, and one with quantities and units; then a row for each
+//! frame. Of each device the forces of its zones are sensors. Its total is left out where there are zones, and so is what else it measures.
+//! Where the zones are is not in the file.
 
 use super::super::column_names::columns;
 use super::layout::{Cell, Layout, Panel, next_value};

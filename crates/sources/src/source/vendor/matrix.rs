@@ -1,5 +1,6 @@
 //! Plain matrices: a line for each frame with all its cells, row by row, and the time before them or not, totals and a
-//! label after them or not ([`Columns`]); or a block of rows for each frame, with whatever between blocks. What the file does not say is given: rows and columns, pitch, rate, unit.
+//! label after them or not ([`Columns`]); or a block of rows for each frame, with whatever between blocks. What the file does not say is
+//! given: rows and columns, pitch, rate, unit.
 
 use super::super::time_column::TimeColumn;
 use super::layout::{Grid, Layout, next_value};

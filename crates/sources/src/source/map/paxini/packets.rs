@@ -1,8 +1,8 @@
 //! What PaXini's board for many sensors says and is told.
 //!
-//! A request is 55 AA 00, a function (3 reads, 16 writes), a register and a count of bytes, both in 16 bits with the low byte first, what is
-//! written, and a checksum: the bytes of a packet add up to 0. An answer begins with AA 55 and goes on in the same way. What the board sends
-//! by itself is AA 56 00, how many bytes follow but for the checksum, in 16 bits, an error that is 0 for none, and data.
+//! A request is 55 AA 00, a function (3 reads, 16 writes), a register and a count of bytes, both in 16 bits with the low byte first, what
+//! is written, and a checksum: the bytes of a packet add up to 0. An answer begins with AA 55 and goes on in the same way. What the board
+//! sends by itself is AA 56 00, how many bytes follow but for the checksum, in 16 bits, an error that is 0 for none, and data.
 
 use std::collections::VecDeque;
 
@@ -26,8 +26,8 @@ const PUSHED: [u8; 3] = [0xAA, 0x56, 0];
 /// Bytes of either before its data.
 const ANSWER_HEAD: usize = 8;
 const PUSHED_HEAD: usize = 5;
-/// Data of a frame while the sensors are not known; more is a damaged length. Twenty sensors with all the taxels that the board has room for
-/// have under 11,000 bytes.
+/// Data of a frame while the sensors are not known; more is a damaged length. Twenty sensors with all the taxels that the board has room
+/// for have under 11,000 bytes.
 const MAX_FRAME_BYTES: usize = 1 << 14;
 
 /// A packet of the board whose checksum is right.
@@ -81,7 +81,8 @@ impl Packets {
         (self.most, self.long) = (Some(most), (0, 0));
     }
 
-    /// The length that `times` frames had, one after the other, which were left out as too long. That is no damage: it begins to count anew.
+    /// The length that `times` frames had, one after the other, which were left out as too long. That is no damage: it begins to count
+    /// anew.
     pub(super) fn too_long(&mut self, times: u32) -> Option<usize> {
         let (bytes, count) = self.long;
         (count >= times).then(|| {
