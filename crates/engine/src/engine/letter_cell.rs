@@ -33,8 +33,8 @@ pub(super) struct Readings<T> {
     /// Those with a value that counts.
     pub(super) members: Vec<usize>,
     pub(super) values: Vec<T>,
-    /// Of every member, °C or m; infinite where nothing is in range, `None` where it has no reading.
-    pub(super) by_member: Vec<Option<f64>>,
+    /// Of every member that has a reading, °C or m; infinite where nothing is in range.
+    pub(super) by_member: Vec<(usize, f64)>,
 }
 
 impl<T> Readings<T> {

@@ -6,17 +6,17 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::letter_cell::{Made, Readings};
 use super::links::Links;
-use super::pulls::{Pull, Pulls, Sides};
+use super::pulls::{Pull, Pulls};
 use super::spread::{Frames, Now};
 use crate::backend::Step;
 use crate::percept::{Flags, Host, Outputs, Percepts};
 use crate::scene::{Plan, PlanField, SensedMember};
-use crate::signal::{RawValue, Reading, Receptor, SenseCalibration, ShearCalibration};
+use crate::signal::{RawValue, Reading, Receptor, Sense, SenseCalibration, ShearCalibration};
 use crate::stage::proximity::{LEAST_M, Near};
-use crate::stage::shear::{Noise, Pulled, Sums};
+use crate::stage::shear::{Noise, Noisy, Pulled, Sums};
 use crate::stage::temperature::Warm;
 use crate::stage::window::Trend;
-use crate::stage::{calibrate, proximity, temperature};
+use crate::stage::{proximity, temperature};
 
 /// The values of the frames of a call that such letters are made of.
 #[derive(Clone, Copy, Default)]
@@ -36,6 +36,8 @@ impl<'a> SensedValues<'a> {
 pub(super) struct Cell<'a> {
     pub(super) plan: &'a Plan,
     pub(super) field: &'a PlanField,
+    /// Its number in the plan.
+    pub(super) number: usize,
     pub(super) frames: Frames<'a>,
     /// The frame's number in the call.
     pub(super) frame: usize,
@@ -52,15 +54,10 @@ enum Frame {
 }
 
 impl Cell<'_> {
-    /// Makes the cell `cell` of `percepts`, of which the backend knows nothing. `now` and `room` have what the fields of a frame share,
-    /// and `trend` what the letter measured before.
-    pub(super) fn make(
-        &self,
-        cell: usize,
-        percepts: &mut Percepts,
-        (now, room): (&mut Now, &mut Room),
-        trend: &mut Trend,
-    ) {
+    /// Fills the cell `cell` of `percepts`, which backends leave out. `room` has what the fields of a frame share, and `trend` what the
+    /// letter measured before.
+    pub(super) fn make(&self, cell: usize, percepts: &mut Percepts, room: &mut Room, trend: &mut Trend) {
+        let Room { pulls, warm, near, now } = room;
         percepts.set_present(cell, Outputs::empty());
         // As it was in a frame of another call.
         percepts.in_world[cell] = false;
@@ -72,13 +69,13 @@ impl Cell<'_> {
         match self.plan.letters()[self.field.letter].receptor {
             Receptor::Sustained | Receptor::Change => {}
             Receptor::Shear => {
-                senses.shear.iter().for_each(|by| self.shear(by, &mut room.pulls, now, &mut made));
+                senses.shear.iter().for_each(|by| self.shear(by, pulls, now, &mut made));
             }
             Receptor::Temperature => {
-                senses.temperature.iter().for_each(|by| self.temperature(by, &mut room.warm, now, (&mut made, trend)));
+                senses.temperature.iter().for_each(|by| self.temperature(by, warm, now, (&mut made, trend)));
             }
             Receptor::Proximity => {
-                senses.proximity.iter().for_each(|by| self.proximity(by, &mut room.near, now, (&mut made, trend)));
+                senses.proximity.iter().for_each(|by| self.proximity(by, near, now, (&mut made, trend)));
             }
         }
         made.flags.set(Flags::NO_CONTACT, !made.is_there);
@@ -140,16 +137,15 @@ impl Cell<'_> {
         by: &SenseCalibration,
         readings: &mut Readings<T>,
         made: &mut Made<'_>,
-        read: impl Fn(&SensedMember, (RawValue, f64), &mut Flags) -> Option<T>,
+        read: impl Fn(&SensedMember, &Sense, (RawValue, f64), &mut Flags) -> Option<T>,
     ) {
         let row = self.sensed.row(self.frame);
         readings.members.clear();
         readings.values.clear();
         readings.by_member.clear();
         for (index, member) in self.field.sensed.iter().enumerate() {
-            let raw = row[member.values[0]];
-            readings.by_member.push(None);
-            match by.of_taxel(member.taxel).read(raw) {
+            let (raw, sense) = (row[member.values[0]], by.of_taxel(member.taxel));
+            match sense.read(raw) {
                 Reading::Missing => made.flags |= Flags::INCOMPLETE,
                 Reading::Faulty => made.flags |= Flags::FAULTY_INPUT,
                 Reading::Value(number, is_in_range) => {
@@ -157,9 +153,9 @@ impl Cell<'_> {
                     if !is_in_range {
                         made.flags |= Flags::OUT_OF_RANGE;
                     }
-                    let read = read(member, (raw, number), &mut made.flags);
+                    let read = read(member, sense, (raw, number), &mut made.flags);
                     // Of proximity: where there is none, nothing is near.
-                    readings.by_member[index] = Some(if read.is_some() { number } else { f64::INFINITY });
+                    readings.by_member.push((index, if read.is_some() { number } else { f64::INFINITY }));
                     readings.members.extend(read.is_some().then_some(index));
                     readings.values.extend(read);
                 }
@@ -174,7 +170,7 @@ impl Cell<'_> {
         now: &mut Now,
         (made, trend): (&mut Made<'_>, &mut Trend),
     ) {
-        self.read(by, readings, made, |member, (_, celsius), _| {
+        self.read(by, readings, made, |member, _, (_, celsius), _| {
             Some(Warm { weight: member.weight, celsius, place_m: member.place_m })
         });
         let Readings { members, values: warm, by_member } = &*readings;
@@ -231,8 +227,8 @@ impl Cell<'_> {
         now: &mut Now,
         (made, trend): (&mut Made<'_>, &mut Trend),
     ) {
-        self.read(by, readings, made, |member, (raw, distance_m), flags| {
-            let end_beyond = by.of_taxel(member.taxel).end_beyond(raw);
+        self.read(by, readings, made, |member, sense, (raw, distance_m), flags| {
+            let end_beyond = sense.end_beyond(raw);
             if distance_m > by.range_m || end_beyond.is_gt() {
                 return None;
             }
@@ -243,7 +239,7 @@ impl Cell<'_> {
             Some(Near { distance_m: distance_m.max(LEAST_M), place_m: member.place_m })
         });
         let Readings { members, values: near, by_member } = &*readings;
-        if by_member.iter().all(Option::is_none) {
+        if by_member.is_empty() {
             return;
         }
         made.give(Outputs::COVERED, Host::Covered, &[near.len() as f64]);
@@ -307,10 +303,10 @@ impl Cell<'_> {
 
     fn shear(&self, by: &ShearCalibration, pulls: &mut Pulls, now: &mut Now, made: &mut Made<'_>) {
         pulls.look(by, &self.frames, self.sensed.row(self.frame));
-        made.flags |= pulls.flags_of(self.field.sensed.iter().filter_map(|member| member.channel));
-        if !pulls.is_pressed() {
+        if !pulls.has_news(self.number) {
             return;
         }
+        made.flags |= pulls.flags_of(self.field.sensed.iter().filter_map(|member| member.channel));
         let frame = self.frame_of(self.pressed(pulls).map(|(member, _)| member.link), now);
         let found = self.sums(pulls, &frame, now);
         if !found.is_pressed() {
@@ -347,13 +343,12 @@ impl Cell<'_> {
                 None => made.lack(Outputs::SHEAR_DIRECTION, Flags::STILL),
             }
         }
-        let friction = found.friction(self.field.chart.is_some());
+        let charted = self.field.chart.is_some();
+        let friction = found.friction(charted);
         made.give(Outputs::FRICTION, Host::Friction, &[friction]);
         if made.percepts.outputs().contains(Outputs::FRICTION_SIGMA) {
-            match self.friction_variance(by, pulls, &found) {
-                Some(variance) => {
-                    made.give(Outputs::FRICTION_SIGMA, Host::FrictionSigma, &[variance.sqrt() / found.pull]);
-                }
+            match found.friction_sigma(charted, by, self.noisy(pulls)) {
+                Some(sigma) => made.give(Outputs::FRICTION_SIGMA, Host::FrictionSigma, &[sigma]),
                 None => made.flags |= Flags::NOISE_UNKNOWN,
             }
         }
@@ -362,26 +357,17 @@ impl Cell<'_> {
         }
     }
 
-    /// The variance of the friction times Σ wP, where the noise of all pressed members is known.
-    fn friction_variance(&self, by: &ShearCalibration, pulls: &Pulls, found: &Sums) -> Option<f64> {
-        let (plan, charted) = (self.plan, self.field.chart.is_some());
-        let (friction, direction) = (found.friction(charted), found.along_chart.normalize_or(DVec2::X));
-        self.pressed(pulls).try_fold(0.0, |sum, (member, pull)| {
-            let (channel, Some(shear)) = (member.channel?, pull.shear) else { return Some(sum) };
-            let calibration = &plan.calibrations[channel];
-            let (noise, raw) = (calibration.noise?, self.frames.raw.rows.value(self.frames.offset, channel));
-            let noise = Noise {
-                of_pressure: calibrate::sigma(raw.number()?, noise, calibration, plan.curve_of(channel)),
-                of_sides: Sides::of(by, member.taxel, (calibration, plan.onset(channel).threshold))
-                    .gains
-                    .map(|gain| gain.abs() * by.noise_of(member.taxel).unwrap_or(noise)),
-            };
-            // Without a chart, each along its own direction.
-            let along = match charted {
-                true => member.tangents_in_chart.map(|tangent| tangent.dot(direction)),
-                false => DVec2::from_array(shear.forces).normalize_or(DVec2::X).to_array(),
-            };
-            Some(sum + member.weight.powi(2) * noise.variance(by, along, friction))
+    /// The pressed members whose tangential force is known, with its noise; `None` where that is not known.
+    fn noisy<'m>(&'m self, pulls: &'m Pulls) -> impl Iterator<Item = Option<Noisy<'m>>> {
+        let noise = |channel: usize| {
+            let raw = self.frames.raw.rows.value(self.frames.offset, channel);
+            let calibration = (&self.plan.calibrations[channel], self.plan.curve_of(channel));
+            Noise::of(raw, calibration, pulls.sides_of(channel)?)
+        };
+        let known = self.pressed(pulls).filter_map(|(member, pull)| Some((member, pull.felt?)));
+        known.map(move |(member, felt)| {
+            let tangents_in_chart = &member.tangents_in_chart;
+            Some(Noisy { weight: member.weight, felt, noise: noise(member.channel?)?, tangents_in_chart })
         })
     }
 }
@@ -389,30 +375,34 @@ impl Cell<'_> {
 /// Room for what the fields of a frame are made of, used again from frame to frame.
 #[derive(Clone, Debug)]
 pub(super) struct Room {
-    pub(super) pulls: Pulls,
+    pulls: Pulls,
     warm: Readings<Warm>,
     near: Readings<Near>,
+    pub(super) now: Now,
 }
 
 impl Room {
     pub(super) fn new(plan: &Plan) -> Self {
-        Self { pulls: Pulls::new(plan), warm: Readings::none(), near: Readings::none() }
+        Self { pulls: Pulls::new(plan), warm: Readings::none(), near: Readings::none(), now: Now::default() }
+    }
+
+    /// Forgets the frame.
+    pub(super) fn forget(&mut self) {
+        self.pulls.forget();
+        self.now.forget();
     }
 }
 
 /// Adds what `member` feels to `sums`, in whose space it has these tangents and this normal.
 fn add(sums: &mut Sums, member: &SensedMember, pull: &Pull, (tangents, normal): (&[DVec3; 2], DVec3)) {
-    let shear = pull.shear.unwrap_or_default();
-    let taxel = Pulled {
+    sums.add(&Pulled {
         weight: member.weight,
         pressure: pull.pressure,
-        shear: shear.forces,
-        size: shear.size,
+        felt: pull.felt,
         tangents_in_chart: &member.tangents_in_chart,
         tangents,
         normal,
         place_m: member.place_m,
         newtons_per_p: pull.newtons_per_p,
-    };
-    if pull.shear.is_some() { sums.add(&taxel) } else { sums.add_normal(&taxel) }
+    });
 }

@@ -28,6 +28,27 @@ pub(super) struct Links {
     likely: Vec<u32>,
 }
 
+/// Where every link is in a frame, where that is known.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LinkPoses {
+    /// By link.
+    world_from_link: Vec<Option<DAffine3>>,
+    /// Memory: by link, which of the frame's poses is its own.
+    own: Vec<Option<usize>>,
+}
+
+impl LinkPoses {
+    /// Forgets the frame: none is known.
+    pub(super) fn clear(&mut self) {
+        self.world_from_link.clear();
+    }
+
+    /// By link; empty if none is known.
+    pub(super) fn as_slice(&self) -> &[Option<DAffine3>] {
+        &self.world_from_link
+    }
+}
+
 /// A frame of the call with the links of its poses.
 #[derive(Clone, Copy)]
 pub(super) struct Posed<'a> {
@@ -143,7 +164,8 @@ impl Links {
 
     /// Puts world_from_link of every link in `frame`, number `index` of the call, into `poses`, as [`Links::world_from_anchor`]
     /// has it: none of a frame that is not posed.
-    pub(super) fn poses_into(&self, index: usize, frame: &Frame, poses: &mut Vec<Option<DAffine3>>) {
+    pub(super) fn poses_into(&self, index: usize, frame: &Frame, poses: &mut LinkPoses) {
+        let LinkPoses { world_from_link: poses, own } = poses;
         poses.clear();
         poses.resize(self.names.len(), None);
         if !self.are_posed(frame) {
@@ -155,7 +177,8 @@ impl Links {
             Some(link) => self.world_from(link, posed).map(|world_from_link| world_from_link.inverse()),
         };
         let Some(from_world) = from_world else { return };
-        let mut own: Vec<Option<usize>> = vec![None; self.names.len()];
+        own.clear();
+        own.resize(self.names.len(), None);
         for (at, &link) in posed.links.iter().enumerate().rev() {
             own[link as usize] = Some(at);
         }
@@ -220,9 +243,10 @@ mod tests {
             links.forget();
             frames[call.clone()].iter().for_each(|frame| links.resolve(frame).unwrap());
             for (index, (frame, expected)) in frames[call.clone()].iter().zip(&expected[call]).enumerate() {
-                let mut poses = Vec::new();
+                let mut poses = LinkPoses::default();
                 links.poses_into(index, frame, &mut poses);
-                let found: Vec<Option<f64>> = poses.iter().map(|pose| pose.map(|pose| pose.translation.x)).collect();
+                let found: Vec<Option<f64>> =
+                    poses.as_slice().iter().map(|pose| pose.map(|pose| pose.translation.x)).collect();
                 assert_eq!(found, expected);
                 let posed = links.posed(index, frame);
                 let alone: Vec<Option<f64>> =

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::letters::SensedValues;
-use super::links::Links;
+use super::links::{LinkPoses, Links};
 use super::self_contacts::SelfContacts;
 use super::skin_fits::{FitTrails, Moment, SkinFits};
 use super::skin_sigmas::SkinSigmas;
 use super::touch_check::TouchCheck;
-use super::touch_senses::{Sensed, TouchSenses};
+use super::touch_senses::{On, Sensed, TouchSenses};
 use super::touch_warmth::Trends;
 use crate::backend::RawBatch;
 use crate::body::Body;
@@ -51,7 +51,7 @@ pub(super) struct OnSkin {
     /// Memory for a frame.
     without_value: Vec<u32>,
     notes: Vec<(u32, TouchFlags)>,
-    poses: Vec<Option<DAffine3>>,
+    poses: LinkPoses,
     /// What was read beside pressures in the last frame that touches were found in, where that is needed.
     row: Vec<RawValue>,
 }
@@ -100,7 +100,7 @@ impl OnSkin {
             touches: Touches::new(Arc::new(skin), options),
             without_value: Vec::new(),
             notes: Vec::new(),
-            poses: Vec::new(),
+            poses: LinkPoses::default(),
             row: Vec::new(),
         })
     }
@@ -149,12 +149,12 @@ impl OnSkin {
     pub(super) fn on_links(&self, plan: &Plan, out: &mut Vec<LinkShare>) {
         self.touches.on_links(out);
         if let Some(senses) = &self.senses {
-            senses.add_to_links((plan, self.touches.skin()), &self.row, self.touches.pressed(), out);
+            senses.add_to_links(On { plan, skin: self.touches.skin() }, &self.row, self.touches.pressed(), out);
         }
     }
 
     /// Finds the touches of `frames`, which are those of `raw`; their fields and pressures are in `percepts`. `intake` has noted
-    /// what is stale, by frame of the call, and what is corrected in part; `sensed` has what is read beside pressures. With `check`,
+    /// what is stale, by frame of the call, and what is corrected in part; `sensed` has what the host reads. With `check`,
     /// touches are compared with their definition.
     pub(super) fn find(
         &mut self,
@@ -198,17 +198,17 @@ impl OnSkin {
                 links.poses_into(index, frame, &mut self.poses);
             }
             if let Some(senses) = &mut self.senses {
-                let (row, poses) = (sensed.row(index), &self.poses[..]);
+                let (row, poses) = (sensed.row(index), self.poses.as_slice());
                 let sensed = Sensed { t_s: frame.t_s, raw, offset, row, pressures, poses };
-                senses.add((plan, self.touches.skin()), &sensed, &mut found);
+                senses.add(On { plan, skin: self.touches.skin() }, &sensed, &mut found);
             }
-            put_in_world(&self.poses, &mut found);
+            put_in_world(self.poses.as_slice(), &mut found);
             if let Some(self_contacts) = &mut self.self_contacts {
                 let (contacts, are_known) = self_contacts.find(&found, input.restarts);
                 percepts.push_self_contacts(contacts, are_known);
             }
             if let Some(fits) = &mut self.fits {
-                let moment = Moment { offset, t_s: frame.t_s, poses: &self.poses };
+                let moment = Moment { offset, t_s: frame.t_s, poses: self.poses.as_slice() };
                 fits.take((plan, self.touches.skin()), raw, moment, &mut found);
             }
             percepts.put_touch_frame(index, found);

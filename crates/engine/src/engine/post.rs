@@ -178,14 +178,14 @@ impl Post<'_> {
         if !own && self.cadence.is_none() {
             return;
         }
-        let (alone, mut now) = (std::slice::from_ref(frame), Now::default());
-        state.room.pulls.forget();
+        let alone = std::slice::from_ref(frame);
+        state.room.forget();
         for (number, field) in self.plan.fields.iter().enumerate() {
             let cell = index * self.plan.fields.len() + number;
             if !field.sensed.is_empty() {
                 let frames = self.frames(alone, raw, offset, &state.raw_before);
-                let of = Cell { plan: self.plan, field, frames, frame: index, step, sensed: self.sensed };
-                of.make(cell, percepts, (&mut now, &mut state.room), &mut state.fields[number].trend);
+                let of = Cell { plan: self.plan, field, number, frames, frame: index, step, sensed: self.sensed };
+                of.make(cell, percepts, &mut state.room, &mut state.fields[number].trend);
                 continue;
             }
             if let Some(cadence) = self.cadence {
@@ -212,7 +212,8 @@ impl Post<'_> {
             }
             if stages.world_motion {
                 let own_frame = self.frames(alone, raw, offset, &state.raw_before);
-                self.world_motion(field, (own_frame, &mut now), step, cell, percepts, &mut before.world_motion);
+                let now = &mut state.room.now;
+                self.world_motion(field, (own_frame, now), step, cell, percepts, &mut before.world_motion);
             }
             if stages.sigma && contact {
                 self.sigmas(field, raw, offset, cell, percepts);

@@ -6,7 +6,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::links::Links;
+use super::links::{LinkPoses, Links};
 use crate::backend::{RawBatch, Step};
 use crate::percept::Flags;
 use crate::scene::{Plan, PlanField};
@@ -28,15 +28,21 @@ pub(super) struct Frames<'a> {
 }
 
 /// What is known of one frame: found when the first field asks.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Now {
     /// The frame of the poses, and that of the pressures.
     posed: Option<usize>,
     pressed: Option<usize>,
-    /// By link, world_from_link.
-    poses: Vec<Option<DAffine3>>,
+    poses: LinkPoses,
     /// By slot, P.
     pressures: Vec<f64>,
+}
+
+impl Now {
+    /// Forgets the frame.
+    pub(super) fn forget(&mut self) {
+        (self.posed, self.pressed) = (None, None);
+    }
 }
 
 impl Frames<'_> {
@@ -51,7 +57,7 @@ impl Frames<'_> {
             now.posed = Some(frame);
             self.links.poses_into(self.number_of(frame), &self.frames[frame], &mut now.poses);
         }
-        &now.poses
+        now.poses.as_slice()
     }
 
     /// Where `field` is touched in frame `frame`, m in the world, or why that is not known.
@@ -75,7 +81,7 @@ impl Frames<'_> {
                 }
             }
             if pull > 0.0 {
-                let world_from_link = now.poses[part.link].ok_or(Flags::NO_POSE)?;
+                let world_from_link = now.poses.as_slice()[part.link].ok_or(Flags::NO_POSE)?;
                 total += pull;
                 moment += world_from_link.transform_vector3(of_link) + pull * world_from_link.translation;
             }

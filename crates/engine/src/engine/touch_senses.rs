@@ -1,4 +1,4 @@
-//! What touches are beside pressure: how they pull along the skin, and how warm they are.
+//! Shear and temperature of touches.
 //!
 //! Sums, direction, torsion and friction are those of stage *shear*, over the taxels of a touch that have three axes and whose tangential
 //! forces are known, in the touch's chart: a taxel counts as in the touch's place, and s and torsion are scaled by ΣP/ΣwP, so that they
@@ -8,15 +8,15 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
-use super::pulls::{Sides, Tangential, tangential};
 use super::touch_warmth::{Trends, Warmth};
 use crate::backend::RawBatch;
 use crate::body::Body;
-use crate::percept::{Flags, LinkShare, Touch, TouchFlags, TouchFrame, TouchOutputs};
+use crate::percept::{LinkShare, Touch, TouchFlags, TouchFrame, TouchOutputs};
 use crate::scene::Plan;
-use crate::signal::{Axis, Channel, RawValue};
-use crate::stage::shear::{Noise, Pulled, Sums};
-use crate::stage::{calibrate, force};
+use crate::signal::{Axis, RawValue};
+use crate::stage::force;
+use crate::stage::shear::{Noise, Noisy, Pulled, Sums};
+use crate::stage::tangential::{Sides, Tangential, Unknown};
 use crate::touch::Skin;
 
 /// What touches have of tangential forces.
@@ -24,34 +24,54 @@ const OF_PULLS: TouchOutputs = TouchOutputs::SHEAR.union(TouchOutputs::FRICTION_
 
 /// A pressure taxel with three axes, on the body at rest.
 #[derive(Clone, Debug)]
-struct PulledTaxel {
+struct PulledNode {
     /// Its place in the body.
     taxel: usize,
-    /// Where its tangential values are among those that are read beside pressures.
+    /// Where its tangential values are among those that the host reads.
     values: [usize; 2],
     tangents_in_body: [DVec3; 2],
     /// How these are read; `None` where there is no gain: touches and fields refuse that, and wrenches are then of normal forces.
     sides: Option<Sides>,
 }
 
-/// A taxel of a touch.
-#[derive(Clone, Copy, Debug)]
-struct Pull {
+impl PulledNode {
+    /// s on the body at rest, of what is felt along the tangents.
+    fn in_body(&self, felt: &Tangential) -> DVec3 {
+        in_space(felt, &self.tangents_in_body)
+    }
+}
+
+/// s as a vector in the space of these tangents.
+fn in_space(felt: &Tangential, tangents: &[DVec3; 2]) -> DVec3 {
+    felt.forces[0] * tangents[0] + felt.forces[1] * tangents[1]
+}
+
+/// A taxel of a touch. What depends on how it pulls is zero where that is not known.
+#[derive(Clone, Copy, Debug, Default)]
+struct NodePull {
     node: u32,
     /// P > 0.
     pressure: f64,
     /// What it feels along the skin, where that is known.
     felt: Option<Tangential>,
-    /// Its tangents on the body at rest, if it has three axes.
     tangents_in_body: [DVec3; 2],
+    /// In the touch's chart.
+    tangents_in_chart: [DVec2; 2],
+    place_m: DVec2,
 }
 
-impl Pull {
+impl NodePull {
     /// s on the body at rest, where it is known.
     fn shear(&self) -> Option<DVec3> {
-        let [along, across] = self.tangents_in_body;
-        self.felt.map(|felt| felt.forces[0] * along + felt.forces[1] * across)
+        self.felt.map(|felt| in_space(&felt, &self.tangents_in_body))
     }
+}
+
+/// Where touches are found.
+#[derive(Clone, Copy)]
+pub(super) struct On<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) skin: &'a Skin,
 }
 
 /// The frame of a call that touches are of.
@@ -61,7 +81,7 @@ pub(super) struct Sensed<'a> {
     pub(super) raw: &'a RawBatch<'a>,
     /// Its number in `raw`.
     pub(super) offset: usize,
-    /// The values that are read beside pressures.
+    /// The values that the host reads.
     pub(super) row: &'a [RawValue],
     /// P by node.
     pub(super) pressures: &'a [f64],
@@ -76,29 +96,24 @@ pub(super) struct TouchSenses {
     /// How often the plan was calibrated when `pulled` were.
     calibration_changes: u64,
     /// By node of the skin.
-    pulled: Vec<Option<PulledTaxel>>,
+    pulled: Vec<Option<PulledNode>>,
     warmth: Option<Warmth>,
     /// By link, turns directions of the body at rest into the link.
     link_from_body: Vec<DMat3>,
     /// Memory: the taxels of a touch.
-    pulls: Vec<Pull>,
+    pulls: Vec<NodePull>,
 }
 
 impl TouchSenses {
     /// `None` where no taxel has three axes and none measures temperature.
     pub(super) fn new(body: &Body, plan: &Plan, skin: &Skin) -> Option<Self> {
-        let all = Channel::all_of(body);
-        let value = |id: u32, axis: Axis| {
-            let channel = all.binary_search(&Channel::of_taxel(id, axis).0).ok()?;
-            plan.senses.channels.binary_search(&channel).ok()
-        };
         let pulled = plan.body_taxels.iter().map(|&taxel| {
             let own = &body.taxels[taxel];
-            let values = [value(own.id, Axis::U)?, value(own.id, Axis::V)?];
+            let values = [plan.senses.place_of(own.id, Axis::U)?, plan.senses.place_of(own.id, Axis::V)?];
             let turned = |tangent| body.links[own.link].body_from_link.transform_vector3(tangent);
-            Some(PulledTaxel { taxel, values, tangents_in_body: own.tangents_in_link().map(turned), sides: None })
+            Some(PulledNode { taxel, values, tangents_in_body: own.tangents_in_link().map(turned), sides: None })
         });
-        let pulled: Vec<Option<PulledTaxel>> =
+        let pulled: Vec<Option<PulledNode>> =
             if plan.senses.shear.is_some() { pulled.collect() } else { vec![None; plan.body_taxels.len()] };
         let wanted = plan.touch_outputs().unwrap_or(TouchOutputs::empty());
         let warmth = if wanted.contains(TouchOutputs::TEMPERATURE) { Warmth::new(body, plan, skin) } else { None };
@@ -141,9 +156,9 @@ impl TouchSenses {
     }
 
     /// Puts them into the touches `found` of a frame, directions in the frames of their links, and what pulls into their wrenches.
-    pub(super) fn add(&mut self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, found: &mut TouchFrame) {
-        if self.calibration_changes != plan.calibration_changes {
-            self.calibrate(plan);
+    pub(super) fn add(&mut self, of: On<'_>, sensed: &Sensed<'_>, found: &mut TouchFrame) {
+        if self.calibration_changes != of.plan.calibration_changes {
+            self.calibrate(of.plan);
         }
         if let Some(warmth) = &mut self.warmth {
             warmth.keep(&found.touches, sensed.raw.steps[sensed.offset].restarts());
@@ -153,33 +168,43 @@ impl TouchSenses {
             let [from, to] = touch.taxels.map(|end| end as usize);
             let nodes = &taxels[from..to];
             if let Some(warmth) = &mut self.warmth {
-                warmth.add((plan, skin), (sensed.t_s, sensed.row, sensed.poses), nodes, touch);
+                warmth.add((of.plan, of.skin), (sensed.t_s, sensed.row, sensed.poses), nodes, touch);
             }
-            if self.wanted.intersects(OF_PULLS) && self.look(plan, sensed, nodes, touch) {
+            if self.wanted.intersects(OF_PULLS) && self.look(of, sensed, nodes, touch) {
                 let [from, to] = touch.links.map(|end| end as usize);
-                self.pull((plan, skin), sensed, touch, &mut links[from..to]);
+                self.pull(of, sensed, touch, &mut links[from..to]);
             }
         }
     }
 
     /// Notes what the taxels at `nodes` feel; whether any has three axes. Flags of `touch` say why it is not known how one pulls.
-    fn look(&mut self, plan: &Plan, sensed: &Sensed<'_>, nodes: &[u32], touch: &mut Touch) -> bool {
-        self.pulls.clear();
+    fn look(&mut self, of: On<'_>, sensed: &Sensed<'_>, nodes: &[u32], touch: &mut Touch) -> bool {
+        let chart = TouchChart::new(of.skin, touch);
         let mut any = false;
+        self.pulls.clear();
         for &node in nodes {
             let pressure = sensed.pressures[node as usize];
-            let felt = self.felt(plan, sensed.row, (node, pressure));
-            any |= felt.is_some();
-            let tangents_in_body = self.pulled[node as usize].as_ref().map(|own| own.tangents_in_body);
-            let felt = felt.and_then(|felt| felt.map_err(|why| touch.flags |= why).ok());
-            self.pulls.push(Pull { node, pressure, felt, tangents_in_body: tangents_in_body.unwrap_or_default() });
+            let mut pull = NodePull { node, pressure, ..NodePull::default() };
+            if let Some((own, felt)) = self.felt(of.plan, sensed.row, (node, pressure)) {
+                any = true;
+                match felt {
+                    Ok(felt) => {
+                        pull.felt = Some(felt);
+                        pull.tangents_in_body = own.tangents_in_body;
+                        pull.tangents_in_chart = chart.tangents(node, own.tangents_in_body);
+                        pull.place_m = chart.place(node);
+                    }
+                    Err(why) => touch.flags |= why.into(),
+                }
+            }
+            self.pulls.push(pull);
         }
         any
     }
 
     /// Gives `touch` what is wanted of what its taxels feel; its wrenches are in `links`.
-    fn pull(&self, (plan, skin): (&Plan, &Skin), sensed: &Sensed<'_>, touch: &mut Touch, links: &mut [LinkShare]) {
-        let found = self.sums((plan, skin), touch);
+    fn pull(&self, of: On<'_>, sensed: &Sensed<'_>, touch: &mut Touch, links: &mut [LinkShare]) {
+        let found = self.sums(of);
         if self.wanted.contains(TouchOutputs::SHEAR) {
             let turn = self.link_from_body[touch.link as usize];
             touch.force_vector_newton = found.force().map(|force| turn * force);
@@ -188,44 +213,40 @@ impl TouchSenses {
             // It is not known how any of them pulls.
             return;
         }
-        let friction = found.friction(!touch.flags.contains(TouchFlags::WRAPPED));
+        let (by, charted) = (of.plan.senses.shear.as_ref(), !touch.flags.contains(TouchFlags::WRAPPED));
         if self.wanted.contains(TouchOutputs::SHEAR) {
+            let friction = found.friction(charted);
             touch.friction = Some(friction);
-            touch.slip_ratio = plan.senses.shear.as_ref().and_then(|by| by.slips_at).map(|at| friction / at);
+            touch.slip_ratio = by.and_then(|by| by.slips_at).map(|at| friction / at);
             self.shear(&found, touch);
         }
         if self.wanted.contains(TouchOutputs::FRICTION_SIGMA) {
-            let variance = self.friction_variance((plan, skin), sensed, (&found, friction), touch);
-            touch.friction_sigma = variance.map(|variance| variance.sqrt() / found.pull);
-            touch
-                .flags
-                .set(TouchFlags::NOISE_UNKNOWN, touch.flags.contains(TouchFlags::NOISE_UNKNOWN) || variance.is_none());
+            touch.friction_sigma = by.and_then(|by| found.friction_sigma(charted, by, self.noisy(of, sensed)));
+            if touch.friction_sigma.is_none() {
+                touch.flags |= TouchFlags::NOISE_UNKNOWN;
+            }
         }
         if self.wanted.contains(TouchOutputs::WRENCH) {
             for (node, shear) in self.pulls.iter().filter_map(|pull| Some((pull.node, pull.shear()?))) {
-                add_to_wrench((plan, skin), (node, shear), links);
+                add_to_wrench(of, (node, shear), links);
             }
         }
     }
 
-    /// Adds what pulls at the `pressed` taxels to the wrenches of their links, of which `row` has the values that are read beside
-    /// pressures. A wrench of which a part is missing or faulty is absent, as nothing would say so.
+    /// Adds what pulls at the `pressed` taxels to the wrenches of their links, of which `row` has the values that the host reads. A wrench
+    /// of which a part is not known is absent, as nothing would say so.
     pub(super) fn add_to_links(
         &self,
-        (plan, skin): (&Plan, &Skin),
+        of: On<'_>,
         row: &[RawValue],
         pressed: impl Iterator<Item = (u32, f64)>,
         links: &mut [LinkShare],
     ) {
         for (node, pressure) in pressed {
-            let tangents_in_body = self.pulled[node as usize].as_ref().map(|own| own.tangents_in_body);
-            match self.felt(plan, row, (node, pressure)).zip(tangents_in_body) {
-                Some((Ok(felt), tangents_in_body)) => {
-                    let shear = felt.forces[0] * tangents_in_body[0] + felt.forces[1] * tangents_in_body[1];
-                    add_to_wrench((plan, skin), (node, shear), links);
-                }
-                Some((Err(_), _)) => {
-                    let link = skin.taxels()[node as usize].link;
+            match self.felt(of.plan, row, (node, pressure)) {
+                Some((own, Ok(felt))) => add_to_wrench(of, (node, own.in_body(&felt)), links),
+                Some((_, Err(_))) => {
+                    let link = of.skin.taxels()[node as usize].link;
                     links.iter_mut().filter(|share| share.link == link).for_each(|share| share.wrench = None);
                 }
                 None => {}
@@ -233,25 +254,20 @@ impl TouchSenses {
         }
     }
 
-    /// What the taxel of `node` feels along the skin, pressed by P, if it has three axes; or why that is not known.
+    /// The taxel of `node` if it has three axes, and what it feels along the skin, pressed by P; or why that is not known.
     fn felt(
         &self,
         plan: &Plan,
         row: &[RawValue],
         (node, pressure): (u32, f64),
-    ) -> Option<Result<Tangential, TouchFlags>> {
+    ) -> Option<(&PulledNode, Result<Tangential, Unknown>)> {
         let by = plan.senses.shear.as_ref()?;
         let own = self.pulled[node as usize].as_ref()?;
-        let sides = own.sides?;
         let values = own.values.map(|value| row.get(value).copied().unwrap_or(RawValue::MISSING));
-        Some(tangential(by, sides, pressure, values).map_err(|why| match why {
-            why if why.contains(Flags::INCOMPLETE) => TouchFlags::INCOMPLETE,
-            why if why.contains(Flags::OUT_OF_RANGE) => TouchFlags::OUT_OF_RANGE,
-            _ => TouchFlags::FAULTY_INPUT,
-        }))
+        Some((own, own.sides.as_ref()?.read(by, pressure, values)))
     }
 
-    /// The nodes of which some value beside pressure is `stale`: channels of the body, ascending.
+    /// The nodes of which some value that the host reads is `stale`: channels of the body, ascending.
     pub(super) fn stale_nodes<'a>(&'a self, plan: &'a Plan, stale: &'a [usize]) -> impl Iterator<Item = u32> + 'a {
         let is_stale = |value: usize| stale.binary_search(&plan.senses.channels[value]).is_ok();
         let pulled = self
@@ -263,27 +279,21 @@ impl TouchSenses {
         pulled.map(|(_, node)| node).chain(warm)
     }
 
-    /// The sums over the taxels of `touch`, in its chart.
-    fn sums(&self, (plan, skin): (&Plan, &Skin), touch: &Touch) -> Sums {
-        let chart = TouchChart::new(skin, touch);
+    /// The sums over the taxels of a touch, in its chart.
+    fn sums(&self, of: On<'_>) -> Sums {
         let mut sums = Sums::default();
         for pull in &self.pulls {
-            let own = &skin.taxels()[pull.node as usize];
-            let felt = pull.felt.unwrap_or_default();
-            let is_known = pull.felt.is_some();
-            let tangents_in_chart = if is_known { chart.tangents(pull) } else { Default::default() };
-            let taxel = Pulled {
+            let own = &of.skin.taxels()[pull.node as usize];
+            sums.add(&Pulled {
                 weight: own.weight(),
                 pressure: pull.pressure,
-                shear: felt.forces,
-                size: felt.size,
-                tangents_in_chart: &tangents_in_chart,
+                felt: pull.felt,
+                tangents_in_chart: &pull.tangents_in_chart,
                 tangents: &pull.tangents_in_body,
                 normal: own.normal,
-                place_m: if is_known { chart.place(pull.node) } else { DVec2::ZERO },
-                newtons_per_p: newtons_per_p(plan, pull.node),
-            };
-            if is_known { sums.add(&taxel) } else { sums.add_normal(&taxel) }
+                place_m: pull.place_m,
+                newtons_per_p: newtons_per_p(of.plan, pull.node),
+            });
         }
         sums
     }
@@ -307,34 +317,19 @@ impl TouchSenses {
         touch.flags.set(TouchFlags::STILL, touch.shear_direction_rad.is_none());
     }
 
-    /// The variance of the `friction` of `touch` times Σ wP, as stage *shear* has it; `None` where a taxel's noise is not known.
-    fn friction_variance(
-        &self,
-        (plan, skin): (&Plan, &Skin),
-        sensed: &Sensed<'_>,
-        (found, friction): (&Sums, f64),
-        touch: &Touch,
-    ) -> Option<f64> {
-        let by = plan.senses.shear.as_ref()?;
-        let first_slot = plan.touched_from.unwrap_or(0);
-        let chart = TouchChart::new(skin, touch);
-        let in_chart = found.along_chart.normalize_or(DVec2::X);
-        self.pulls.iter().filter(|pull| pull.felt.is_some()).try_fold(0.0, |sum, pull| {
-            let node = pull.node as usize;
-            let (calibration, own) = (&plan.calibrations[node], self.pulled[node].as_ref()?);
-            let noise = calibration.noise?;
-            let number = sensed.raw.rows.value(sensed.offset, node).number()?;
-            let gains = own.sides?.gains;
-            let noise = Noise {
-                of_pressure: calibrate::sigma(number, noise, calibration, plan.curve_of(first_slot + node)),
-                of_sides: gains.map(|gain| gain.abs() * by.noise_of(own.taxel).unwrap_or(noise)),
-            };
-            let along = match pull.felt {
-                // Around a limb, each along its own direction; where nothing pulls, every direction is as good.
-                Some(felt) if chart.is_wrapped => DVec2::from_array(felt.forces).normalize_or(DVec2::X).to_array(),
-                _ => chart.tangents(pull).map(|tangent| tangent.dot(in_chart)),
-            };
-            Some(sum + skin.taxels()[node].weight().powi(2) * noise.variance(by, along, friction))
+    /// The taxels of a touch of which it is known how they pull, with their noise; `None` where that is not known.
+    fn noisy<'a>(&'a self, of: On<'a>, sensed: &'a Sensed<'_>) -> impl Iterator<Item = Option<Noisy<'a>>> {
+        let first_slot = of.plan.touched_from.unwrap_or(0);
+        let noise = move |node: usize| {
+            let calibration = (&of.plan.calibrations[node], of.plan.curve_of(first_slot + node));
+            let sides = self.pulled[node].as_ref()?.sides.as_ref()?;
+            Noise::of(sensed.raw.rows.value(sensed.offset, node), calibration, sides)
+        };
+        let known = self.pulls.iter().filter_map(|pull| Some((pull, pull.felt?)));
+        known.map(move |(pull, felt)| {
+            let weight = of.skin.taxels()[pull.node as usize].weight();
+            let tangents_in_chart = &pull.tangents_in_chart;
+            Some(Noisy { weight, felt, noise: noise(pull.node as usize)?, tangents_in_chart })
         })
     }
 }
@@ -365,12 +360,12 @@ impl<'a> TouchChart<'a> {
         })
     }
 
-    /// The tangents of the taxel of `pull` along u and v.
-    fn tangents(&self, pull: &Pull) -> [DVec2; 2] {
+    /// The `tangents` of the taxel of `node` along u and v.
+    fn tangents(&self, node: u32, tangents: [DVec3; 2]) -> [DVec2; 2] {
         let [u, v, up] = self.axes;
-        let normal = self.skin.taxels()[pull.node as usize].normal.normalize();
+        let normal = self.skin.taxels()[node as usize].normal.normalize();
         let turn = if self.is_wrapped { DQuat::IDENTITY } else { DQuat::from_rotation_arc(normal, up) };
-        pull.tangents_in_body.map(|tangent| {
+        tangents.map(|tangent| {
             let turned = turn * tangent;
             DVec2::new(turned.dot(u), turned.dot(v))
         })
@@ -383,7 +378,7 @@ fn newtons_per_p(plan: &Plan, node: u32) -> Option<f64> {
 }
 
 /// Adds the tangential force s of `node`, on the body at rest, to the wrench of its link among `links`, if that is known.
-fn add_to_wrench((plan, skin): (&Plan, &Skin), (node, shear): (u32, DVec3), links: &mut [LinkShare]) {
+fn add_to_wrench(On { plan, skin }: On<'_>, (node, shear): (u32, DVec3), links: &mut [LinkShare]) {
     let taxel = &skin.taxels()[node as usize];
     let share = links.iter_mut().find(|share| share.link == taxel.link);
     let Some((wrench, newtons)) = share.and_then(|share| share.wrench.as_mut()).zip(newtons_per_p(plan, node)) else {

@@ -11,10 +11,10 @@ use glam::{DAffine3, DVec3};
 use crate::body::{Body, Modality};
 use crate::percept::{Touch, TouchFlags};
 use crate::scene::Plan;
-use crate::signal::{Axis, Channel, RawValue, Reading, SenseCalibration};
+use crate::signal::{Axis, RawValue, Reading, SenseCalibration};
 use crate::stage::temperature::{self, Warm};
 use crate::stage::window::Trend;
-use crate::touch::Skin;
+use crate::touch::{Skin, SkinTaxel};
 
 /// How far a taxel of temperature may be from its nearest pressure taxel, in widths of that one's cell.
 const REACH: f64 = 1.5;
@@ -26,7 +26,7 @@ struct WarmTaxel {
     taxel: usize,
     id: u32,
     link: u32,
-    /// Where its value is among those that are read beside pressures.
+    /// Where its value is among those that the host reads.
     value: usize,
     /// On the body at rest.
     position: DVec3,
@@ -60,10 +60,10 @@ pub(super) struct Warmth {
     trends: Trends,
     /// Memory: trends of touches that ended.
     spare: Vec<Trend>,
-    /// Memory: what each of `taxels` reads, if it is under a touch, °C.
-    now: Vec<Option<f64>>,
-    /// Memory: those that have a reading.
-    read: Vec<usize>,
+    /// Memory: those of `taxels` that are under a touch.
+    under: Vec<usize>,
+    /// Memory: which of those have a reading, and it, °C.
+    read: Vec<(usize, f64)>,
     warm: Vec<Warm>,
 }
 
@@ -71,22 +71,21 @@ impl Warmth {
     /// `None` where no taxel of the skin has one of temperature beside it, or nobody asks for it.
     pub(super) fn new(body: &Body, plan: &Plan, skin: &Skin) -> Option<Self> {
         plan.senses.temperature.as_ref()?;
-        let all = Channel::all_of(body);
-        let value_of = |id: u32| {
-            let channel = all.binary_search(&Channel::of_taxel(id, Axis::Normal).0).ok()?;
-            plan.senses.channels.binary_search(&channel).ok()
-        };
+        let mut by_link: BTreeMap<usize, Vec<(u32, &SkinTaxel)>> = BTreeMap::new();
+        for (number, node) in (0_u32..).zip(skin.taxels()) {
+            by_link.entry(node.link as usize).or_default().push((number, node));
+        }
         let mut taxels = Vec::new();
         let mut by_node: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (taxel, own) in body.taxels.iter().enumerate().filter(|(_, own)| own.modality == Modality::Temperature) {
             let position = body.links[own.link].body_from_link.transform_point3(own.position_in_link);
-            let on_link = skin.taxels().iter().zip(0_u32..).filter(|(node, _)| node.link as usize == own.link);
-            let far = |node: DVec3| node.distance(position);
-            let nearest = on_link.min_by(|(a, _), (b, _)| far(a.position).total_cmp(&far(b.position)));
-            if let Some(((node, number), value)) = nearest.zip(value_of(own.id))
-                && far(node.position) <= REACH * node.cell_m2.sqrt()
+            let far = |node: &SkinTaxel| node.position.distance_squared(position);
+            let on_link = by_link.get(&own.link).into_iter().flatten();
+            let nearest = on_link.min_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
+            if let Some(((number, node), value)) = nearest.zip(plan.senses.place_of(own.id, Axis::Normal))
+                && far(node) <= REACH.powi(2) * node.cell_m2
             {
-                by_node.entry(number).or_default().push(taxels.len());
+                by_node.entry(*number).or_default().push(taxels.len());
                 let (link, mean_normal) = (own.link as u32, node.mean_normal);
                 taxels.push(WarmTaxel { taxel, id: own.id, link, value, position, mean_normal });
             }
@@ -96,7 +95,7 @@ impl Warmth {
             by_node,
             trends: Trends::new(),
             spare: Vec::new(),
-            now: Vec::new(),
+            under: Vec::new(),
             read: Vec::new(),
             warm: Vec::new(),
         })
@@ -134,7 +133,7 @@ impl Warmth {
         }
     }
 
-    /// Gives `touch`, whose taxels are `nodes`, what it has of temperature at `t_s`. `row` has the values that are read beside pressures,
+    /// Gives `touch`, whose taxels are `nodes`, what it has of temperature at `t_s`. `row` has the values that the host reads,
     /// and `poses` where links are in the world, by link.
     pub(super) fn add(
         &mut self,
@@ -151,12 +150,12 @@ impl Warmth {
         touch.temperature_celsius = Some(temperature::mean(&self.warm));
         if let Some(warmest) = temperature::extreme(&self.warm, |a, b| a > b) {
             touch.warmest_celsius = Some(self.warm[warmest].celsius);
-            let own = &self.taxels[self.read[warmest]];
+            let own = &self.taxels[self.read[warmest].0];
             (touch.warmest_taxel, touch.warmest_position) = (Some(own.id), Some(own.in_frame_of(touch, skin, poses)));
         }
         if let Some(coldest) = temperature::extreme(&self.warm, |a, b| a < b) {
             touch.coldest_celsius = Some(self.warm[coldest].celsius);
-            let own = &self.taxels[self.read[coldest]];
+            let own = &self.taxels[self.read[coldest].0];
             (touch.coldest_taxel, touch.coldest_position) = (Some(own.id), Some(own.in_frame_of(touch, skin, poses)));
         }
         // Around a limb there is no chart.
@@ -171,17 +170,16 @@ impl Warmth {
 
     /// Reads the taxels at `nodes`; whether any has a reading. What is wrong with the others is said by flags of `touch`.
     fn read_under(&mut self, by: &SenseCalibration, row: &[RawValue], nodes: &[u32], touch: &mut Touch) -> bool {
-        self.now.clear();
-        self.now.resize(self.taxels.len(), None);
-        self.read.clear();
-        self.read.extend(nodes.iter().filter_map(|node| self.by_node.get(node)).flatten());
+        self.under.clear();
+        self.under.extend(nodes.iter().filter_map(|node| self.by_node.get(node)).flatten());
         // By ascending id, as a field has them.
-        self.read.sort_unstable();
-        self.read.retain(|&place| {
+        self.under.sort_unstable();
+        self.read.clear();
+        for &place in &self.under {
             let own = self.taxels[place];
             match by.of_taxel(own.taxel).read(row[own.value]) {
                 Reading::Value(celsius, is_in_range) => {
-                    self.now[place] = Some(celsius);
+                    self.read.push((place, celsius));
                     if !is_in_range {
                         touch.flags |= TouchFlags::OUT_OF_RANGE;
                     }
@@ -189,8 +187,7 @@ impl Warmth {
                 Reading::Missing => touch.flags |= TouchFlags::INCOMPLETE,
                 Reading::Faulty => touch.flags |= TouchFlags::FAULTY_INPUT,
             }
-            self.now[place].is_some()
-        });
+        }
         !self.read.is_empty()
     }
 
@@ -198,10 +195,11 @@ impl Warmth {
     fn place(&mut self, (skin, touch): (&Skin, &Touch)) {
         let [u, v, _] = skin.chart_axes(touch.base, touch.link);
         self.warm.clear();
-        for &place in &self.read {
+        for &(place, celsius) in &self.read {
             let own = self.taxels[place];
+            // Around a limb there is no chart, and nothing is made of places.
             let place_m = skin.place_in_chart(touch.base, [u, v], own.position, own.mean_normal).unwrap_or_default();
-            self.warm.push(Warm { weight: 1.0, celsius: self.now[place].unwrap_or_default(), place_m });
+            self.warm.push(Warm { weight: 1.0, celsius, place_m });
         }
     }
 
@@ -214,6 +212,6 @@ impl Warmth {
         });
         self.trends[place]
             .1
-            .take(t_s, &self.now, window_s, |read| temperature::mean_of(read.map(|(_, celsius)| [1.0, celsius])))
+            .take(t_s, &self.read, window_s, |read| temperature::mean_of(read.map(|(_, celsius)| [1.0, celsius])))
     }
 }

@@ -2,9 +2,10 @@
 
 use super::Plan;
 use crate::body::Body;
-use crate::signal::{Axis, Channel, RawValue, Reading, Receptor, SenseCalibration, ShearCalibration};
+use crate::signal::{Axis, RawValue, Reading, Receptor, SenseCalibration, ShearCalibration};
 use crate::stage::calibrate;
 use crate::stage::proximity::LEAST_M;
+use crate::stage::tangential::{Sides, Tangential, Unknown};
 
 /// The taxels of a plan that are read as temperatures, distances or tangential forces, by ascending index in the body. It reads
 /// them in double precision.
@@ -112,11 +113,9 @@ impl SensedTaxels {
     }
 
     fn chosen(plan: &Plan, body: &Body, is_wanted: impl Fn(Receptor) -> bool) -> Self {
-        let all = Channel::all_of(body);
-        let channels: Vec<u32> = plan.senses.channels.iter().map(|&channel| all[channel]).collect();
-        let place = |taxel: u32, axis: Axis| channels.binary_search(&Channel::of_taxel(taxel, axis).0);
+        let place = |taxel: u32, axis: Axis| plan.senses.place_of(taxel, axis);
         let of_taxel = |(index, taxel): (usize, &crate::body::Taxel)| {
-            let letter = [Receptor::Shear, Receptor::Temperature, Receptor::Proximity]
+            let letter = Receptor::OF_HOST
                 .into_iter()
                 .find(|receptor| receptor.reads(taxel.modality))
                 .filter(|&receptor| is_wanted(receptor))?;
@@ -124,10 +123,13 @@ impl SensedTaxels {
                 Receptor::Shear => [Axis::U, Axis::V].map(|axis| place(taxel.id, axis)),
                 _ => [place(taxel.id, Axis::Normal); 2],
             };
-            let [Ok(first), Ok(second)] = values else { return None };
+            let [Some(first), Some(second)] = values else { return None };
             Some(SensedTaxel { taxel: index, receptor: letter, values: [first, second] })
         };
-        Self { taxels: body.taxels.iter().enumerate().filter_map(of_taxel).collect(), channels }
+        Self {
+            taxels: body.taxels.iter().enumerate().filter_map(of_taxel).collect(),
+            channels: plan.senses.ids().to_vec(),
+        }
     }
 
     /// The channels whose values are read, ascending.
@@ -178,7 +180,7 @@ impl SensedTaxels {
     }
 }
 
-/// The tangential forces of the taxel at `taxel`.
+/// How the taxel at `taxel` is pulled: the size and the two parts of its tangential force, 0 where nothing presses.
 fn pulled(
     by: &ShearCalibration,
     plan: &Plan,
@@ -186,29 +188,23 @@ fn pulled(
     raw: &[RawValue],
     tangential: [RawValue; 2],
 ) -> (Reading, [f64; 2]) {
-    let nothing = (Reading::Value(0.0, true), [0.0; 2]);
-    let Ok(channel) = plan.body_taxels.binary_search(&taxel) else { return nothing };
-    let calibration = &plan.calibrations[channel];
-    let Some(&normal) = raw.get(channel) else { return nothing };
-    let own = calibrate::reference(normal, calibration, plan.curve_of(channel));
-    if own.value <= 0.0 {
-        return nothing;
-    }
-    let numbers = tangential.map(|raw| raw.number().filter(|number| number.abs() <= calibrate::HUGE));
-    let [Some(u), Some(v)] = numbers else {
-        let is_missing = tangential.iter().any(|raw| raw.is_missing());
-        return (if is_missing { Reading::Missing } else { Reading::Faulty }, [0.0; 2]);
+    let channel = plan.body_taxels.binary_search(&taxel).ok();
+    let Some((channel, &normal)) = channel.and_then(|channel| Some((channel, raw.get(channel)?))) else {
+        return (Reading::Missing, [0.0; 2]);
     };
-    let [low, high] = by.range_of(taxel);
-    if [u, v].iter().any(|number| !(low..=high).contains(number)) {
-        return (Reading::Faulty, [0.0; 2]);
+    let calibration = &plan.calibrations[channel];
+    let felt = match calibrate::pressure(normal, calibration, plan.curve_of(channel)) {
+        None if normal.is_missing() => Err(Unknown::Missing),
+        None => Err(Unknown::Faulty),
+        Some(pressure) if pressure > 0.0 => {
+            let sides = Sides::of(by, taxel, (calibration, plan.onset(channel).threshold));
+            sides.read(by, pressure, tangential)
+        }
+        Some(_) => Ok(Tangential::default()),
+    };
+    match felt {
+        Ok(Tangential { forces, .. }) => (Reading::Value(libm::hypot(forces[0], forces[1]), true), forces),
+        Err(Unknown::Missing) => (Reading::Missing, [0.0; 2]),
+        Err(Unknown::Faulty | Unknown::OutOfRange) => (Reading::Faulty, [0.0; 2]),
     }
-    let gains = by.gains_of(taxel, calibration.gain, calibration.unit_factor);
-    // What a soft onset has taken off, the sensor has measured all the same.
-    let measured = own.value + plan.onset(channel).threshold;
-    let forces = by.forces(by.rest_of(taxel), gains, measured, [u, v]);
-    if !forces.iter().all(|force| force.abs() <= calibrate::HUGE) {
-        return (Reading::Faulty, [0.0; 2]);
-    }
-    (Reading::Value(libm::hypot(forces[0], forces[1]), true), forces)
 }

@@ -19,6 +19,8 @@ use crate::signal::{
 pub(crate) struct Senses {
     /// The channels of the body that are read, as [`Channel::all_of`] counts.
     pub(crate) channels: Vec<usize>,
+    /// Their ids, ascending.
+    ids: Vec<u32>,
     pub(crate) temperature: Option<SenseCalibration>,
     pub(crate) proximity: Option<SenseCalibration>,
     /// Of fields with that letter, and of touches.
@@ -27,7 +29,7 @@ pub(crate) struct Senses {
     pulls_touches: bool,
 }
 
-/// What of the whole body is read for touches.
+/// Which letters touches read, of the whole body.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ForTouches {
     /// Tangential forces: wrenches are made of them, whatever is asked for.
@@ -64,8 +66,10 @@ pub(crate) struct SensedMember {
 /// What reads what `column` is made of: shear, temperature or proximity, or else pressure.
 #[must_use]
 pub fn receptor_of(column: &Column) -> Receptor {
-    let others = [Receptor::Shear, Receptor::Temperature, Receptor::Proximity];
-    others.into_iter().find(|&receptor| outputs_of(receptor).contains(column.output)).unwrap_or(Receptor::Sustained)
+    Receptor::OF_HOST
+        .into_iter()
+        .find(|&receptor| outputs_of(receptor).contains(column.output))
+        .unwrap_or(Receptor::Sustained)
 }
 
 /// What the letter of `receptor` gives, if the host makes it; else nothing.
@@ -94,7 +98,7 @@ pub(super) fn letters_and_outputs(
     let has = |receptor: Receptor| members().any(|member| receptor.reads(body.taxels[member.taxel].modality));
     let asked = outputs & Outputs::OF_OTHER_LETTERS;
     let is_usual = outputs.contains(Outputs::USUAL);
-    let others = [Receptor::Shear, Receptor::Temperature, Receptor::Proximity];
+    let others = Receptor::OF_HOST;
     let letters = if scene.letters.is_empty() {
         let wanted = others.into_iter().filter(|&receptor| {
             let own = outputs_of(receptor);
@@ -196,6 +200,16 @@ fn without_pressure(scene: &Scene, outputs: Outputs) -> String {
 }
 
 impl Senses {
+    /// Which of [`Senses::channels`] has the value of taxel `id` along `axis`, if it is read.
+    pub(crate) fn place_of(&self, id: u32, axis: Axis) -> Option<usize> {
+        self.ids.binary_search(&Channel::of_taxel(id, axis).0).ok()
+    }
+
+    /// The ids of [`Senses::channels`].
+    pub(crate) fn ids(&self) -> &[u32] {
+        &self.ids
+    }
+
     /// For `letters` of the fields `chosen`, and for touches, which are anywhere on the body.
     pub(super) fn new(
         body: &Body,
@@ -231,6 +245,7 @@ impl Senses {
         members.for_each(|member| read(member.taxel, of_fields));
         (0..body.taxels.len()).for_each(|taxel| read(taxel, of_touches));
         Self {
+            ids: channels.iter().map(|&channel| all[channel]).collect(),
             channels: channels.into_iter().collect(),
             temperature: (temperature || gives_temperature).then(|| calibration.temperature.clone()),
             proximity: proximity.then(|| calibration.proximity.clone()),
@@ -294,11 +309,7 @@ impl Senses {
         field: &Field,
         receptor: Receptor,
     ) -> Arc<[SensedMember]> {
-        let all = Channel::all_of(body);
-        let value = |taxel: &Taxel, axis: Axis| {
-            let channel = all.binary_search(&Channel::of_taxel(taxel.id, axis).0).expect("it is a channel of the body");
-            self.channels.binary_search(&channel).expect("it is read")
-        };
+        let value = |taxel: &Taxel, axis: Axis| self.place_of(taxel.id, axis).expect("it is read");
         let read = field.members.iter().filter(|member| receptor.reads(body.taxels[member.taxel].modality));
         let made = read.map(|member| {
             let taxel = &body.taxels[member.taxel];

@@ -29,6 +29,7 @@ pub(crate) mod proximity;
 pub(crate) mod self_contacts;
 pub(crate) mod shear;
 pub(crate) mod sigma;
+pub(crate) mod tangential;
 pub(crate) mod temperature;
 pub(crate) mod window;
 pub(crate) mod world_motion;

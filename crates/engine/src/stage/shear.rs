@@ -17,18 +17,19 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::signal::ShearCalibration;
+use super::U;
+use super::calibrate::{self, Table};
+use super::tangential::{Sides, Tangential};
+use crate::signal::{RawValue, ShearCalibration, TaxelCalibration};
 
-/// A pressed taxel with its tangential force.
+/// A pressed taxel with three axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pulled<'a> {
     pub(crate) weight: f64,
     /// P > 0.
     pub(crate) pressure: f64,
-    /// s along t and n × t.
-    pub(crate) shear: [f64; 2],
-    /// What s is made of, sizes added up: its rounding is a share of that.
-    pub(crate) size: f64,
+    /// s, where it is known.
+    pub(crate) felt: Option<Tangential>,
     /// t and n × t along u and v of the chart.
     pub(crate) tangents_in_chart: &'a [DVec2; 2],
     /// t and n × t in space.
@@ -70,38 +71,40 @@ struct InSpace {
     lacks_force: bool,
 }
 
-/// The share of [`Sums::size`] that raw values' own rounding to single precision may make of a sum: up to it there is no direction.
-pub(crate) const ROUNDING: f64 = 1.0 / (1_u32 << 24) as f64;
-
 impl Sums {
+    /// Adds a taxel; one whose tangential force is not known with its normal part alone, to the force.
     #[inline]
     pub(crate) fn add(&mut self, taxel: &Pulled<'_>) {
-        let &Pulled { weight, pressure, shear: [su, sv], size, tangents_in_chart, tangents, normal, place_m, .. } =
-            taxel;
+        let in_space = match &taxel.felt {
+            Some(felt) => self.add_felt(taxel, felt),
+            None => {
+                self.normal_only += 1;
+                DVec3::ZERO
+            }
+        };
+        match taxel.newtons_per_p {
+            Some(newtons) => self.space.force += newtons * (in_space - taxel.pressure * taxel.normal),
+            None => self.space.lacks_force = true,
+        }
+    }
+
+    /// Adds what a taxel feels along the skin; gives that as a vector in space.
+    #[inline]
+    fn add_felt(&mut self, taxel: &Pulled<'_>, felt: &Tangential) -> DVec3 {
+        let &Pulled { weight, pressure, tangents_in_chart, tangents, place_m, .. } = taxel;
+        let [along, across] = felt.forces;
         let pull = weight * pressure;
-        let along_chart = weight * (su * tangents_in_chart[0] + sv * tangents_in_chart[1]);
-        let in_space = su * tangents[0] + sv * tangents[1];
+        let along_chart = weight * (along * tangents_in_chart[0] + across * tangents_in_chart[1]);
+        let in_space = along * tangents[0] + across * tangents[1];
         self.taxels += 1;
         self.pull += pull;
         self.along_chart += along_chart;
         self.moment += pull * place_m;
         self.turn += place_m.perp_dot(along_chart);
-        self.size += weight * size;
-        self.lengths += weight * DVec2::new(su, sv).length();
+        self.size += weight * felt.size;
+        self.lengths += weight * DVec2::from_array(felt.forces).length();
         self.space.shear += weight * in_space;
-        match taxel.newtons_per_p {
-            Some(newtons) => self.space.force += newtons * (in_space - pressure * normal),
-            None => self.space.lacks_force = true,
-        }
-    }
-
-    /// Adds a taxel whose tangential force is not known: its normal force is in the force alone. `taxel.shear` does not count.
-    pub(crate) fn add_normal(&mut self, taxel: &Pulled<'_>) {
-        self.normal_only += 1;
-        match taxel.newtons_per_p {
-            Some(newtons) => self.space.force -= newtons * taxel.pressure * taxel.normal,
-            None => self.space.lacks_force = true,
-        }
+        in_space
     }
 
     /// Whether any taxel is in it, also with its normal part alone.
@@ -139,10 +142,10 @@ impl Sums {
         (!self.space.lacks_force).then_some(self.space.force)
     }
 
-    /// Of Σ ws in the chart; absent where nothing pulls.
+    /// Of Σ ws in the chart; absent where nothing pulls: up to what raw values' own rounding to single precision may make of it.
     pub(crate) fn direction(&self) -> Option<f64> {
         let DVec2 { x, y } = self.along_chart;
-        (self.along_chart.length() > ROUNDING * self.size).then(|| libm::atan2(y + 0.0, x + 0.0))
+        (self.along_chart.length() > U * self.size).then(|| libm::atan2(y + 0.0, x + 0.0))
     }
 
     /// Absent where that of one taxel is known: it has no arm.
@@ -155,21 +158,61 @@ impl Sums {
         let length = if charted { self.along_chart.length() } else { self.lengths };
         length / self.pull
     }
+
+    /// The standard deviation of that friction, from all the `taxels` whose s is known; `None` where the noise of one is not known.
+    pub(crate) fn friction_sigma<'a>(
+        &self,
+        charted: bool,
+        by: &ShearCalibration,
+        mut taxels: impl Iterator<Item = Option<Noisy<'a>>>,
+    ) -> Option<f64> {
+        let (friction, direction) = (self.friction(charted), self.along_chart.normalize_or(DVec2::X));
+        let variance = taxels.try_fold(0.0, |sum, taxel| {
+            let Noisy { weight, felt, noise, tangents_in_chart } = taxel?;
+            // Without a chart, each along its own direction; where nothing pulls, every direction is as good.
+            let along = match charted {
+                true => tangents_in_chart.map(|tangent| tangent.dot(direction)),
+                false => DVec2::from_array(felt.forces).normalize_or(DVec2::X).to_array(),
+            };
+            Some(sum + weight.powi(2) * noise.variance(by, along, friction))
+        })?;
+        Some(variance.sqrt() / self.pull)
+    }
 }
 
-/// The noise of a taxel's raw values.
+/// A taxel whose s is known, and the noise of what it is made of.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Noisy<'a> {
+    pub(crate) weight: f64,
+    pub(crate) felt: Tangential,
+    pub(crate) noise: Noise,
+    /// As of [`Pulled`].
+    pub(crate) tangents_in_chart: &'a [DVec2; 2],
+}
+
+/// The noise of a taxel's raw values, in the unit of P.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noise {
     /// Standard deviation of P.
     pub(crate) of_pressure: f64,
-    /// Of u and of v.
+    /// Of gᵤu and of gᵥv.
     pub(crate) of_sides: [f64; 2],
 }
 
 impl Noise {
+    /// Of the raw value `normal`, calibrated so, and of the `sides`; `None` where it is not known.
+    pub(crate) fn of(
+        normal: RawValue,
+        (calibration, curve): (&TaxelCalibration, Table<'_>),
+        sides: &Sides,
+    ) -> Option<Self> {
+        let of_pressure = calibrate::sigma(normal.number()?, calibration.noise?, calibration, curve);
+        Some(Self { of_pressure, of_sides: sides.noise()? })
+    }
+
     /// The variance of what a taxel adds to (ΣwP) f, for a weight of 1 and the friction f: `along` are its t and n × t along the direction
     /// of Σ ws.
-    pub(crate) fn variance(self, by: &ShearCalibration, along: [f64; 2], friction: f64) -> f64 {
+    fn variance(self, by: &ShearCalibration, along: [f64; 2], friction: f64) -> f64 {
         let [of_p, of_u, of_v] = [0, 1, 2].map(|of| along[0] * by.cross_axis[0][of] + along[1] * by.cross_axis[1][of]);
         let ([_, into_u, into_v], of_p) = (by.into_normal, of_p - friction);
         // What of u and v is in P has its part in σₚ already.
@@ -189,8 +232,7 @@ mod tests {
         Pulled {
             weight: 1.0,
             pressure,
-            shear,
-            size: shear[0].abs() + shear[1].abs(),
+            felt: Some(Tangential { forces: shear, size: shear[0].abs() + shear[1].abs() }),
             tangents_in_chart: &PLANE.0,
             tangents: &PLANE.1,
             normal: DVec3::Z,
@@ -280,7 +322,7 @@ mod tests {
         let sums = sums_of(&taxels);
         assert!(sums.force().is_none() && sums.direction().is_some());
         let mut half_known = sums_of(&taxels[..1]);
-        half_known.add_normal(&at(0.02, 0.0, 3.0, [9.0, 9.0]));
+        half_known.add(&Pulled { felt: None, ..at(0.02, 0.0, 3.0, [9.0, 9.0]) });
         assert!((half_known.force().unwrap() - DVec3::new(0.6, 0.8, -5.0)).length() < 1e-15 && half_known.pull == 2.0);
         assert!(sums_of(&taxels[..1]).torsion().is_none(), "one taxel has no arm");
     }

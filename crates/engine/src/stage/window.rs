@@ -89,8 +89,8 @@ pub(crate) struct Trend {
     /// What the value would be now if all members had been there all the time, and by how much that is more than it is.
     level: f64,
     above: f64,
-    /// By member, what it was when the value was known last.
-    before: Vec<Option<f64>>,
+    /// What each member was when the value was known last, by ascending member.
+    before: Vec<(usize, f64)>,
 }
 
 impl Trend {
@@ -100,30 +100,23 @@ impl Trend {
         self.before.clear();
     }
 
-    /// Takes what the members are at `t_s`, `None` where one has no value; `value_of` makes the value of some of them, by member, if
-    /// there is one. Gives its slope, per second, over the last `window_s`, where samples span enough of it.
+    /// Takes what the members are at `t_s` that have a value, by ascending member; `value_of` makes the value of some of them, if there is
+    /// one. Gives its slope, per second, over the last `window_s`, where samples span enough of it.
     pub(crate) fn take(
         &mut self,
         t_s: f64,
-        now: &[Option<f64>],
+        now: &[(usize, f64)],
         window_s: f64,
         value_of: impl Fn(&mut dyn Iterator<Item = (usize, f64)>) -> Option<f64>,
     ) -> Option<f64> {
-        let mut there = now.iter().enumerate().filter_map(|(member, now)| Some((member, (*now)?)));
-        let Some(value) = value_of(&mut there) else {
+        let Some(value) = value_of(&mut now.iter().copied()) else {
             self.window.clear();
             return None;
         };
-        let are_the_same = self.before.len() == now.len()
-            && self.before.iter().zip(now).all(|(before, now)| before.is_some() == now.is_some());
         // As long as they are the same, nothing adds up from frame to frame, and no rounding stays.
-        if !are_the_same {
-            let both = || {
-                let pairs = now.iter().zip(&self.before).enumerate();
-                pairs.filter_map(|(member, (now, before))| Some((member, (*now)?, (*before)?)))
-            };
-            let was = value_of(&mut both().map(|(member, _, before)| (member, before)));
-            let is = value_of(&mut both().map(|(member, now, _)| (member, now)));
+        if !are_of_same_members(now, &self.before) {
+            let was = value_of(&mut also_in(&self.before, now));
+            let is = value_of(&mut also_in(now, &self.before));
             if let (Some(was), Some(is)) = (was, is) {
                 self.above = self.level + (is - was) - value;
             } else {
@@ -133,14 +126,33 @@ impl Trend {
         }
         self.level = value + self.above;
         self.before.clear();
-        self.before.extend(now);
+        self.before.extend_from_slice(now);
         self.window.take(t_s, self.level, window_s)
     }
+}
+
+fn are_of_same_members(one: &[(usize, f64)], other: &[(usize, f64)]) -> bool {
+    let members = |of: &(usize, f64)| of.0;
+    one.iter().map(members).eq(other.iter().map(members))
+}
+
+/// Those `of` whose members `other` has, too.
+fn also_in(of: &[(usize, f64)], other: &[(usize, f64)]) -> impl Iterator<Item = (usize, f64)> {
+    let mut others = other.iter().map(|(member, _)| *member).peekable();
+    of.iter().copied().filter(move |(member, _)| {
+        while others.next_if(|other| other < member).is_some() {}
+        others.peek() == Some(member)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Those of `now` that have a value.
+    fn there(now: &[Option<f64>]) -> Vec<(usize, f64)> {
+        now.iter().enumerate().filter_map(|(member, now)| Some((member, (*now)?))).collect()
+    }
 
     fn mean(members: &mut dyn Iterator<Item = (usize, f64)>) -> Option<f64> {
         let [sum, count] = members.fold([0.0; 2], |[sum, count], (_, value)| [sum + value, count + 1.0]);
@@ -154,15 +166,15 @@ mod tests {
             let t_s = 0.01 * f64::from(frame);
             // One of them is 30 K warmer, and lost now and then.
             let warm = (frame % 7 != 3).then_some(50.0 + 2.0 * t_s);
-            let slope = trend.take(t_s, &[Some(20.0 + 2.0 * t_s), warm], 0.5, mean);
+            let slope = trend.take(t_s, &there(&[Some(20.0 + 2.0 * t_s), warm]), 0.5, mean);
             assert!(
                 slope.is_none_or(|slope| (slope - 2.0).abs() < 1e-9) && slope.is_some() == (frame >= 25),
                 "{slope:?}"
             );
         }
         // Where no member stays, nothing is known of what was before.
-        assert!(trend.take(1.99, &[None, Some(54.0)], 0.5, mean).is_some());
-        assert_eq!(trend.take(2.0, &[Some(24.0), None], 0.5, mean), None);
+        assert!(trend.take(1.99, &there(&[None, Some(54.0)]), 0.5, mean).is_some());
+        assert_eq!(trend.take(2.0, &there(&[Some(24.0), None]), 0.5, mean), None);
     }
 
     #[test]
@@ -171,7 +183,7 @@ mod tests {
         for frame in 0..3000 {
             // It comes after a sample that stays, and the next frame takes its place.
             let wild = if frame == 1001 { 1e17 } else { 20.3 };
-            let slope = trend.take(1e-3 * f64::from(frame), &[Some(wild), Some(20.1)], 1.0, mean);
+            let slope = trend.take(1e-3 * f64::from(frame), &there(&[Some(wild), Some(20.1)]), 1.0, mean);
             assert!(frame == 1001 || slope.is_none_or(|slope| slope.abs() < 1e-9), "{frame}: {slope:?}");
         }
         // What is equal in time is one sample, the last.

@@ -37,6 +37,9 @@ impl Receptor {
         ("proximity", Self::Proximity),
     ];
 
+    /// Those that the host makes: the ones that are not of pressure.
+    pub const OF_HOST: [Self; 3] = [Self::Shear, Self::Temperature, Self::Proximity];
+
     /// Whether it is made of pressures, which backends compute; the others are the host's, in double precision on every backend.
     #[must_use]
     pub fn is_of_pressure(self) -> bool {
