@@ -46,7 +46,7 @@ const OF_LETTERS: [(TouchOutputs, &str, Option<&str>); 3] = [
         TouchOutputs::TEMPERATURE,
         "temperature",
         Some(
-            "Mean of the temperature taxels whose nearest pressure taxel (same link, within 1.5 cell widths) is one of its, °C; \
+            "Mean of the temperature taxels whose nearest pressure taxel (same side of the same link, within 1.5 cell widths) is one of its, °C; \
              also warmest, warmest_taxel, warmest_position, coldest, coldest_taxel, coldest_position, temperature_gradient and \
              temperature_rate.",
         ),

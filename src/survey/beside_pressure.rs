@@ -32,12 +32,12 @@ impl Apart {
         of(values, &self.own)
     }
 
-    /// By tangential channel its raw value at rest, by the rule for pressures; `None` where it delivered nothing, or moved.
-    pub(super) fn baselines(&self) -> BTreeMap<u32, Option<f64>> {
+    /// By tangential channel its raw value at rest, by the rule for pressures, whose raw `range` is known or was seen; `None` where it
+    /// delivered nothing, or moved. What was seen of tangential values alone is no measure: perhaps nothing pulled.
+    pub(super) fn baselines(&self, range: f64, is_range_known: bool) -> BTreeMap<u32, Option<f64>> {
         let survey = &self.survey;
         let at_rest: Vec<AtRest> = survey.rest.iter().map(|kept| rest_of(kept, survey.step())).collect();
-        let range = survey.seen_range();
-        let moved = survey.moved(&at_rest, range, range > 0.0);
+        let moved = survey.moved(&at_rest, range.max(survey.seen_range()), is_range_known);
         let baseline = |place: usize| at_rest[place].filter(|_| !moved[place]).map(|(baseline, _)| baseline);
         survey.ids.iter().enumerate().map(|(place, &id)| (id, baseline(place))).collect()
     }
@@ -162,6 +162,27 @@ mod tests {
         assert_eq!(Some(first), calibration.taxels[0].noise);
         assert!((0.6..0.8).contains(&first) && (second - 1.0 / 12.0_f64.sqrt()).abs() < 1e-6, "{text}");
         assert!(Engine::new(&body, Options::default().calibration(calibration)).is_ok());
+    }
+
+    #[test]
+    fn sensors_that_nothing_pulls_have_baselines_too() {
+        let ids = channels(&["1", "1.u", "1.v"]);
+        let cell = SheetCell::rectangle(1, [0.0; 2], 0.01, 0.01).with_axes(true);
+        let bytes = sheets(&[Sheet::new("pad", vec![cell])]).unwrap().to_bytes().unwrap();
+        for bits in [Some(12), None] {
+            let mut survey = Survey::new(&ids).on(&Body::from_bytes("pad", &bytes).unwrap()).unwrap();
+            let values = |n: usize, depth: f64| {
+                let noise = [0.0, 2.0, -1.0, 1.0, -2.0][n % 5];
+                [40.0 + depth, 2048.0 + noise, 2047.0 - noise].map(RawValue::new)
+            };
+            (0..300).for_each(|n| survey.rest(&values(n, 0.0)));
+            (0..100).for_each(|n| survey.press(&values(n, 10.0 * n.min(99 - n) as f64)));
+            let text = survey.finish(Wishes { bits, ..Wishes::default() }).unwrap().calibration("pad");
+            assert!(
+                text.contains("shear_baseline = [2048, 2047]") || text.contains("\nbaseline = [2048, 2047]"),
+                "{text}"
+            );
+        }
     }
 
     /// A sheet of taxels of these kinds, in a row.

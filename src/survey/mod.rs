@@ -355,7 +355,7 @@ impl Survey {
             scale: None,
             curves: Vec::new(),
             forces_agree: None,
-            tangential: self.apart.as_ref().map(|apart| apart.baselines()).unwrap_or_default(),
+            tangential: self.apart.as_ref().map(|apart| apart.baselines(range, is_range_known)).unwrap_or_default(),
             tangential_sigmas: self.apart.as_ref().map(|apart| apart.sigmas()).unwrap_or_default(),
             with_axes: self.with_axes.clone(),
         })

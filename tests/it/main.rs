@@ -50,6 +50,7 @@ mod drift;
 mod senses;
 mod senses_calibrated;
 mod senses_extremes;
+mod senses_lost;
 mod simulated;
 mod skipped;
 mod slow;

@@ -49,7 +49,7 @@ pub fn row(kinds: &[Modality]) -> Body {
 }
 
 /// A frame in which all values but those of `named` are 0.
-fn frame_with(engine: &Engine, t_s: f64, named: &[(&str, RawValue)]) -> Frame {
+pub fn frame_with(engine: &Engine, t_s: f64, named: &[(&str, RawValue)]) -> Frame {
     let mut frame = engine.frame(t_s);
     frame.values.fill(RawValue::new(0.0));
     for &(name, value) in named {
@@ -58,16 +58,16 @@ fn frame_with(engine: &Engine, t_s: f64, named: &[(&str, RawValue)]) -> Frame {
     frame
 }
 
-fn number(value: f64) -> RawValue {
+pub fn number(value: f64) -> RawValue {
     RawValue::new(value)
 }
 
-fn percepts_of(frame: &Frame, engine: &mut Engine) -> Vec<Percept> {
+pub fn percepts_of(frame: &Frame, engine: &mut Engine) -> Vec<Percept> {
     engine.process_one(frame).unwrap().frame(0).collect()
 }
 
 /// The percept of `receptor` in the first field that has one.
-fn of(engine: &Engine, percepts: &[Percept], receptor: Receptor) -> Percept {
+pub fn of(engine: &Engine, percepts: &[Percept], receptor: Receptor) -> Percept {
     let letters = engine.plan().letters();
     *percepts.iter().find(|percept| letters[percept.letter].receptor == receptor).unwrap()
 }

@@ -101,14 +101,16 @@ class TouchesOf:
         self.raw = np.where(is_leaky, raw + np.where(is_leaky, leak, 0), raw).astype(np.float32).astype(float)
 
     def find_warm(self, recording):
-        """By node, the taxels of temperature that are nearest to it on its link."""
+        """By node, the taxels of temperature that are nearest to it on its side of its link."""
         warm = [taxel for taxel, kind in enumerate(self.body.kind) if kind == "temperature"]
-        self.warm_of, self.warm_at, self.warm_node = {}, self.in_body(warm)[0], {}
+        self.warm_at, warm_normals = self.in_body(warm)[:2]
+        self.warm_of, self.warm_node = {}, {}
         self.warm_ids = [self.body.ids[taxel] for taxel in warm]
         self.celsius, _, missing, faulty, _ = sensed(recording, "temperature", warm)
         self.reads = ~missing & ~faulty
         for place, (taxel, at) in enumerate(zip(warm, self.warm_at)):
             on_link = [node for node, own in enumerate(self.taxels) if self.body.link[own] == self.body.link[taxel]]
+            on_link = [node for node in on_link if self.normal[node] @ warm_normals[place] > 0]
             if not on_link:
                 continue
             away = np.linalg.norm(self.at[on_link] - at, axis=1)

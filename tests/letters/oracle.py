@@ -38,6 +38,7 @@ HUGE = 2.0**60
 LEAST_M = 1e-4
 LONGEST_GAP_S, SHORTEST_STEP_S = 10.0, 1e-9
 MOST_EXAMPLES = 20
+EPSILON = float(np.finfo(np.float64).eps)
 
 
 class Slope:
@@ -64,19 +65,21 @@ class Slope:
         return self.take(t, self.level, size)
 
     def take(self, t, value, size):
+        # What a time of this size, and a difference of two, lose to rounding.
+        slack = 1e-9 * self.window + 2 * EPSILON * abs(t)
         if self.kept and t <= self.kept[-1][0]:
             self.kept.clear()
         # After a gap of two windows in frames that were not slow, nothing is known of before.
-        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] <= self.window and t - self.kept[-1][0] > 2 * self.window:
+        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] <= self.window + slack and t - self.kept[-1][0] > 2 * self.window + slack:
             self.kept.clear()
         if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] < self.window / 128:
             self.kept.pop()
         self.kept.append((t, value, size))
-        while len(self.kept) > 1 and t - self.kept[1][0] >= self.window * (1 - 1e-9):
+        while len(self.kept) > 1 and t - self.kept[1][0] >= self.window - slack:
             self.kept.popleft()
-        if len(self.kept) > 2 and t - self.kept[0][0] > 2 * self.window:
+        if len(self.kept) > 2 and t - self.kept[0][0] > 2 * self.window + slack:
             self.kept.popleft()
-        if t - self.kept[0][0] < self.window / 2:
+        if t - self.kept[0][0] < self.window / 2 - slack:
             return None
         times, values, sizes = np.array(self.kept).T
         away = times - times[0]
@@ -160,7 +163,9 @@ def distances(recording, field, frames):
         flags |= {"out_of_range"} if (reads & ~inside[frame]).any() else set()
         found = {"covered": Value(len(there))}
         if len(there) == 0:
-            slope.clear()
+            # One that saw something and has no reading now may see it still.
+            if all(reads[member] for member, metres in slope.before.items() if np.isfinite(metres)):
+                slope.clear()
             yield found, flags | {"out_of_range", "no_contact"}, False
             continue
         flags |= {"saturated"} if ((values[frame, there] < LEAST_M) | (beyond[frame, there] == -1)).any() else set()

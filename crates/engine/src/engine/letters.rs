@@ -245,7 +245,10 @@ impl Cell<'_> {
         made.give(Outputs::COVERED, Host::Covered, &[near.len() as f64]);
         let Some(nearest) = proximity::nearest(near) else {
             made.flags |= Flags::OUT_OF_RANGE;
-            trend.clear();
+            // What was in range may be there still, of a member that has no reading now.
+            if !trend.misses_one(by_member) {
+                trend.clear();
+            }
             return;
         };
         made.is_there = true;

@@ -13,7 +13,7 @@ use crate::scene::{Plan, PlanField, SensedMember};
 use crate::signal::{Frame, Intake, Quantity, RawValue, Reading, Receptor};
 use crate::stage::layout::Member;
 use crate::stage::window::Trend;
-use crate::stage::{difference, filter, force, motion, world_motion};
+use crate::stage::{calibrate, difference, filter, force, motion, world_motion};
 
 /// What post-processing keeps from frame to frame.
 #[derive(Clone, Debug)]
@@ -198,7 +198,7 @@ impl Post<'_> {
                 }
             }
             if stages.force {
-                self.force(field, index, cell, percepts);
+                self.force(field, (raw, offset), cell, percepts);
             }
             let contact = percepts.in_contact(index, number);
             let before = &mut state.fields[number];
@@ -299,8 +299,18 @@ impl Post<'_> {
         }
     }
 
-    /// Adds up a cell's force.
-    fn force(&self, field: &PlanField, frame: usize, cell: usize, percepts: &mut Percepts) {
+    /// Adds up a cell's force. Where no member has a value there is none: nobody knows that nothing presses.
+    fn force(&self, field: &PlanField, (raw, offset): (&RawBatch<'_>, usize), cell: usize, percepts: &mut Percepts) {
+        let frame = raw.first + offset;
+        let has_value = |member: &Member| {
+            let (channel, slot) = (self.plan.channel_of(member.slot as usize), member.slot as usize);
+            let value = raw.rows.value(offset, channel);
+            calibrate::pressure(value, &self.plan.calibrations[channel], self.plan.curve_of(slot)).is_some()
+        };
+        let is_in_doubt = percepts.flags[cell].intersects(Flags::INCOMPLETE | Flags::FAULTY_INPUT);
+        if is_in_doubt && !self.plan.members_of(field).iter().any(has_value) {
+            return;
+        }
         let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
         let pressure_and_area = |member: &Member| {
             let slot = member.slot as usize;

@@ -1,5 +1,5 @@
-//! How warm touches are: of the taxels of temperature whose nearest pressure taxel on the same link, within 1.5 widths of its cell, is one
-//! of a touch's taxels.
+//! How warm touches are: of the taxels of temperature whose nearest pressure taxel on the same side of the same link, within 1.5 widths of
+//! its cell, is one of a touch's taxels.
 //!
 //! All of them count alike. Mean, extremes and gradient are those of stage *temperature*, the gradient in the touch's chart. The rate is
 //! that of a [`Trend`], so that a touch that comes over a taxel, or leaves it, does not seem to warm.
@@ -79,8 +79,11 @@ impl Warmth {
         let mut by_node: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (taxel, own) in body.taxels.iter().enumerate().filter(|(_, own)| own.modality == Modality::Temperature) {
             let position = body.links[own.link].body_from_link.transform_point3(own.position_in_link);
+            let normal = body.links[own.link].body_from_link.transform_vector3(own.normal_in_link);
             let far = |node: &SkinTaxel| node.position.distance_squared(position);
-            let on_link = by_link.get(&own.link).into_iter().flatten();
+            // A thin shell has skin on its other side, too.
+            let faces_alike = |node: &SkinTaxel| node.normal.dot(normal) > 0.0;
+            let on_link = by_link.get(&own.link).into_iter().flatten().filter(|(_, node)| faces_alike(node));
             let nearest = on_link.min_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
             if let Some(((number, node), value)) = nearest.zip(plan.senses.place_of(own.id, Axis::Normal))
                 && far(node) <= REACH.powi(2) * node.cell_m2

@@ -143,7 +143,7 @@ pub struct Touch {
     pub friction_sigma: Option<f64>,
     /// Friction over that at which it slips, where the calibration has it.
     pub slip_ratio: Option<f64>,
-    /// Mean of the temperature taxels whose nearest pressure taxel (same link, within 1.5 cell widths) is one of its, °C.
+    /// Mean of the temperature taxels whose nearest pressure taxel (same side of the same link, within 1.5 cell widths) is one of its, °C.
     pub temperature_celsius: Option<f64>,
     /// The highest temperature of these, °C.
     pub warmest_celsius: Option<f64>,

@@ -238,7 +238,7 @@ touch_columns! {
     SHEAR "friction" One 1 "‖Σws‖ / ΣwP of those taxels, each s turned into its own chart." |touch| one_of(touch.friction);
     SHEAR "slip_ratio" One 1 "Friction over that at which it slips, slips_at of the calibration: a slip begins at 0.95." |touch| one_of(touch.slip_ratio);
     FRICTION_SIGMA "friction_sigma" One 1 "The standard deviation of its friction, from the sensors' noise." |touch| one_of(touch.friction_sigma);
-    TEMPERATURE "temperature" Celsius 1 "Mean of the temperature taxels whose nearest pressure taxel (same link, within 1.5 cell widths) is one of its, °C." |touch| one_of(touch.temperature_celsius);
+    TEMPERATURE "temperature" Celsius 1 "Mean of the temperature taxels whose nearest pressure taxel (same side of the same link, within 1.5 cell widths) is one of its, °C." |touch| one_of(touch.temperature_celsius);
     TEMPERATURE "warmest" Celsius 1 "The highest temperature of these, °C." |touch| one_of(touch.warmest_celsius);
     TEMPERATURE "warmest_taxel" One 1 "The id of the taxel that has it." |touch| one_of(touch.warmest_taxel.map(f64::from));
     TEMPERATURE "warmest_position" Metre 3 "Where that is, m." |touch| vector(touch.warmest_position);

@@ -11,6 +11,8 @@ const SAMPLES: f64 = 128.0;
 const SPANNED: f64 = 0.5;
 /// Windows without a frame that are a gap.
 const GAP: f64 = 2.0;
+/// How far a span of time may be off, as a share of the window.
+const ROUNDING: f64 = 1e-9;
 
 /// The samples of a value over a window that ends now.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,10 +34,12 @@ impl Window {
     /// The last sample is the newest value, whatever the distance to the one before: that is replaced until it lies far enough
     /// from its own predecessor. So the slope is the same however frames are cut into calls.
     pub(crate) fn take(&mut self, t_s: f64, value: f64, window_s: f64) -> Option<f64> {
+        // What a time of this size, and a difference of two, lose to rounding: of today's time 0.5 µs.
+        let slack_s = ROUNDING * window_s + 2.0 * f64::EPSILON * t_s.abs();
         match self.samples.back() {
             // Of frames with one time the last counts: coarse clocks give many of them.
             Some(&[last, _]) if t_s == last => drop(self.samples.pop_back()),
-            Some(&[last, _]) if t_s > last && !self.is_gap(t_s - last, window_s) => {}
+            Some(&[last, _]) if t_s > last && !self.is_gap(t_s - last, window_s + slack_s) => {}
             _ => self.samples.clear(),
         }
         if !t_s.is_finite() {
@@ -47,15 +51,15 @@ impl Window {
             self.samples.pop_back();
         }
         self.samples.push_back([t_s, value]);
-        while self.samples.get(1).is_some_and(|&[second, _]| t_s - second >= window_s * (1.0 - 1e-9)) {
+        while self.samples.get(1).is_some_and(|&[second, _]| t_s - second >= window_s - slack_s) {
             self.samples.pop_front();
         }
         // A single frame before a gap does not say that it was one.
-        if self.samples.len() > 2 && t_s - self.samples[0][0] > GAP * window_s {
+        if self.samples.len() > 2 && t_s - self.samples[0][0] > GAP * window_s + slack_s {
             self.samples.pop_front();
         }
         let span_s = t_s - self.samples.front()?[0];
-        (span_s >= SPANNED * window_s).then(|| self.slope())
+        (span_s >= SPANNED * window_s - slack_s).then(|| self.slope())
     }
 
     /// Whether the next frame comes after a gap if it comes `after_s` after the last one.
@@ -98,6 +102,12 @@ impl Trend {
     pub(crate) fn clear(&mut self) {
         self.window.clear();
         self.before.clear();
+    }
+
+    /// Whether a member that had a finite value when the value was known last has none `now`.
+    pub(crate) fn misses_one(&self, now: &[(usize, f64)]) -> bool {
+        let has_value = |member: usize| now.binary_search_by_key(&member, |of| of.0).is_ok();
+        self.before.iter().any(|&(member, before)| before.is_finite() && !has_value(member))
     }
 
     /// Takes what the members are at `t_s` that have a value, by ascending member; `value_of` makes the value of some of them, if there is
@@ -222,6 +232,20 @@ mod tests {
             assert!(slope.is_none_or(|slope| (slope + 2.0).abs() < 1e-9), "{slope:?}");
         }
         assert!(window.samples.len() <= SAMPLES as usize + 2, "{}", window.samples.len());
+    }
+
+    #[test]
+    fn a_time_of_day_changes_no_slope() {
+        for begin_s in [0.0, 5.0, 1_764_453_600.0] {
+            let mut window = Window::default();
+            // Toward and away in turns: a sample more or less would show.
+            for frame in 0..400 {
+                let t_s = begin_s + 0.05 * f64::from(frame);
+                let slope = window.take(t_s, f64::from(frame % 2), 0.1);
+                let is_right = frame < 2 || slope.is_some_and(|slope| slope.abs() < 1e-3);
+                assert!(is_right && slope.is_some() == (frame > 0), "{begin_s} s, frame {frame}: {slope:?}");
+            }
+        }
     }
 
     #[test]
