@@ -200,6 +200,11 @@ fn what_cannot_be_authored_is_one_line_and_leaves_nothing_behind() {
     );
     one(1, &["author", "humanoid", "--taxels", "100", "--spacing", "1m", "-o", out], "do not fit");
     one(1, &["author", "humanoid", "--taxels", "9", "--region", "haed", "-o", out], "did you mean `head`?");
+    one(
+        1,
+        &["author", "humanoid", "--taxels", "9", "--region", "head", "--region", "hips_", "-o", out],
+        "region `hips_` is empty",
+    );
     one(2, &["author", "humanoid", "--taxels", "9", "--unit", "inch", "-o", out], "--unit");
     one(1, &["author", "humanoyd", "--taxels", "9", "-o", out], "did you mean the bundled body `humanoid`?");
     one(1, &["author", "humanoid", "--recipe", "/no/such.toml", "-o", out], "no such file");

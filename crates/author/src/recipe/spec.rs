@@ -150,12 +150,13 @@ impl Recipe {
         };
         let name = if nodes.is_empty() { SKIN.to_owned() } else { nodes.join(", ") };
         let mut regions = Vec::new();
-        if !nodes.is_empty() {
+        // Each is a region of its own, so that one that is not there is reported.
+        for own in nodes {
             let at = Origin::flag("--region");
-            let node = Some(Globs::try_from(Names(nodes.to_vec())).map_err(|e| at.put(e))?);
+            let node = Some(Globs::try_from(Names(vec![own.clone()])).map_err(|e| at.put(e))?);
             let region = Region { node, material: None, attribute: None, bounds: None, except: Vec::new(), at };
-            recipe.regions.insert(name.clone(), region);
-            regions.push(name.clone());
+            recipe.regions.insert(own.clone(), region);
+            regions.push(own.clone());
         }
         recipe.places.push(PlaceSpec {
             name,
