@@ -4,7 +4,7 @@
 
 Makes random bodies, calibrations and frames in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter in a
 frame; and what touches feel (`of_touches.py`). Prints a JSON object: `cells`, by letter `by_letter`, `touches` (compared), `present` (by
-quantity, how often there was one), `wrong` (cells and touches with something wrong), `examples` of these, `largest` (by quantity the
+quantity, how often there was one), `touch_flags` (how often each was there), `wrong` (cells and touches with something wrong), `examples` of these, `largest` (by quantity the
 largest difference over what rounding may be), and `missed`: what was changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
 
 The definition is that of the documentation, in numpy, over arrays of frames; it shares nothing with the program but files.
@@ -14,7 +14,7 @@ import argparse
 import json
 import subprocess
 import sys
-from collections import Counter, deque
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from calibrated import PRESSURES, SAME, UNITS, Value, arc, gradient_within, read, sensed
 from made import Recording, recordings
-from of_touches import TOUCHES, TouchesOf
+from of_touches import FLAGS, TOUCHES, TouchesOf
+from slope import Slope
 
 LETTERS = {
     "shear": ["shear", "shear_direction", "shear_vector", "force_vector", "torsion", "friction", "friction_sigma", "slip_ratio"],
@@ -38,51 +39,6 @@ HUGE = 2.0**60
 LEAST_M = 1e-4
 LONGEST_GAP_S, SHORTEST_STEP_S = 10.0, 1e-9
 MOST_EXAMPLES = 20
-
-
-class Slope:
-    """The line of least squares through the last `window` seconds and the last sample before them, of which samples nearer than a
-    128th replace the newest. What is sampled is moved by members alone that have a value before and after."""
-
-    def __init__(self, window):
-        self.window, self.kept, self.level, self.before = window, deque(), 0.0, {}
-
-    def clear(self):
-        self.kept.clear()
-        self.before = {}
-
-    def follow(self, t, now, of, size):
-        """`now` has the members' values, and `of` makes one of some of them, or None."""
-        both = [member for member in now if member in self.before]
-        was, value = of({member: self.before[member] for member in both}), of({member: now[member] for member in both})
-        if was is None or value is None:
-            self.kept.clear()
-            self.level = of(now)
-        else:
-            self.level += value - was
-        self.before = now
-        return self.take(t, self.level, size)
-
-    def take(self, t, value, size):
-        if self.kept and t <= self.kept[-1][0]:
-            self.kept.clear()
-        # After a gap of two windows in frames that were not slow, nothing is known of before.
-        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] <= self.window and t - self.kept[-1][0] > 2 * self.window:
-            self.kept.clear()
-        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] < self.window / 128:
-            self.kept.pop()
-        self.kept.append((t, value, size))
-        while len(self.kept) > 1 and t - self.kept[1][0] >= self.window * (1 - 1e-9):
-            self.kept.popleft()
-        if len(self.kept) > 2 and t - self.kept[0][0] > 2 * self.window:
-            self.kept.popleft()
-        if t - self.kept[0][0] < self.window / 2:
-            return None
-        times, values, sizes = np.array(self.kept).T
-        away = times - times[0]
-        away -= away.mean()
-        size = np.abs(values).max() + sizes.max()
-        return Value((away * (values - values.mean())).sum() / (away**2).sum(), size / (t - times[0]))
 
 
 class Field:
@@ -328,6 +284,7 @@ class Comparison:
     def __init__(self):
         self.cells, self.wrong, self.examples = Counter(), 0, []
         self.present, self.largest, self.touches = Counter(), {}, 0
+        self.touch_flags = Counter()
 
     def off(self, letter, told, found, flags, contact):
         """What is wrong with a cell."""
@@ -366,6 +323,7 @@ class Comparison:
     def take_touch(self, right, number, touch, where):
         self.touches += 1
         self.present.update(f"touches.{name}" for name in TOUCHES if name in touch)
+        self.touch_flags.update(FLAGS & set(touch["flags"]))
         wrong = right.wrong(number, touch, self.largest)
         self.note(wrong, where | {"touch": touch["id"]})
         return wrong
@@ -391,6 +349,12 @@ def changed(told, rng, among=frozenset(name for names in LETTERS.values() for na
     return name, told | {name: value.tolist()}
 
 
+def flagged_otherwise(touch, rng):
+    """`touch` with one flag more or less, of those that are never too close to call."""
+    flag = str(rng.choice(sorted(FLAGS - {"still", "no_gradient"})))
+    return flag, touch | {"flags": sorted(set(touch["flags"]) ^ {flag})}
+
+
 def compare(recording, lines, of_touches, comparison, missed, rng):
     """Compares the lines that the program wrote for `recording`, with its touches by `of_touches` if there are any."""
     frames = recording.frames
@@ -413,11 +377,13 @@ def compare(recording, lines, of_touches, comparison, missed, rng):
                 if not comparison.off(letter, other, found, flags, contact):
                     missed.append([recording.name, number, field, letter, name])
                 comparison.largest = before
+        if of_touches:
+            of_touches.go_on(number, line["touches"])
         for touch in line.get("touches", []):
             wrong = comparison.take_touch(of_touches, number, touch, {"recording": recording.name, "frame": number})
             # A millionth is less than P strays in single precision.
             if recording.backend == "reference" and not wrong and rng.random() < 0.05:
-                name, other = changed(touch, rng, TOUCHES)
+                name, other = changed(touch, rng, TOUCHES) if rng.random() < 0.8 else flagged_otherwise(touch, rng)
                 if not of_touches.wrong(number, other, {}):
                     missed.append([recording.name, number, touch["id"], name])
     if number + 1 != len(frames.t):
@@ -437,6 +403,7 @@ def main():
         paths = recording.write(arguments.folder)
         outputs = [name for letter in recording.letters() for name in LETTERS[letter]]
         outputs += ["touches", "touches.taxels"] if recording.has_touches() else []
+        outputs += ["touches.friction_sigma"] if "shear" in recording.letters() else []
         command = [arguments.somatic, "run", "--body", paths["glb"], "--source", paths["csv"], "--calibration", paths["toml"]]
         command += ["--backend", recording.backend, "--outputs", ",".join(outputs), "--all-fields", "--sink", f"ndjson:{paths['ndjson']}"]
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
@@ -452,7 +419,8 @@ def main():
         for path in paths.values():
             path.unlink()
     json.dump({
-        "cells": comparison.cells.total(), "by_letter": comparison.cells, "touches": comparison.touches, "present": comparison.present, "wrong": comparison.wrong,
+        "cells": comparison.cells.total(), "by_letter": comparison.cells, "touches": comparison.touches, "present": comparison.present,
+        "touch_flags": comparison.touch_flags, "wrong": comparison.wrong,
         "examples": comparison.examples, "largest": comparison.largest, "missed": missed,
     }, sys.stdout)
 
