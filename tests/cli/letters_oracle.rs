@@ -18,8 +18,12 @@ fn assert_right(found: &Value, cells: u64, touches: u64) {
     }
     // Each quantity was there often.
     let present = found["present"].as_object().unwrap();
-    assert_eq!(present.len(), 40);
+    assert_eq!(present.len(), 42);
     assert!(present.values().all(|number| number.as_u64().unwrap() * 200 >= cells), "{present:?}");
+    // And each flag of touches, but for `stale`, which recordings are not.
+    let flags = found["touch_flags"].as_object().unwrap();
+    assert_eq!(flags.len(), 10, "{flags:?}");
+    assert!(flags.values().all(|number| number.as_u64().unwrap() * 100 >= touches), "{flags:?}");
 }
 
 #[test]

@@ -339,5 +339,8 @@ def recordings(long, seed):
     for number in range(180 if long else 8):
         rng = np.random.default_rng([seed, number])
         recording = Recording(f"letters-{number}", rng, 260 if long else 60, mixes[number % len(mixes)] if number % 3 else KINDS, ("cpu", "reference")[number % 2])
+        if number % 8 == 6:
+            # Sensors whose noise nobody knows, in the short run, too.
+            recording.calibration["all"].pop("noise", None)
         if recording.letters():
             yield recording

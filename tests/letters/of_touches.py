@@ -195,7 +195,9 @@ class TouchesOf:
         if "shear" in found:
             # Around a limb there is no direction at all.
             flags |= {"still"} if "shear_direction" not in found and "wrapped" not in touch["flags"] else set()
-            flags |= {"one_pulled"} if "torsion" not in found and self.has_axes[nodes].sum() == 1 else set()
+            # Of one taxel alone that is said otherwise.
+            is_alone = len(nodes) > 1 and self.has_axes[nodes].sum() == 1
+            flags |= {"one_pulled"} if is_alone else set()
             flags |= {"noise_unknown"} if self.has_sigma and "friction_sigma" not in found else set()
         return flags
 
