@@ -10,7 +10,6 @@
 //! its way.
 
 mod at_rest;
-mod beside_pressure;
 pub mod crosstalk;
 mod figure;
 mod file;
@@ -23,6 +22,7 @@ mod remarks;
 pub mod scale;
 mod travel;
 pub mod tuning;
+mod unpressed;
 mod which_way;
 
 use std::collections::{BTreeMap, BTreeSet};

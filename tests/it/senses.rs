@@ -1,4 +1,4 @@
-//! Shear, temperature and proximity beside pressure, on every backend: the same bits everywhere, however frames are cut; nothing of
+//! Shear, temperature and proximity on every backend: the same bits everywhere, however frames are cut; nothing of
 //! one letter is in another, and nothing costs a body without such taxels anything.
 
 use glam::{DQuat, DVec2, DVec3};

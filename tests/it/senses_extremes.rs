@@ -105,7 +105,7 @@ fn one_taxel_with_three_axes_among_others_has_no_torsion_and_says_why() {
 }
 
 #[test]
-fn a_touch_says_what_is_lost_of_what_is_beside_its_pressure() {
+fn a_touch_says_what_is_lost_of_its_pull_and_its_warmth() {
     let body = skin(2);
     let mut engine = engine(&body, BackendKind::Cpu, with_touches());
     let whole = TOUCH.frame(&engine, 0.0);

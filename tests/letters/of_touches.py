@@ -1,4 +1,4 @@
-"""What touches feel beside pressure by a definition of its own, for `oracle.py`.
+"""What touches have of the other letters by a definition of its own, for `oracle.py`.
 
 Which taxels a touch has, its link, and whether it goes around a limb are taken as reported; `tests/touches` compares these. Its chart is
 at one of its taxels: all that is in the chart must be right for one of them.
@@ -20,10 +20,10 @@ TOUCHES = [
     "warmest", "warmest_taxel", "warmest_position", "coldest", "coldest_taxel", "coldest_position", "temperature_gradient",
     "temperature_rate", "friction_sigma",
 ]
-# Those that `tests/touches` does not compare, or that letters give reasons for, too. Recordings are never `stale`.
+# Those of values, letters and links: `tests/touches` compares others. Recordings are never `stale`, and no skin goes over several links.
 FLAGS = {
     "saturated", "faulty_input", "out_of_range", "incomplete", "stale", "no_unit", "still", "no_gradient", "no_previous", "one_pulled",
-    "noise_unknown",
+    "noise_unknown", "one_taxel", "several_links",
 }
 # P is of single precision on the CPU: some units of the terms that it is made of.
 SAME_ON_CPU = 4 * 2.0**-24
@@ -188,6 +188,8 @@ class TouchesOf:
         flags |= {flag for flag, of in self.idle.items() if of[frame, sorted(around)].any()}
         flags |= {flag for flag, of in self.warm_flags.items() if of[frame, under].any()}
         flags |= {"saturated"} if (self.gain[nodes] * (self.raw[frame, nodes] - self.baseline[nodes]) > self.most[nodes]).any() else set()
+        flags |= {"one_taxel"} if len(nodes) == 1 else set()
+        flags |= {"several_links"} if len({self.body.link[self.taxels[node]] for node in nodes}) > 1 else set()
         flags |= {"no_unit"} if np.isnan(self.newtons[nodes]).any() else set()
         if "temperature" in found:
             flags |= {"no_gradient"} if "temperature_gradient" not in found else set()
@@ -195,7 +197,7 @@ class TouchesOf:
         if "shear" in found:
             # Around a limb there is no direction at all.
             flags |= {"still"} if "shear_direction" not in found and "wrapped" not in touch["flags"] else set()
-            # Of one taxel alone that is said otherwise.
+            # A touch of one taxel says so.
             is_alone = len(nodes) > 1 and self.has_axes[nodes].sum() == 1
             flags |= {"one_pulled"} if is_alone else set()
             flags |= {"noise_unknown"} if self.has_sigma and "friction_sigma" not in found else set()
