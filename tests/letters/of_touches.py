@@ -52,7 +52,7 @@ class TouchesOf:
         self.has_sigma = "shear" in recording.letters()
         self.calibrate(recording)
         self.find_warm(recording)
-        self.restarts, self.t = recording.frames.restarts, recording.frames.t
+        self.restarts, self.t, self.moved = recording.frames.restarts, recording.frames.t, recording.frames.moved
         self.slopes, self.rates = {}, {}
 
     def in_body(self, taxels):
@@ -203,11 +203,15 @@ class TouchesOf:
             flags |= {"noise_unknown"} if self.has_sigma and "friction_sigma" not in found else set()
         return flags
 
+    def out(self, frame, link):
+        """The turn and the step from the body at rest to the world, if the frame has poses, or into `link`."""
+        rotation, origin = self.poses[link]
+        return (rotation.T, -rotation.T @ origin) if self.moved[frame] is None else [of[link] for of in self.moved[frame]]
+
     def right(self, frame, touch):
         """What is right of a touch: quantities, and those in each chart that it may have."""
         nodes = np.array([self.node_of[taxel] for taxel in touch["taxels"]])
-        rotation, origin = self.poses[self.link_of[touch["link"]]]
-        turn = rotation.T
+        turn, step = self.out(frame, self.link_of[touch["link"]])
         p = self.gain[nodes] * (self.raw[frame, nodes] - self.baseline[nodes])
         p_size = np.abs(self.gain[nodes]) * (np.abs(self.raw[frame, nodes]) + np.abs(self.baseline[nodes]))
         found = {"total": Value(p.sum(), p_size.sum())}
@@ -219,7 +223,7 @@ class TouchesOf:
             for name, place in (("warmest", celsius.argmax()), ("coldest", celsius.argmin())):
                 found[name] = Value(celsius[place], size)
                 found[f"{name}_taxel"] = Value(self.warm_ids[under[place]])
-                found[f"{name}_position"] = Value(turn @ (self.warm_at[under[place]] - origin), 1)
+                found[f"{name}_position"] = Value(turn @ self.warm_at[under[place]] + step, 1)
             if self.rates[touch["id"]]:
                 found["temperature_rate"] = self.rates[touch["id"]]
         # The nearest to its middle first: it is mostly that.
@@ -335,6 +339,9 @@ class TouchesOf:
         # What is too close to call has either flag.
         unsure = {flag for flag, name in (("still", "shear_direction"), ("no_gradient", "temperature_gradient")) if found.get(name, 0) is None}
         told, right = set(touch["flags"]) & FLAGS - unsure, self.flags(frame, touch, found, self.under(frame, touch)[1]) - unsure
+        frame_of = "world" if self.moved[frame] else touch["link"]
+        if touch["in"] != frame_of:
+            wrong["in"] = (touch["in"], frame_of)
         if told != right:
             wrong["flags"] = (sorted(told), sorted(right))
         for name in TOUCHES:

@@ -4,7 +4,7 @@
 
 Makes random bodies, calibrations and frames in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter in a
 frame; and what touches feel (`of_touches.py`). Prints a JSON object: `cells`, by letter `by_letter`, `touches` (compared), `present` (by
-quantity, how often there was one), `touch_flags` (how often each was there), `wrong` (cells and touches with something wrong), `examples` of these, `largest` (by quantity the
+quantity, how often there was one), `touch_flags` (how often each was there), `in_world` (touches of frames with poses), `wrong` (cells and touches with something wrong), `examples` of these, `largest` (by quantity the
 largest difference over what rounding may be), and `missed`: what was changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
 
 The definition is that of the documentation, in numpy, over arrays of frames; it shares nothing with the program but files.
@@ -47,12 +47,21 @@ class Field:
         self.body, self.chart = body, body.chart_of(field)
         self.members = sorted((taxel for taxel in field.members if body.kind[taxel] in kinds), key=lambda taxel: body.ids[taxel])
         self.weights = np.array([field.members[taxel] for taxel in self.members])
+        self.moved, self.anchor_pose = recording.frames.moved, body.pose(body.anchor(field))
         at, normals, first, second = body.in_anchor(field, self.members)
         self.at, self.normals, self.tangents = at, normals, (first, second)
         if self.chart:
             origin, u, v, n = self.chart
             self.places = np.stack([(at - origin) @ u, (at - origin) @ v], axis=1)
             self.along = [np.array([[turned @ u, turned @ v] for turned in map(arc, normals, [n] * len(normals), way)]) for way in self.tangents]
+
+    def placed(self, frame):
+        """Places, normals and both tangents in a frame: in the anchor, or in the world if it has poses."""
+        if self.moved[frame] is None:
+            return self.at, self.normals, self.tangents
+        (rotation, origin), (turns, steps) = self.anchor_pose, (of[self.body.link[self.members]] for of in self.moved[frame])
+        turned = lambda ways: np.einsum("nij,nj->ni", turns, ways @ rotation.T)
+        return turned(self.at) + turns @ origin + steps, turned(self.normals), tuple(map(turned, self.tangents))
 
 
 def temperatures(recording, field, frames):
@@ -68,7 +77,7 @@ def temperatures(recording, field, frames):
             yield {}, flags | {"no_contact"}, False
             continue
         flags |= {"out_of_range"} if not inside[frame, there].all() else set()
-        celsius, weights = values[frame, there], field.weights[there]
+        celsius, weights, at = values[frame, there], field.weights[there], field.placed(frame)[0]
         size = np.abs(celsius).max() + 300
         mean = (weights * celsius).sum() / weights.sum()
         found = {"temperature": Value(mean, size)}
@@ -76,7 +85,7 @@ def temperatures(recording, field, frames):
             member = there[index]
             found[name] = Value(celsius[index], size)
             found[f"{name}_taxel"] = Value(field.body.ids[field.members[member]])
-            found[f"{name}_position"] = Value(field.at[member], 1)
+            found[f"{name}_position"] = Value(at[member], 1)
         if field.chart and len(there) >= 3:
             away = field.places[there] - (weights[:, None] * field.places[there]).sum(axis=0) / weights.sum()
             root = np.sqrt(weights)
@@ -124,8 +133,9 @@ def distances(recording, field, frames):
         nearest = there[metres.argmin()]
         found["nearest"] = Value(metres.min(), 1)
         found["nearest_taxel"] = Value(field.body.ids[field.members[nearest]])
-        found["nearest_position"] = Value(field.at[nearest], 1)
-        found["nearest_normal"] = Value(field.normals[nearest], 1)
+        at, normals, _ = field.placed(frame)
+        found["nearest_position"] = Value(at[nearest], 1)
+        found["nearest_normal"] = Value(normals[nearest], 1)
         if field.chart:
             weights = 1 / metres**2
             found["proximity_centroid"] = Value((weights[:, None] * field.places[there]).sum(axis=0) / weights.sum(), 1)
@@ -203,7 +213,8 @@ def shears(recording, field, frames):
         if len(presses) == 0:
             yield {}, flags | {"no_contact"}, False
             continue
-        normal = -(newtons * np.where(pressed, pressure, 0))[presses, None] * field.normals[presses]
+        _, normals, tangents = field.placed(frame)
+        normal = -(newtons * np.where(pressed, pressure, 0))[presses, None] * normals[presses]
         if np.isnan(newtons[presses]).any():
             flags |= {"no_unit"}
         if len(there) == 0:
@@ -214,7 +225,7 @@ def shears(recording, field, frames):
         # What was measured along the normal, of which the matrix makes P.
         measured = (p - cross[0, 1:] @ lateral[:, there]) / cross[0, 0]
         along = cross[1:] @ np.vstack([measured, lateral[:, there]])
-        in_space = along[0][:, None] * field.tangents[0][there] + along[1][:, None] * field.tangents[1][there]
+        in_space = along[0][:, None] * tangents[0][there] + along[1][:, None] * tangents[1][there]
         # Differences from baselines are of larger numbers.
         large = g * (np.abs(side[:, there]) + np.abs(rest[there].T))
         terms = np.abs(cross[1:]) @ np.vstack([(p + np.abs(cross[0, 1:]) @ large) / cross[0, 0], large])
@@ -284,14 +295,13 @@ class Comparison:
     def __init__(self):
         self.cells, self.wrong, self.examples = Counter(), 0, []
         self.present, self.largest, self.touches = Counter(), {}, 0
-        self.touch_flags = Counter()
+        self.touch_flags, self.in_world = Counter(), 0
 
     def off(self, letter, told, found, flags, contact):
         """What is wrong with a cell."""
         wrong = {}
         if told["contact"] != contact:
             wrong["contact"] = (told["contact"], contact)
-        # Those of a wish for poses, which these recordings have none of.
         if set(told["flags"]) != flags and found.get("shear_direction", 0) is not None:
             wrong["flags"] = (sorted(told["flags"]), sorted(flags))
         for name in LETTERS[letter]:
@@ -323,6 +333,7 @@ class Comparison:
     def take_touch(self, right, number, touch, where):
         self.touches += 1
         self.present.update(f"touches.{name}" for name in TOUCHES if name in touch)
+        self.in_world += touch["in"] == "world"
         self.touch_flags.update(FLAGS & set(touch["flags"]))
         wrong = right.wrong(number, touch, self.largest)
         self.note(wrong, where | {"touch": touch["id"]})
@@ -404,7 +415,7 @@ def main():
         outputs = [name for letter in recording.letters() for name in LETTERS[letter]]
         outputs += ["touches", "touches.taxels"] if recording.has_touches() else []
         outputs += ["touches.friction_sigma"] if "shear" in recording.letters() else []
-        command = [arguments.somatic, "run", "--body", paths["glb"], "--source", paths["csv"], "--calibration", paths["toml"]]
+        command = [arguments.somatic, "run", "--body", paths["glb"], "--source", paths["frames"], "--calibration", paths["toml"]]
         command += ["--backend", recording.backend, "--outputs", ",".join(outputs), "--all-fields", "--sink", f"ndjson:{paths['ndjson']}"]
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
         if done.returncode not in (0, 3):
@@ -420,7 +431,7 @@ def main():
             path.unlink()
     json.dump({
         "cells": comparison.cells.total(), "by_letter": comparison.cells, "touches": comparison.touches, "present": comparison.present,
-        "touch_flags": comparison.touch_flags, "wrong": comparison.wrong,
+        "touch_flags": comparison.touch_flags, "in_world": comparison.in_world, "wrong": comparison.wrong,
         "examples": comparison.examples, "largest": comparison.largest, "missed": missed,
     }, sys.stdout)
 
