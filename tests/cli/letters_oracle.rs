@@ -20,8 +20,8 @@ fn assert_right(found: &Value, cells: u64, touches: u64) {
     let present = found["present"].as_object().unwrap();
     assert_eq!(present.len(), 42);
     assert!(present.values().all(|number| number.as_u64().unwrap() * 200 >= cells), "{present:?}");
-    let in_world = found["in_world"].as_u64().unwrap();
-    assert!((touches / 4..touches).contains(&in_world), "{in_world} of {} touches in the world", found["touches"]);
+    let [in_world, all] = ["in_world", "touches"].map(|name| found[name].as_u64().unwrap());
+    assert!((all / 4..all).contains(&in_world), "{in_world} of {all} touches are in the world");
     // And each flag of touches, but for `stale` and `several_links`, which these recordings are not.
     let flags = found["touch_flags"].as_object().unwrap();
     assert_eq!(flags.len(), 11, "{flags:?}");

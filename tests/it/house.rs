@@ -361,7 +361,7 @@ fn no_file_is_too_long_for_one_sitting() {
     }
 }
 
-/// The functions of `text` that have a body of several lines: their names, and how many lines each has from `fn` to the brace that closes it.
+/// The functions of `text` whose bodies have several lines: the name of each, and its lines from `fn` to the brace that closes it.
 fn functions(text: &str) -> Vec<(&str, usize)> {
     let lines: Vec<&str> = text.lines().collect();
     let mut found = Vec::new();
@@ -376,7 +376,7 @@ fn functions(text: &str) -> Vec<(&str, usize)> {
             line.strip_prefix(indent).is_some_and(|rest| rest == "}" || rest.starts_with(')') && rest.ends_with(';'))
         };
         if !line.ends_with(['}', ';']) {
-            found.push((name, 2 + lines[at + 1..].iter().position(|line| ends(&line)).unwrap()));
+            found.push((name, 2 + lines[at + 1..].iter().position(ends).unwrap()));
         }
     }
     found
@@ -396,8 +396,9 @@ fn no_function_is_too_long_for_one_screen() {
 
 #[test]
 fn lines_of_functions_are_counted_to_their_closing_braces() {
-    let text = "fn one() {}\ntrait T {\n    fn two(\n        self,\n    ) -> u8;\n    fn three(self) -> u8 {\n        if true {\n            \
-                1\n        } else {\n            2\n        }\n    }\n}\npub(super) const fn four<T>(\n    t: T,\n) -> T {\n    t\n}\n";
+    let text = "fn one() {}\ntrait T {\n    fn two(\n        self,\n    ) -> u8;\n    fn three(self) -> u8 {\n        if true {\n\
+                            1\n        } else {\n            2\n        }\n    }\n}\n\
+                pub(super) const fn four<T>(\n    t: T,\n) -> T {\n    t\n}\n";
     assert_eq!(functions(text), [("two", 3), ("three", 7), ("four", 5)]);
 }
 

@@ -283,7 +283,8 @@ class TouchesOf:
             found["slip_ratio"] = Value(pull / load / self.slips_at, found["friction"].size / self.slips_at)
         # Tangents along the chart, as lengths.
         tangents = [[arc(normal, up, way) for normal, way in zip(self.normal[own], ways)] for ways in (self.first[own], self.second[own])]
-        sigma = self.friction_sigma(frame, own, weight, pull / load, along, None if is_wrapped else (total, np.array(tangents) @ axes.T), load)
+        in_chart = None if is_wrapped else (total, np.array(tangents) @ axes.T)
+        sigma = self.friction_sigma(frame, own, weight, pull / load, along, in_chart, load)
         if sigma is not None:
             found["friction_sigma"] = Value(sigma[0], sigma[0] * sigma[1] * max(1, found["friction"].size / max(pull / load, 1e-9)))
         if len(own) > 1:
@@ -337,7 +338,8 @@ class TouchesOf:
     def off(self, frame, touch, found, largest):
         wrong, over_by = {}, {}
         # What is too close to call has either flag.
-        unsure = {flag for flag, name in (("still", "shear_direction"), ("no_gradient", "temperature_gradient")) if found.get(name, 0) is None}
+        undecided = {"shear_direction": "still", "temperature_gradient": "no_gradient"}
+        unsure = {flag for name, flag in undecided.items() if found.get(name, 0) is None}
         told, right = set(touch["flags"]) & FLAGS - unsure, self.flags(frame, touch, found, self.under(frame, touch)[1]) - unsure
         frame_of = "world" if self.moved[frame] else touch["link"]
         if touch["in"] != frame_of:

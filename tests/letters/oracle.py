@@ -2,10 +2,11 @@
 
     oracle.py SOMATIC FOLDER [--long] [--seed N]
 
-Makes random bodies, calibrations and frames in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter in a
-frame; and what touches feel (`of_touches.py`). Prints a JSON object: `cells`, by letter `by_letter`, `touches` (compared), `present` (by
-quantity, how often there was one), `touch_flags` (how often each was there), `in_world` (touches of frames with poses), `wrong` (cells and touches with something wrong), `examples` of these, `largest` (by quantity the
-largest difference over what rounding may be), and `missed`: what was changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
+Makes random bodies, calibrations, frames and poses in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter
+in a frame; and what touches feel (`of_touches.py`). Prints a JSON object: `cells`, by letter `by_letter`, `touches` (compared), `present`
+(by quantity, how often there was one), `touch_flags` (how often each was there), `in_world` (touches of frames with poses), `wrong` (cells
+and touches with something wrong), `examples` of these, `largest` (by quantity the largest difference over what rounding may be), and
+`missed`: what was changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
 
 The definition is that of the documentation, in numpy, over arrays of frames; it shares nothing with the program but files.
 """
