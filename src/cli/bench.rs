@@ -176,7 +176,7 @@ impl Report<'_> {
     }
 
     /// How many times as long a call takes as one with pressures alone, and that one's time, s.
-    fn beside_pressure(&self) -> Option<(f64, f64)> {
+    fn over_pressures_alone(&self) -> Option<(f64, f64)> {
         let [with_letters, alone] = self.times else { return None };
         Some((with_letters.median_s / alone.median_s, alone.median_s))
     }
@@ -187,7 +187,7 @@ impl Report<'_> {
             "backend": self.backend, "adapter": self.device, "us_median": us(self.times[0].median_s),
             "us_p99": us(self.times[0].p99_s), "rate": self.rate().round(),
         });
-        if let Some((_, alone_s)) = self.beside_pressure() {
+        if let Some((_, alone_s)) = self.over_pressures_alone() {
             line["letters"] = self.letters.iter().map(ToString::to_string).collect();
             line["us_median_pressure"] = us(alone_s).into();
         }
@@ -202,7 +202,7 @@ impl Report<'_> {
         let (skin, rate) = (words(&self.shape, self.letters), self.rate());
         let (backend, device, each_ns) = (self.backend, &self.device, 1e9 / rate);
         let beside = self
-            .beside_pressure()
+            .over_pressures_alone()
             .map(|(ratio, alone_s)| format!("{ratio:.2} times as long as pressures alone, median {}\n", time(alone_s)));
         format!(
             "{skin}\n{backend}: {device}\nmedian {median}, 99 % within {p99}, of {calls}\n{}{} memberships/s, {each_ns:.3} ns each\n",

@@ -31,7 +31,7 @@ const LISTS: [(TouchOutputs, &str, &str); 5] = [
     (TouchOutputs::FIT_SIGMAS, "", "The standard deviations of the fit's place, force, direction, width and length."),
 ];
 
-/// What letters beside pressure give touches, in other words where it is more than one quantity.
+/// What the other letters give touches, with words of its own where it is more than one quantity.
 const OF_LETTERS: [(TouchOutputs, &str, Option<&str>); 3] = [
     (
         TouchOutputs::SHEAR,

@@ -69,7 +69,7 @@ pub struct Moments {
     shown: Vec<Shown>,
     letter: Receptor,
     /// Of the colours, in SI units: up to the largest pressure or tangential force of the whole recording, 1 where there is none; of
-    /// other letters those of the calibration, or all that was read.
+    /// temperatures and distances those of the calibration, or all that was read.
     ends: [f64; 2],
     quantity: Quantity,
 }
@@ -152,16 +152,7 @@ impl Moments {
             return Err(Error::usage("the recording has no frames at that time").at(name));
         }
         let quantity = engine.plan().common_quantity().unwrap_or_default();
-        let calibrated = SenseRanges::of_calibration(engine.plan());
-        let known = match letter {
-            Receptor::Temperature => calibrated.celsius.or(ranges.celsius),
-            Receptor::Proximity => calibrated.distance_m.or(ranges.distance_m).map(|[_, most]| [0.0, most]),
-            _ => Some([0.0, max_force]),
-        };
-        let ends = match known.unwrap_or_default() {
-            [least, most] if least < most => [least, most],
-            [least, _] => [least, least + 1.0],
-        };
+        let ends = ends_of(letter, &SenseRanges::of_calibration(engine.plan()), &ranges, max_force);
         Ok(Self { shown, letter, ends, quantity })
     }
 
@@ -249,6 +240,20 @@ impl Moments {
             }
         }
         Ok(pictures)
+    }
+}
+
+/// The ends of the colours of `letter`: of temperatures and distances as they are `calibrated`, or else all that was `read`; of forces up
+/// to `most`.
+fn ends_of(letter: Receptor, calibrated: &SenseRanges, read: &SenseRanges, most: f64) -> [f64; 2] {
+    let known = match letter {
+        Receptor::Temperature => calibrated.celsius.or(read.celsius),
+        Receptor::Proximity => calibrated.distance_m.or(read.distance_m).map(|[_, most]| [0.0, most]),
+        _ => Some([0.0, most]),
+    };
+    match known.unwrap_or_default() {
+        [least, most] if least < most => [least, most],
+        [least, _] => [least, least + 1.0],
     }
 }
 

@@ -6,91 +6,38 @@ use std::fmt::Write as _;
 use super::known_curve::KnownCurve;
 use super::{Findings, Found, median};
 
+/// What most sensors share.
+struct Shared {
+    baseline: f64,
+    dead_band: f64,
+    /// `None` where no sensor's is known.
+    p_max: Option<f64>,
+    noise: Option<f64>,
+    shear_gain: Option<f64>,
+    shear_noise: Option<f64>,
+}
+
 impl Findings {
     /// The calibration, as `docs/reference/calibration.md` describes it, for the body called `body`. What most sensors share stands
     /// under `[all]`, the rest under each taxel.
     #[must_use]
     pub fn calibration(&self, body: &str) -> String {
-        let sound = || self.sensors.iter().filter(|found| !self.is_lost(found));
-        let baseline = commonest(sound().filter_map(|found| found.baseline));
-        let dead_band = commonest(sound().map(|found| number(self.p_of(found, found.dead_band))));
-        let p_max_of = |found: &Found| found.full.map(|full| number(self.p_of(found, full)));
-        let p_max = commonest(sound().filter_map(p_max_of));
-        let mut sigmas: Vec<f64> = sound().filter_map(|found| found.sigma).map(number).collect();
-        let sigma = median(&mut sigmas);
-        let mut text = format!(
-            "# From a survey of {} sensors: baselines are medians at rest, dead bands 1.5 times what one value in a\n\
-             # thousand strays from them.\n\n[all]\nbaseline = {baseline}\ngain = 1\nunit = \"{}\"\ndead_band = {dead_band}\ninvert = {}\n",
-            self.sensors.len(),
-            self.unit,
-            self.invert
-        );
-        text = format!("body = {}\n\n{text}", quoted(body));
-        let mut line = |name: &str, value: String| {
-            let _ = writeln!(text, "{name} = {value}");
-        };
-        if let Some(scale) = self.scale {
-            line("scale", scale.to_string());
-        }
-        if let Some(usual) = self.curves.last() {
-            line("curve", quoted(&usual.name()));
-        }
-        if sound().any(|found| found.full.is_some()) {
-            line("p_max", p_max.to_string());
-        }
-        if let Some(sigma) = sigma {
-            line("noise", sigma.to_string());
-        }
-        if let Some([low, high]) = self.raw_range {
-            line("raw_range", format!("[{low}, {high}]"));
-        }
-        if !self.missing.is_empty() {
-            line("missing", format!("{:?}", self.missing));
-        }
-        let shear_noise = self.usual_shear_noise(sound().map(|found| found.id)).map(number);
-        let shear_gain =
-            self.curves.last().filter(|_| !self.with_axes.is_empty()).and_then(KnownCurve::gain).map(number);
-        if shear_noise.is_some() || shear_gain.is_some() {
+        let shared = self.shared();
+        let mut text = self.for_all(body, &shared);
+        if shared.shear_noise.is_some() || shared.shear_gain.is_some() {
             text += "\n[shear]\n";
         }
-        if let Some(gain) = shear_gain {
+        if let Some(gain) = shared.shear_gain {
             let _ = write!(
                 text,
                 "# As the heaviest known force has it, on average: none pulled along the skin.\ngain = {gain}\n"
             );
         }
-        if let Some(noise) = shear_noise {
+        if let Some(noise) = shared.shear_noise {
             let _ = writeln!(text, "noise = {noise}");
         }
         for found in &self.sensors {
-            let mut own: Vec<(&str, String)> = Vec::new();
-            if self.is_lost(found) {
-                own.push(("mask", "true".to_owned()));
-            } else {
-                let all = [
-                    ("baseline", found.baseline.unwrap_or(baseline), baseline),
-                    ("gain", found.gain, 1.0),
-                    ("dead_band", number(self.p_of(found, found.dead_band)), dead_band),
-                    ("p_max", p_max_of(found).unwrap_or(p_max), p_max),
-                ];
-                if let Some(curve) = self.curves.iter().find(|curve| curve.id == Some(found.id)) {
-                    own.push(("curve", quoted(&curve.name())));
-                }
-                let differs = all.iter().filter(|(_, own, all)| own != all);
-                own.extend(differs.map(|(name, own, _)| (*name, number(*own).to_string())));
-                if let Some(noise) = found.sigma.map(number).filter(|own| Some(*own) != sigma) {
-                    own.push(("noise", noise.to_string()));
-                }
-                if let Some([u, v]) = self.shear_baseline(found.id) {
-                    own.push(("shear_baseline", format!("[{u}, {v}]")));
-                }
-                if let Some(gain) = self.shear_gain(found).filter(|own| Some(*own) != shear_gain) {
-                    own.push(("shear_gain", gain.to_string()));
-                }
-                if let Some(noise) = self.shear_noise(found.id).map(number).filter(|own| Some(*own) != shear_noise) {
-                    own.push(("shear_noise", noise.to_string()));
-                }
-            }
+            let own = self.own(found, &shared);
             if !own.is_empty() {
                 let _ = write!(text, "\n[taxel.{}]\n", found.id);
                 for (name, value) in own {
@@ -103,6 +50,96 @@ impl Findings {
             let _ = write!(text, "\n[curve.{}]\nraw = {:?}\np = {:?}\n", curve.name(), column(0), column(1));
         }
         text
+    }
+
+    fn shared(&self) -> Shared {
+        let sound = || self.sensors.iter().filter(|found| !self.is_lost(found));
+        let is_full_known = sound().any(|found| found.full.is_some());
+        let mut sigmas: Vec<f64> = sound().filter_map(|found| found.sigma).map(number).collect();
+        let usual = self.curves.last().filter(|_| !self.with_axes.is_empty());
+        Shared {
+            baseline: commonest(sound().filter_map(|found| found.baseline)),
+            dead_band: commonest(sound().map(|found| number(self.p_of(found, found.dead_band)))),
+            p_max: is_full_known.then(|| commonest(sound().filter_map(|found| self.p_max_of(found)))),
+            noise: median(&mut sigmas),
+            shear_gain: usual.and_then(KnownCurve::gain).map(number),
+            shear_noise: self.usual_shear_noise(sound().map(|found| found.id)).map(number),
+        }
+    }
+
+    /// What the file says of the body and under `[all]`.
+    fn for_all(&self, body: &str, shared: &Shared) -> String {
+        let mut text = format!(
+            "body = {}\n\n# From a survey of {} sensors: baselines are medians at rest, dead bands 1.5 times what one value in a\n\
+             # thousand strays from them.\n\n[all]\nbaseline = {}\ngain = 1\nunit = \"{}\"\ndead_band = {}\ninvert = {}\n",
+            quoted(body),
+            self.sensors.len(),
+            shared.baseline,
+            self.unit,
+            shared.dead_band,
+            self.invert
+        );
+        let mut line = |name: &str, value: String| {
+            let _ = writeln!(text, "{name} = {value}");
+        };
+        if let Some(scale) = self.scale {
+            line("scale", scale.to_string());
+        }
+        if let Some(usual) = self.curves.last() {
+            line("curve", quoted(&usual.name()));
+        }
+        if let Some(p_max) = shared.p_max {
+            line("p_max", p_max.to_string());
+        }
+        if let Some(noise) = shared.noise {
+            line("noise", noise.to_string());
+        }
+        if let Some([low, high]) = self.raw_range {
+            line("raw_range", format!("[{low}, {high}]"));
+        }
+        if !self.missing.is_empty() {
+            line("missing", format!("{:?}", self.missing));
+        }
+        text
+    }
+
+    /// The keys of `found` alone, with their values.
+    fn own(&self, found: &Found, shared: &Shared) -> Vec<(&'static str, String)> {
+        if self.is_lost(found) {
+            return vec![("mask", "true".to_owned())];
+        }
+        let mut own = Vec::new();
+        if let Some(curve) = self.curves.iter().find(|curve| curve.id == Some(found.id)) {
+            own.push(("curve", quoted(&curve.name())));
+        }
+        let p_max = shared.p_max.unwrap_or_default();
+        let all = [
+            ("baseline", found.baseline.unwrap_or(shared.baseline), shared.baseline),
+            ("gain", found.gain, 1.0),
+            ("dead_band", number(self.p_of(found, found.dead_band)), shared.dead_band),
+            ("p_max", self.p_max_of(found).unwrap_or(p_max), p_max),
+        ];
+        let differs = all.into_iter().filter(|(_, own, all)| own != all);
+        own.extend(differs.map(|(name, own, _)| (name, number(own).to_string())));
+        if let Some(noise) = found.sigma.map(number).filter(|own| Some(*own) != shared.noise) {
+            own.push(("noise", noise.to_string()));
+        }
+        if let Some([u, v]) = self.shear_baseline(found.id) {
+            own.push(("shear_baseline", format!("[{u}, {v}]")));
+        }
+        if let Some(gain) = self.shear_gain(found).filter(|own| Some(*own) != shared.shear_gain) {
+            own.push(("shear_gain", gain.to_string()));
+        }
+        let shear_noise = self.shear_noise(found.id).map(number);
+        if let Some(noise) = shear_noise.filter(|own| Some(*own) != shared.shear_noise) {
+            own.push(("shear_noise", noise.to_string()));
+        }
+        own
+    }
+
+    /// The P of `found` at the end of its range.
+    fn p_max_of(&self, found: &Found) -> Option<f64> {
+        found.full.map(|full| number(self.p_of(found, full)))
     }
 
     /// The P of `found` where it went `raw` units.

@@ -10,7 +10,6 @@
 //! its way.
 
 mod at_rest;
-mod beside_pressure;
 pub mod crosstalk;
 mod figure;
 mod file;
@@ -23,6 +22,7 @@ mod remarks;
 pub mod scale;
 mod travel;
 pub mod tuning;
+mod unpressed;
 mod which_way;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -316,32 +316,14 @@ impl Survey {
         };
         // A sensor may rest far above the way that is left to its end: only with its range can it be calibrated.
         let raw_range = raw_range.or_else(|| end.filter(|_| !invert).map(|end| range_to(end, lowest)));
-        let pressed: Vec<Option<f64>> =
-            (0..self.ids.len()).map(|sensor| clear(sensor, side).then(|| travels[sensor][side])).collect();
-        let mut travels_of_pressed: Vec<f64> = pressed.iter().copied().flatten().collect();
-        let usual = median(&mut travels_of_pressed);
-        let sensors = (0..self.ids.len()).map(|sensor| {
-            let rest = at_rest[sensor];
-            let noise = rest.map_or(0.0, |(_, noise)| noise);
-            let full = rest.zip(end).map(|((baseline, _), end)| (end - baseline).abs()).filter(|&full| full > 0.0);
-            Found {
-                id: self.ids[sensor],
-                baseline: rest.map(|(baseline, _)| baseline),
-                noise,
-                sigma: (self.rest[sensor].len() >= MIN_SIGMA_VALUES).then(|| sigma_of(&self.rest[sensor], step)),
-                dead_band: dead_band(noise),
-                travel: pressed[sensor],
-                // At the end itself it is already full.
-                full: full.map(|full| rounded(full - if step > 0.0 { 0.5 * step } else { 1e-3 * full })),
-                gain: match (pressed[sensor], usual) {
-                    (Some(travel), Some(usual)) if wishes.equalise => rounded(usual / travel),
-                    _ => 1.0,
-                },
-                moved: moved[sensor],
-                went_other_way: goes(sensor, 1 - side),
-            }
-        });
-        let sensors: Vec<Found> = sensors.collect();
+        let went = |sensor: usize, side: usize| clear(sensor, side).then(|| travels[sensor][side]);
+        let mut sensors = self.found(&at_rest, end, |sensor| went(sensor, side));
+        for (sensor, found) in sensors.iter_mut().enumerate() {
+            (found.moved, found.went_other_way) = (moved[sensor], goes(sensor, 1 - side));
+        }
+        if wishes.equalise {
+            equalise(&mut sensors);
+        }
         let mut bands: Vec<f64> = sensors.iter().map(|found| found.dead_band).collect();
         let crosstalk = self.leaks.found(median(&mut bands).unwrap_or(0.0), |band| self.rounded_band(band));
         Ok(Findings {
@@ -359,6 +341,30 @@ impl Survey {
             tangential_sigmas: self.apart.as_ref().map(|apart| apart.sigmas()).unwrap_or_default(),
             with_axes: self.with_axes.clone(),
         })
+    }
+
+    /// What was found of each sensor by itself, where they go to `end`; `travel` says how far one went.
+    fn found(&self, at_rest: &[AtRest], end: Option<f64>, travel: impl Fn(usize) -> Option<f64>) -> Vec<Found> {
+        let step = self.step();
+        let of = |sensor: usize| {
+            let rest = at_rest[sensor];
+            let noise = rest.map_or(0.0, |(_, noise)| noise);
+            let full = rest.zip(end).map(|((baseline, _), end)| (end - baseline).abs()).filter(|&full| full > 0.0);
+            Found {
+                id: self.ids[sensor],
+                baseline: rest.map(|(baseline, _)| baseline),
+                noise,
+                sigma: (self.rest[sensor].len() >= MIN_SIGMA_VALUES).then(|| sigma_of(&self.rest[sensor], step)),
+                dead_band: self.dead_band(noise),
+                travel: travel(sensor),
+                // At the end itself it is already full.
+                full: full.map(|full| rounded(full - if step > 0.0 { 0.5 * step } else { 1e-3 * full })),
+                gain: 1.0,
+                moved: false,
+                went_other_way: false,
+            }
+        };
+        (0..self.ids.len()).map(of).collect()
     }
 
     /// The step between raw values: 1 for whole numbers.
@@ -395,6 +401,15 @@ impl Survey {
         let all = at_rest.chain(pressed.flat_map(|pressed| [pressed.low, pressed.high]));
         let (low, high) = all.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         (f64::from(high) - f64::from(low)).max(0.0)
+    }
+}
+
+/// Gives each of `sensors` that was pressed the gain with which it went as far as the middle one.
+fn equalise(sensors: &mut [Found]) {
+    let mut travels: Vec<f64> = sensors.iter().filter_map(|found| found.travel).collect();
+    let Some(usual) = median(&mut travels) else { return };
+    for found in sensors {
+        found.gain = found.travel.map_or(1.0, |travel| rounded(usual / travel));
     }
 }
 

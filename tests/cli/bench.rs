@@ -178,7 +178,7 @@ fn figures_are_json_for_programs_and_lines_for_people() {
 }
 
 #[test]
-fn letters_are_measured_beside_pressures_alone() {
+fn letters_are_compared_with_pressures_alone() {
     let letters = "sustained,shear,temperature,proximity";
     let text = done(&with(&["--letters", letters, "--frames", "20", "--backend", "reference", "--json"]));
     let figures: Value = serde_json::from_str(&text).unwrap();

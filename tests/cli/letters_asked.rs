@@ -1,4 +1,4 @@
-//! Letters beside pressure that are asked for, and what is said where a body or a scene does not have them.
+//! Other letters that are asked for, and what is said where a body or a scene does not have them.
 
 use std::path::PathBuf;
 
@@ -38,7 +38,7 @@ fn touches(lines: &[Value]) -> Vec<&Value> {
 }
 
 #[test]
-fn touches_have_what_they_feel_beside_pressure_whatever_fields_have() {
+fn touches_have_other_letters_whatever_fields_have() {
     let whole = hand(&[]);
     let keys = ["shear", "torsion", "friction", "temperature"];
     let of = |lines: &[Value]| -> Vec<Vec<Value>> {

@@ -1,4 +1,4 @@
-//! Shear, temperature and proximity, and what touches have of them, against a definition of their own in Python, on random bodies,
+//! Shear, temperature and proximity, and what touches have of them, against a definition of their own in Python, on random bodies, poses,
 //! calibrations and frames.
 
 use serde_json::Value;
@@ -18,8 +18,14 @@ fn assert_right(found: &Value, cells: u64, touches: u64) {
     }
     // Each quantity was there often.
     let present = found["present"].as_object().unwrap();
-    assert_eq!(present.len(), 40);
+    assert_eq!(present.len(), 42);
     assert!(present.values().all(|number| number.as_u64().unwrap() * 200 >= cells), "{present:?}");
+    let [in_world, all] = ["in_world", "touches"].map(|name| found[name].as_u64().unwrap());
+    assert!((all / 4..all).contains(&in_world), "{in_world} of {all} touches are in the world");
+    // And each flag of touches, but for `stale` and `several_links`, which these recordings are not.
+    let flags = found["touch_flags"].as_object().unwrap();
+    assert_eq!(flags.len(), 11, "{flags:?}");
+    assert!(flags.values().all(|number| number.as_u64().unwrap() * 100 >= touches), "{flags:?}");
 }
 
 #[test]

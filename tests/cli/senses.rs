@@ -117,9 +117,14 @@ fn each_quantity_is_plotted_in_the_letter_that_gives_it_with_its_unit() {
         assert!(svg.contains(label), "{label}");
     }
     // A line for each: of the shear along u and v.
-    let drawn = |outputs: &str| skin.plot(outputs).iter().filter(|line| line.contains("<polyline")).count();
+    let points = |line: &String| {
+        line.split_once("points=\"").map_or(0, |(_, rest)| rest.split('"').next().unwrap().split_whitespace().count())
+    };
+    // Of as many points as there are frames.
+    let drawn = |outputs: &str| skin.plot(outputs).iter().filter(|line| points(line) == 21).count();
     let without = drawn("total");
-    assert!(drawn("total,temperature") > without && drawn("total,nearest") > without);
+    let more = ["temperature", "nearest", "shear"].map(|output| drawn(&format!("total,{output}")) - without);
+    assert!(without > 0 && more == [1, 1, 2], "{without} {more:?}");
     // 25 to 35 °C and 60 to 20 mm: numbers of their axes.
     for number in ["30", "40", "60"] {
         assert!(lines.iter().any(|line| line.trim() == number), "{number}");

@@ -332,7 +332,7 @@ fn touches_have_shear_where_it_is_asked_for_whatever_fields_feel() {
     assert!(given(Scene::default().touches(asked(usual))).contains(TouchOutputs::SHEAR));
     let total = Scene::default().outputs(Outputs::TOTAL);
     assert!(given(total.clone().touches(asked(usual))).contains(TouchOutputs::SHEAR));
-    // Not for whoever names other letters, nor where only what is made of touches is asked for.
+    // Not for whoever names letters without it, nor where only what is made of touches is asked for.
     let pressed = total.clone().letters(vec![Letter::default()]);
     assert_eq!(given(pressed.touches(asked(usual))), usual);
     assert_eq!(given(Scene::default().outputs(Outputs::SELF_CONTACTS).touches(None)), usual);

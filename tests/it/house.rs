@@ -361,6 +361,47 @@ fn no_file_is_too_long_for_one_sitting() {
     }
 }
 
+/// The functions of `text` whose bodies have several lines: the name of each, and its lines from `fn` to the brace that closes it.
+fn functions(text: &str) -> Vec<(&str, usize)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut found = Vec::new();
+    for (at, line) in lines.iter().enumerate() {
+        let indent = &line[..line.len() - line.trim_start().len()];
+        let mut words =
+            line.split_whitespace().skip_while(|word| word.starts_with("pub") || ["const", "async"].contains(word));
+        let Some(name) = words.next().filter(|word| *word == "fn").and_then(|_| words.next()) else { continue };
+        let name = name.split(['(', '<']).next().unwrap();
+        // What a trait asks for ends with a semicolon.
+        let ends = |line: &&str| {
+            line.strip_prefix(indent).is_some_and(|rest| rest == "}" || rest.starts_with(')') && rest.ends_with(';'))
+        };
+        if !line.ends_with(['}', ';']) {
+            found.push((name, 2 + lines[at + 1..].iter().position(ends).unwrap()));
+        }
+    }
+    found
+}
+
+#[test]
+fn no_function_is_too_long_for_one_screen() {
+    let mut count = 0;
+    for (_, path, text) in sources().into_iter().filter(|(_, path, _)| !path.ends_with("tests.rs")) {
+        for (name, lines) in functions(&text) {
+            assert!(lines < 80, "`{name}` in {} has {lines} lines; split it by what it does", path.display());
+            count += 1;
+        }
+    }
+    assert!(count > 4000, "{count} functions are not all");
+}
+
+#[test]
+fn lines_of_functions_are_counted_to_their_closing_braces() {
+    let text = "fn one() {}\ntrait T {\n    fn two(\n        self,\n    ) -> u8;\n    fn three(self) -> u8 {\n        if true {\n\
+                            1\n        } else {\n            2\n        }\n    }\n}\n\
+                pub(super) const fn four<T>(\n    t: T,\n) -> T {\n    t\n}\n";
+    assert_eq!(functions(text), [("two", 3), ("three", 7), ("four", 5)]);
+}
+
 #[test]
 fn only_outputs_are_written() {
     let writes = [

@@ -1,4 +1,4 @@
-//! Shear, temperature and proximity beside pressure, on every backend: the same bits everywhere, however frames are cut; nothing of
+//! Shear, temperature and proximity on every backend: the same bits everywhere, however frames are cut; nothing of
 //! one letter is in another, and nothing costs a body without such taxels anything.
 
 use glam::{DQuat, DVec2, DVec3};
@@ -185,7 +185,9 @@ fn a_twist_has_the_sign_of_its_sense_and_no_direction() {
         let percepts = run(&body, BackendKind::Cpu, &Scene::default(), &[(0.0, touch)]);
         let shear = percepts[0].iter().find(|percept| percept.letter == 1).unwrap();
         assert!(shear.torsion.unwrap() * sign > 1e-4, "{:?}", shear.torsion);
-        assert!(shear.shear_direction.is_none_or(|_| shear.friction.unwrap() < 1e-6));
+        // What pulls on one side is what pulls on the other, to the last bit.
+        assert_eq!((shear.shear_direction, shear.flags.contains(Flags::STILL)), (None, true), "{:?}", shear.friction);
+        assert!(shear.friction.unwrap() < 1e-9);
     }
 }
 
@@ -217,10 +219,9 @@ fn a_touch_pulls_and_is_warm_as_the_taxels_under_it() {
         let felt = &percepts.touches(0).unwrap().touches[0];
         let of_field = DVec3::from_array(percepts.get(0, 1).force_vector.unwrap());
         for force in [felt.force_vector_newton.unwrap(), of_field] {
-            assert!(
-                (force.y + felt.total).abs() < 1e-5 * felt.total && force.x < 0.29 * felt.total,
-                "{kind:?}: {force}"
-            );
+            // Taxel 13 is in the middle of the touch: it presses by 0.2 N, and how it pulls is not known.
+            let right = felt.total * DVec3::new(0.3, -1.0, -0.1) - 0.2 * DVec3::new(0.3, 0.0, -0.1);
+            assert!((force - right).length() < 1e-5 * felt.total, "{kind:?}: {force}, not {right}");
         }
         assert!(felt.flags.contains(somatic::percept::TouchFlags::INCOMPLETE));
     }
@@ -269,7 +270,10 @@ fn what_is_missing_or_out_of_range_is_said_and_the_rest_counts() {
     assert!(!pressure.flags.intersects(Flags::INCOMPLETE | Flags::FAULTY_INPUT) && pressure.peak.unwrap() > 0.19);
     assert!(shear.flags.contains(Flags::INCOMPLETE | Flags::FAULTY_INPUT));
     assert!((shear.friction.unwrap() - TOUCH.drag.length()).abs() < 1e-6);
-    assert!(warm.flags.contains(Flags::INCOMPLETE | Flags::FAULTY_INPUT) && warm.temperature.is_some());
+    assert!(warm.flags.contains(Flags::INCOMPLETE | Flags::FAULTY_INPUT));
+    // Of 25 around 31 °C the two are lost that read 29 and 30.5 °C.
+    let mean = (25.0 * TOUCH.celsius - 29.0 - 30.5) / 23.0;
+    assert!((warm.temperature.unwrap() - mean).abs() < 1e-5, "{:?}", warm.temperature);
     assert!(near.nearest.is_none() && near.covered == Some(0) && !near.contact);
     assert!(near.flags.contains(Flags::OUT_OF_RANGE | Flags::NO_CONTACT));
     // What touches a distance sensor is as near as it can tell.
@@ -342,9 +346,8 @@ fn one_taxel_has_no_torsion_and_two_have_no_gradient() {
         frame.values[engine.index_of(&(WARM + i).to_string()).unwrap()] = RawValue::MISSING;
     }
     let percepts: Vec<Percept> = engine.process_one(&frame).unwrap().frame(0).collect();
-    assert!(
-        percepts[1].torsion.is_none() && percepts[1].flags.contains(Flags::ONE_TAXEL) && percepts[1].shear.is_some()
-    );
+    assert!(percepts[1].torsion.is_none() && percepts[1].flags.contains(Flags::ONE_TAXEL));
+    close(DVec2::from_array(percepts[1].shear.unwrap()), 0.2 * TOUCH.drag, 1e-8);
     assert!(percepts[2].temperature_gradient.is_none() && percepts[2].flags.contains(Flags::NO_GRADIENT));
     assert!(!percepts[2].flags.contains(Flags::COINCIDENT) && !percepts[1].flags.contains(Flags::NO_GRADIENT));
 }
@@ -410,7 +413,11 @@ fn a_skin_without_any_pressure_is_read_on_every_backend() {
     for kind in backends() {
         let scene = Scene::default().touches(somatic::touch::Options::default());
         let percepts = run(&body, kind, &scene, &[(0.0, TOUCH), (0.1, TOUCH)]);
-        assert!(percepts.iter().all(|frame| frame.len() == 1 && frame[0].nearest.is_some()), "{kind:?}");
+        for frame in &percepts {
+            let [near] = frame[..] else { panic!("{kind:?}: {} percepts", frame.len()) };
+            assert!((near.nearest.unwrap() - TOUCH.distance_m).abs() < 1e-8, "{kind:?}: {:?}", near.nearest);
+            assert_eq!((near.nearest_taxel, near.covered), (Some(NEAR + 12), Some(25)), "{kind:?}");
+        }
     }
 }
 

@@ -82,7 +82,9 @@ fn one_taxel_with_three_axes_among_others_has_no_torsion_and_says_why() {
             let frame = frame_with(&engine, 0.0, &pulled);
             let percepts = engine.process_one(&frame).unwrap();
             let [touch] = &percepts.touches(0).unwrap().touches[..] else { panic!("one touch") };
-            assert!(touch.active == 3 && touch.friction.is_some() && touch.shear.is_some());
+            // 0.5 N of the one that is pulled, over the 2 N that it presses with, or 3 N where the first tells how it is pulled, too.
+            let friction = if has_torsion { 0.5 / 3.0 } else { 0.25 };
+            assert!(touch.active == 3 && (touch.friction.unwrap() - friction).abs() < 1e-6, "{:?}", touch.friction);
             assert_eq!(
                 (touch.torsion.is_some(), touch.flags.contains(TouchFlags::ONE_PULLED)),
                 (has_torsion, !has_torsion)
@@ -103,7 +105,7 @@ fn one_taxel_with_three_axes_among_others_has_no_torsion_and_says_why() {
 }
 
 #[test]
-fn a_touch_says_what_is_lost_of_what_is_beside_its_pressure() {
+fn a_touch_says_what_is_lost_of_its_pull_and_its_warmth() {
     let body = skin(2);
     let mut engine = engine(&body, BackendKind::Cpu, with_touches());
     let whole = TOUCH.frame(&engine, 0.0);
@@ -250,16 +252,20 @@ fn rates_stand_clocks_that_are_coarse_and_times_that_are_none() {
         let percepts = percepts_of(&frame, &mut engine);
         let warm = of(&engine, &percepts, Receptor::Temperature);
         assert!(warm.temperature_rate.is_none() && warm.flags.contains(Flags::NO_PREVIOUS), "{wrong}: {warm:?}");
-        assert_eq!(
-            warm.temperature,
-            of(&engine, &percepts, Receptor::Temperature).warmest.map(|_| warm.temperature.unwrap())
-        );
+        // The temperature itself needs no time.
+        assert!((warm.temperature.unwrap() - TOUCH.celsius).abs() < 1e-5, "{wrong}: {:?}", warm.temperature);
         for index in 0..200 {
             let t_s = 1.0 + 0.01 * f64::from(index);
             let percepts = percepts_of(&Touch { celsius: 20.0 - t_s, ..TOUCH }.frame(&engine, t_s), &mut engine);
             let rate = of(&engine, &percepts, Receptor::Temperature).temperature_rate;
-            assert!(rate.is_none_or(f64::is_finite), "after {wrong}: {rate:?}");
-            assert!(index < 100 || (rate.unwrap() + 1.0).abs() < 1e-2, "after {wrong}: {rate:?}");
+            // A time that is none leaves nothing behind; of one half a second before the first frame the window, which is as long, still
+            // has the fall from 31 to 19 °C.
+            match (wrong.is_finite(), index) {
+                (true, 0..25) => assert!(rate.unwrap() < -1.1, "{index} after {wrong}: {rate:?}"),
+                (true, 25..100) => assert!(rate.unwrap().is_finite(), "{index} after {wrong}: {rate:?}"),
+                (false, 0..25) => assert_eq!(rate, None, "{index} after {wrong}"),
+                _ => assert!((rate.unwrap() + 1.0).abs() < 1e-2, "{index} after {wrong}: {rate:?}"),
+            }
         }
     }
 }

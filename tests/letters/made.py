@@ -290,6 +290,26 @@ class Frames:
         self.raw[rng.random(self.raw.shape) < holes / 3] = np.nan
         self.missing = rng.random(self.raw.shape) < holes
         self.place = {channel: index for index, channel in enumerate(self.channels)}
+        self.poses, self.moved = [{}] * count, [None] * count
+
+    def pose(self, rng, body):
+        """Puts the body into the world in most frames: by link, place and quaternion. A link without a pose goes with the one above it."""
+        self.poses = []
+        for frame in range(len(self.t)):
+            own = [0] + [link for link in range(1, len(body.links)) if rng.random() < 0.5] if rng.random() < 0.9 else []
+            self.poses.append({link: np.append(rng.uniform(-1, 1, 3), unit(rng.normal(0, 1, 4))) for link in own})
+            self.moved[frame] = self.move(self.poses[-1], body) if own else None
+
+    @staticmethod
+    def move(poses, body):
+        """By link, the rotation and the step that take the body at rest to where the link is in the world."""
+        moved = []
+        for link in range(len(body.links)):
+            pose = poses[next(above for above in body.above(link) if above in poses)]
+            rotation, origin = body.pose(next(above for above in body.above(link) if above in poses))
+            turn = matrix(pose[3:]) @ rotation.T
+            moved.append((turn, pose[:3] - turn @ origin))
+        return [np.array(column) for column in zip(*moved)]
 
     def of(self, taxels, axis=""):
         places = [self.place[taxel, axis] for taxel in taxels]
@@ -304,12 +324,28 @@ class Frames:
         return "\n".join(lines) + "\n"
 
 
+    def lines(self, body):
+        """The same as a driver writes them, with poses."""
+        told = lambda raw, gone: None if gone else "nan" if np.isnan(raw) else float(raw)
+        for t, raw, missing, poses in zip(self.t, self.raw, self.missing, self.poses):
+            values = {}
+            for (taxel, _), value, gone in zip(self.channels, raw, missing):
+                values.setdefault(str(body.ids[taxel]), []).append(told(value, gone))
+            values = {name: own if len(own) > 1 else own[0] for name, own in values.items()}
+            pose = {body.links[link][0]: list(map(float, pose)) for link, pose in poses.items()}
+            yield json.dumps({"t": t, "values": values} | ({"pose": pose} if pose else {}))
+
+
 class Recording:
     def __init__(self, name, rng, count, kinds, backend):
-        self.name, self.backend = name, backend
+        self.name, self.backend, self.is_posed = name, backend, False
         self.body = random_body(rng, kinds)
         self.calibration = random_calibration(rng, self.body)
         self.frames = Frames(rng, self.body, count)
+
+    def pose(self, rng):
+        self.is_posed = True
+        self.frames.pose(rng, self.body)
 
     def kinds(self):
         return {self.body.kind[taxel] for one in self.body.fields for taxel in one.members}
@@ -326,10 +362,12 @@ class Recording:
         return len(self.letters()) == 1 and not self.kinds() & {"pressure", "force3"}
 
     def write(self, folder):
-        paths = {key: folder / f"{self.name}.{key}" for key in ("glb", "toml", "csv", "ndjson")}
+        keys = {"glb": "glb", "toml": "toml", "frames": "jsonl" if self.is_posed else "csv", "ndjson": "ndjson"}
+        paths = {key: folder / f"{self.name}.{end}" for key, end in keys.items()}
         paths["glb"].write_bytes(self.body.glb())
         paths["toml"].write_text("\n".join(toml(self.calibration)) + "\n")
-        paths["csv"].write_text(self.frames.csv(self.body))
+        frames = "\n".join(self.frames.lines(self.body)) + "\n" if self.is_posed else self.frames.csv(self.body)
+        paths["frames"].write_text(frames)
         paths["ndjson"].unlink(missing_ok=True)
         return paths
 
@@ -339,5 +377,10 @@ def recordings(long, seed):
     for number in range(180 if long else 8):
         rng = np.random.default_rng([seed, number])
         recording = Recording(f"letters-{number}", rng, 260 if long else 60, mixes[number % len(mixes)] if number % 3 else KINDS, ("cpu", "reference")[number % 2])
+        if number % 8 == 6:
+            # Sensors whose noise nobody knows, in the short run, too.
+            recording.calibration["all"].pop("noise", None)
+        if number % 4 > 1:
+            recording.pose(np.random.default_rng([seed, number, 1]))
         if recording.letters():
             yield recording

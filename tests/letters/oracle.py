@@ -2,10 +2,11 @@
 
     oracle.py SOMATIC FOLDER [--long] [--seed N]
 
-Makes random bodies, calibrations and frames in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter in a
-frame; and what touches feel (`of_touches.py`). Prints a JSON object: `cells`, by letter `by_letter`, `touches` (compared), `present` (by
-quantity, how often there was one), `wrong` (cells and touches with something wrong), `examples` of these, `largest` (by quantity the
-largest difference over what rounding may be), and `missed`: what was changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
+Makes random bodies, calibrations, frames and poses in FOLDER (`made.py`), runs SOMATIC on them, and compares each cell: a field's letter
+in a frame; and what touches feel (`of_touches.py`). Prints a JSON object: `cells`, by letter `by_letter`, `touches` (compared), `present`
+(by quantity, how often there was one), `touch_flags` (how often each was there), `in_world` (touches of frames with poses), `wrong` (cells
+and touches with something wrong), `examples` of these, `largest` (by quantity the largest difference over what rounding may be), and
+`missed`: what was changed in a line and not found to be wrong. Some ten thousand cells, or with --long over a million.
 
 The definition is that of the documentation, in numpy, over arrays of frames; it shares nothing with the program but files.
 """
@@ -14,7 +15,7 @@ import argparse
 import json
 import subprocess
 import sys
-from collections import Counter, deque
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from calibrated import PRESSURES, SAME, UNITS, Value, arc, gradient_within, read, sensed
 from made import Recording, recordings
-from of_touches import TOUCHES, TouchesOf
+from of_touches import FLAGS, TOUCHES, TouchesOf
+from slope import Slope
 
 LETTERS = {
     "shear": ["shear", "shear_direction", "shear_vector", "force_vector", "torsion", "friction", "friction_sigma", "slip_ratio"],
@@ -38,54 +40,6 @@ HUGE = 2.0**60
 LEAST_M = 1e-4
 LONGEST_GAP_S, SHORTEST_STEP_S = 10.0, 1e-9
 MOST_EXAMPLES = 20
-EPSILON = float(np.finfo(np.float64).eps)
-
-
-class Slope:
-    """The line of least squares through the last `window` seconds and the last sample before them, of which samples nearer than a
-    128th replace the newest. What is sampled is moved by members alone that have a value before and after."""
-
-    def __init__(self, window):
-        self.window, self.kept, self.level, self.before = window, deque(), 0.0, {}
-
-    def clear(self):
-        self.kept.clear()
-        self.before = {}
-
-    def follow(self, t, now, of, size):
-        """`now` has the members' values, and `of` makes one of some of them, or None."""
-        both = [member for member in now if member in self.before]
-        was, value = of({member: self.before[member] for member in both}), of({member: now[member] for member in both})
-        if was is None or value is None:
-            self.kept.clear()
-            self.level = of(now)
-        else:
-            self.level += value - was
-        self.before = now
-        return self.take(t, self.level, size)
-
-    def take(self, t, value, size):
-        # What a time of this size, and a difference of two, lose to rounding.
-        slack = 1e-9 * self.window + 2 * EPSILON * abs(t)
-        if self.kept and t <= self.kept[-1][0]:
-            self.kept.clear()
-        # After a gap of two windows in frames that were not slow, nothing is known of before.
-        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] <= self.window + slack and t - self.kept[-1][0] > 2 * self.window + slack:
-            self.kept.clear()
-        if len(self.kept) > 1 and self.kept[-1][0] - self.kept[-2][0] < self.window / 128:
-            self.kept.pop()
-        self.kept.append((t, value, size))
-        while len(self.kept) > 1 and t - self.kept[1][0] >= self.window - slack:
-            self.kept.popleft()
-        if len(self.kept) > 2 and t - self.kept[0][0] > 2 * self.window + slack:
-            self.kept.popleft()
-        if t - self.kept[0][0] < self.window / 2 - slack:
-            return None
-        times, values, sizes = np.array(self.kept).T
-        away = times - times[0]
-        away -= away.mean()
-        size = np.abs(values).max() + sizes.max()
-        return Value((away * (values - values.mean())).sum() / (away**2).sum(), size / (t - times[0]))
 
 
 class Field:
@@ -94,12 +48,21 @@ class Field:
         self.body, self.chart = body, body.chart_of(field)
         self.members = sorted((taxel for taxel in field.members if body.kind[taxel] in kinds), key=lambda taxel: body.ids[taxel])
         self.weights = np.array([field.members[taxel] for taxel in self.members])
+        self.moved, self.anchor_pose = recording.frames.moved, body.pose(body.anchor(field))
         at, normals, first, second = body.in_anchor(field, self.members)
         self.at, self.normals, self.tangents = at, normals, (first, second)
         if self.chart:
             origin, u, v, n = self.chart
             self.places = np.stack([(at - origin) @ u, (at - origin) @ v], axis=1)
             self.along = [np.array([[turned @ u, turned @ v] for turned in map(arc, normals, [n] * len(normals), way)]) for way in self.tangents]
+
+    def placed(self, frame):
+        """Places, normals and both tangents in a frame: in the anchor, or in the world if it has poses."""
+        if self.moved[frame] is None:
+            return self.at, self.normals, self.tangents
+        (rotation, origin), (turns, steps) = self.anchor_pose, (of[self.body.link[self.members]] for of in self.moved[frame])
+        turned = lambda ways: np.einsum("nij,nj->ni", turns, ways @ rotation.T)
+        return turned(self.at) + turns @ origin + steps, turned(self.normals), tuple(map(turned, self.tangents))
 
 
 def temperatures(recording, field, frames):
@@ -115,7 +78,7 @@ def temperatures(recording, field, frames):
             yield {}, flags | {"no_contact"}, False
             continue
         flags |= {"out_of_range"} if not inside[frame, there].all() else set()
-        celsius, weights = values[frame, there], field.weights[there]
+        celsius, weights, at = values[frame, there], field.weights[there], field.placed(frame)[0]
         size = np.abs(celsius).max() + 300
         mean = (weights * celsius).sum() / weights.sum()
         found = {"temperature": Value(mean, size)}
@@ -123,7 +86,7 @@ def temperatures(recording, field, frames):
             member = there[index]
             found[name] = Value(celsius[index], size)
             found[f"{name}_taxel"] = Value(field.body.ids[field.members[member]])
-            found[f"{name}_position"] = Value(field.at[member], 1)
+            found[f"{name}_position"] = Value(at[member], 1)
         if field.chart and len(there) >= 3:
             away = field.places[there] - (weights[:, None] * field.places[there]).sum(axis=0) / weights.sum()
             root = np.sqrt(weights)
@@ -173,8 +136,9 @@ def distances(recording, field, frames):
         nearest = there[metres.argmin()]
         found["nearest"] = Value(metres.min(), 1)
         found["nearest_taxel"] = Value(field.body.ids[field.members[nearest]])
-        found["nearest_position"] = Value(field.at[nearest], 1)
-        found["nearest_normal"] = Value(field.normals[nearest], 1)
+        at, normals, _ = field.placed(frame)
+        found["nearest_position"] = Value(at[nearest], 1)
+        found["nearest_normal"] = Value(normals[nearest], 1)
         if field.chart:
             weights = 1 / metres**2
             found["proximity_centroid"] = Value((weights[:, None] * field.places[there]).sum(axis=0) / weights.sum(), 1)
@@ -252,7 +216,8 @@ def shears(recording, field, frames):
         if len(presses) == 0:
             yield {}, flags | {"no_contact"}, False
             continue
-        normal = -(newtons * np.where(pressed, pressure, 0))[presses, None] * field.normals[presses]
+        _, normals, tangents = field.placed(frame)
+        normal = -(newtons * np.where(pressed, pressure, 0))[presses, None] * normals[presses]
         if np.isnan(newtons[presses]).any():
             flags |= {"no_unit"}
         if len(there) == 0:
@@ -263,7 +228,7 @@ def shears(recording, field, frames):
         # What was measured along the normal, of which the matrix makes P.
         measured = (p - cross[0, 1:] @ lateral[:, there]) / cross[0, 0]
         along = cross[1:] @ np.vstack([measured, lateral[:, there]])
-        in_space = along[0][:, None] * field.tangents[0][there] + along[1][:, None] * field.tangents[1][there]
+        in_space = along[0][:, None] * tangents[0][there] + along[1][:, None] * tangents[1][there]
         # Differences from baselines are of larger numbers.
         large = g * (np.abs(side[:, there]) + np.abs(rest[there].T))
         terms = np.abs(cross[1:]) @ np.vstack([(p + np.abs(cross[0, 1:]) @ large) / cross[0, 0], large])
@@ -333,13 +298,13 @@ class Comparison:
     def __init__(self):
         self.cells, self.wrong, self.examples = Counter(), 0, []
         self.present, self.largest, self.touches = Counter(), {}, 0
+        self.touch_flags, self.in_world = Counter(), 0
 
     def off(self, letter, told, found, flags, contact):
         """What is wrong with a cell."""
         wrong = {}
         if told["contact"] != contact:
             wrong["contact"] = (told["contact"], contact)
-        # Those of a wish for poses, which these recordings have none of.
         if set(told["flags"]) != flags and found.get("shear_direction", 0) is not None:
             wrong["flags"] = (sorted(told["flags"]), sorted(flags))
         for name in LETTERS[letter]:
@@ -371,6 +336,8 @@ class Comparison:
     def take_touch(self, right, number, touch, where):
         self.touches += 1
         self.present.update(f"touches.{name}" for name in TOUCHES if name in touch)
+        self.in_world += touch["in"] == "world"
+        self.touch_flags.update(FLAGS & set(touch["flags"]))
         wrong = right.wrong(number, touch, self.largest)
         self.note(wrong, where | {"touch": touch["id"]})
         return wrong
@@ -396,6 +363,12 @@ def changed(told, rng, among=frozenset(name for names in LETTERS.values() for na
     return name, told | {name: value.tolist()}
 
 
+def flagged_otherwise(touch, rng):
+    """`touch` with one flag more or less, of those that are never too close to call."""
+    flag = str(rng.choice(sorted(FLAGS - {"still", "no_gradient"})))
+    return flag, touch | {"flags": sorted(set(touch["flags"]) ^ {flag})}
+
+
 def compare(recording, lines, of_touches, comparison, missed, rng):
     """Compares the lines that the program wrote for `recording`, with its touches by `of_touches` if there are any."""
     frames = recording.frames
@@ -418,11 +391,13 @@ def compare(recording, lines, of_touches, comparison, missed, rng):
                 if not comparison.off(letter, other, found, flags, contact):
                     missed.append([recording.name, number, field, letter, name])
                 comparison.largest = before
+        if of_touches:
+            of_touches.go_on(number, line["touches"])
         for touch in line.get("touches", []):
             wrong = comparison.take_touch(of_touches, number, touch, {"recording": recording.name, "frame": number})
             # A millionth is less than P strays in single precision.
             if recording.backend == "reference" and not wrong and rng.random() < 0.05:
-                name, other = changed(touch, rng, TOUCHES)
+                name, other = changed(touch, rng, TOUCHES) if rng.random() < 0.8 else flagged_otherwise(touch, rng)
                 if not of_touches.wrong(number, other, {}):
                     missed.append([recording.name, number, touch["id"], name])
     if number + 1 != len(frames.t):
@@ -442,7 +417,8 @@ def main():
         paths = recording.write(arguments.folder)
         outputs = [name for letter in recording.letters() for name in LETTERS[letter]]
         outputs += ["touches", "touches.taxels"] if recording.has_touches() else []
-        command = [arguments.somatic, "run", "--body", paths["glb"], "--source", paths["csv"], "--calibration", paths["toml"]]
+        outputs += ["touches.friction_sigma"] if "shear" in recording.letters() else []
+        command = [arguments.somatic, "run", "--body", paths["glb"], "--source", paths["frames"], "--calibration", paths["toml"]]
         command += ["--backend", recording.backend, "--outputs", ",".join(outputs), "--all-fields", "--sink", f"ndjson:{paths['ndjson']}"]
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
         if done.returncode not in (0, 3):
@@ -457,7 +433,8 @@ def main():
         for path in paths.values():
             path.unlink()
     json.dump({
-        "cells": comparison.cells.total(), "by_letter": comparison.cells, "touches": comparison.touches, "present": comparison.present, "wrong": comparison.wrong,
+        "cells": comparison.cells.total(), "by_letter": comparison.cells, "touches": comparison.touches, "present": comparison.present,
+        "touch_flags": comparison.touch_flags, "in_world": comparison.in_world, "wrong": comparison.wrong,
         "examples": comparison.examples, "largest": comparison.largest, "missed": missed,
     }, sys.stdout)
 

@@ -9,7 +9,7 @@ use super::bill::{Bill, Stage};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{count, one_line, title};
 
-/// Stages of letters that are not made of pressures.
+/// Stages of the other letters.
 const LETTERS: [&str; 3] = ["shear", "temperature", "proximity"];
 
 impl Bill {

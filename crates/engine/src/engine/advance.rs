@@ -63,7 +63,7 @@ impl Engine {
         self.intake.notes().last().map_or(&[], Vec::as_slice)
     }
 
-    /// The values that the last frame's letters beside pressure were made of, by
+    /// The values that the last frame's other letters were made of, by
     /// [`SensedTaxels::channels`](crate::scene::SensedTaxels::channels); empty before the first frame.
     #[must_use]
     pub fn values_sensed(&self) -> &[RawValue] {

@@ -52,7 +52,8 @@ pub(super) struct OnSkin {
     without_value: Vec<u32>,
     notes: Vec<(u32, TouchFlags)>,
     poses: LinkPoses,
-    /// What was read beside pressures in the last frame that touches were found in, where that is needed.
+    is_held: Vec<bool>,
+    /// What the host read in the last frame that touches were found in, where that is needed.
     row: Vec<RawValue>,
 }
 
@@ -101,6 +102,7 @@ impl OnSkin {
             without_value: Vec::new(),
             notes: Vec::new(),
             poses: LinkPoses::default(),
+            is_held: Vec::new(),
             row: Vec::new(),
         })
     }
@@ -189,7 +191,8 @@ impl OnSkin {
                 let number = percepts.frame_number(index);
                 check.compare((offset, number), &input, (&before, &self.touches), &found);
             }
-            flag_several(&found, &mut percepts.flags[index * plan.fields.len()..][..plan.fields.len()]);
+            let flags = &mut percepts.flags[index * plan.fields.len()..][..plan.fields.len()];
+            flag_several(&found, flags, &mut self.is_held);
             if let Some(sigmas) = &mut self.sigmas {
                 sigmas.add((plan, self.touches.skin()), raw, offset, pressures, &mut found);
             }
@@ -279,12 +282,13 @@ fn flag_of(reading: signal::Reading) -> TouchFlags {
     }
 }
 
-/// Flags the fields that hold parts of several of the touches `found`.
-fn flag_several(found: &TouchFrame, flags: &mut [Flags]) {
+/// Flags the fields that hold parts of several of the touches `found`. `is_held` is memory: by field, whether one holds a part of it.
+fn flag_several(found: &TouchFrame, flags: &mut [Flags], is_held: &mut Vec<bool>) {
     if found.touches.len() < 2 {
         return;
     }
-    let mut is_held = vec![false; flags.len()];
+    is_held.clear();
+    is_held.resize(flags.len(), false);
     for share in found.touches.iter().flat_map(|touch| found.fields(touch)) {
         let field = share.field as usize;
         if std::mem::replace(&mut is_held[field], true) {

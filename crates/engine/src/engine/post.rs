@@ -67,15 +67,17 @@ pub(super) struct Post<'a> {
 
 /// Flags every field that holds a taxel that `intake` has noted: stale, corrected in part, or out of range before it was corrected.
 pub(super) fn flag_noted(plan: &Plan, intake: &Intake, percepts: &mut Percepts) {
-    for (frame, stale) in intake.stale().iter().enumerate() {
-        flag_fields_of(plan, stale, (frame, Flags::STALE), percepts);
+    for (frame, stale) in intake.stale().iter().enumerate().filter(|(_, stale)| !stale.is_empty()) {
+        flag_fields_of(plan, |channel| stale.binary_search(&channel).is_ok(), (frame, Flags::STALE), percepts);
     }
     for (frame, notes) in intake.notes().iter().enumerate().filter(|(_, notes)| !notes.is_empty()) {
         for flag in [Flags::INCOMPLETE, Flags::FAULTY_INPUT, Flags::OUT_OF_RANGE] {
-            // As they are noted: ascending.
-            let taxels: Vec<usize> =
-                notes.iter().filter(|(_, reading)| flag_of(*reading) == flag).map(|(taxel, _)| *taxel).collect();
-            flag_fields_of(plan, &taxels, (frame, flag), percepts);
+            let is_noted = |channel: usize| {
+                // They ascend, and there may be several of one channel.
+                let own = &notes[notes.partition_point(|(noted, _)| *noted < channel)..];
+                own.iter().take_while(|(noted, _)| *noted == channel).any(|(_, reading)| flag_of(*reading) == flag)
+            };
+            flag_fields_of(plan, is_noted, (frame, flag), percepts);
         }
     }
 }
@@ -89,19 +91,16 @@ fn flag_of(reading: Reading) -> Flags {
     }
 }
 
-/// Flags every field that holds one of `noted` in a frame: channels of the body, ascending.
-fn flag_fields_of(plan: &Plan, noted: &[usize], (frame, flag): (usize, Flags), percepts: &mut Percepts) {
-    if noted.is_empty() {
-        return;
-    }
+/// Flags every field that holds one of what `is_noted` in a frame, of the channels of the body.
+fn flag_fields_of(
+    plan: &Plan,
+    is_noted: impl Fn(usize) -> bool,
+    (frame, flag): (usize, Flags),
+    percepts: &mut Percepts,
+) {
     let fields = plan.fields.len();
-    let mut channels = vec![false; plan.channels()];
-    for channel in noted.iter().filter_map(|taxel| plan.body_taxels.binary_search(taxel).ok()) {
-        channels[channel] = true;
-    }
     for (flags, field) in percepts.flags[frame * fields..][..fields].iter_mut().zip(plan.fields.iter()) {
-        let is_pressed_one = |member: &Member| channels[plan.channel_of(member.slot as usize)];
-        let is_noted = |channel: usize| noted.binary_search(&channel).is_ok();
+        let is_pressed_one = |member: &Member| is_noted(plan.body_taxels[plan.channel_of(member.slot as usize)]);
         let is_sensed_one = |member: &SensedMember| {
             is_noted(member.taxel) || member.values.iter().any(|&value| is_noted(plan.senses.channels[value]))
         };

@@ -9,7 +9,8 @@ bitflags! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable)]
     #[repr(transparent)]
     pub struct Flags: u32 {
-        /// The field is not in contact: everything that needs a touch is absent.
+        /// The field is not in contact: everything that needs a touch is absent. Of letter temperature: no taxel has a reading; of letter
+        /// proximity: none reads anything in range.
         const NO_CONTACT = 1 << 0;
         /// Only one taxel is pressed: there is no line through two points, no spread and no torsion.
         const ONE_TAXEL = 1 << 1;
@@ -28,7 +29,7 @@ bitflags! {
         /// A taxel's value was masked or altered: not finite, unbelievable, or distrusted by the calibration's checks.
         const FAULTY_INPUT = 1 << 7;
         /// A taxel's raw value lies outside the range that the calibration says the sensor has; it is kept. Of letter proximity also:
-        /// nothing is in range; of letter shear: it is left out.
+        /// nothing is in range; of letter shear: a tangential value is left out, and its taxel's normal one is kept.
         const OUT_OF_RANGE = 1 << 8;
         /// A taxel's value is missing and left out of every sum.
         const INCOMPLETE = 1 << 9;

@@ -25,7 +25,7 @@ impl Outputs {
         .union(Self::NEAREST_TAXEL)
         .union(Self::COVERED);
 
-    /// What letters beside pressure give: of shear, temperature and proximity.
+    /// What other letters give: of shear, temperature and proximity.
     pub const OF_OTHER_LETTERS: Self =
         Self::of_stage("shear").union(Self::of_stage("temperature")).union(Self::of_stage("proximity"));
 

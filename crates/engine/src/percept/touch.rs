@@ -10,7 +10,7 @@ bitflags! {
     /// [`Flags`](crate::percept::Flags) where both have one.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
     pub struct TouchFlags: u32 {
-        /// Only one taxel is pressed: no axis, no orientation, no spread. Or one alone of its taxels has three axes: no torsion.
+        /// Only one taxel is pressed: no axis, no orientation, no spread.
         const ONE_TAXEL = 1 << 0;
         /// The second and third farthest points are as good as equally far: orientation is in doubt.
         const TIE = 1 << 1;

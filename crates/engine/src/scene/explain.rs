@@ -102,6 +102,9 @@ const ON_HOST: [&str; 11] = [
     "proximity",
 ];
 
+/// Of a stage its name, whether it runs, what it goes over and of how many memberships, and why it might not run.
+type Row = (&'static str, bool, (usize, usize), &'static str);
+
 impl Plan {
     /// All stages, in the order that they run in.
     #[must_use]
@@ -123,8 +126,7 @@ impl Plan {
             own.fold((0, 0), |(fields, members), field| (fields + 1, members + field.sensed.len()))
         };
         let found_charted = (counts(&charted).0, 0);
-        // Of each stage whether it runs, what it goes over, and why it might not.
-        let rows = [
+        let rows: [Row; _] = [
             ("calibrate", true, slots, ""),
             ("change", self.has_changes(), (self.slots() - slots.0, 0), "no letter is `change`"),
             ("contact", true, counts(&all), ""),
@@ -150,41 +152,42 @@ impl Plan {
             ),
             ("proximity", is_letter(Receptor::Proximity), sensed(Receptor::Proximity), "no letter is `proximity`"),
         ];
-        let row = |&(name, runs, (over, memberships), idle): &(&'static str, bool, (_, _), &str)| {
-            let gives = match name {
-                "self_contacts" => Outputs::SELF_CONTACTS,
-                _ => Outputs::of_stage(name),
-            };
-            let mut asked: Vec<String> = (self.outputs() & gives).names().collect();
-            if name == "fit" {
-                let outputs = self.touch_outputs().unwrap_or(TouchOutputs::empty()) & TouchOutputs::FIT;
-                asked.extend(outputs.names().map(|name| format!("touches.{name}")));
-            }
-            let why = match (runs, asked.is_empty(), idle.is_empty()) {
-                (true, false, _) => format!("asked for: {}", asked.join(", ")),
-                (true, true, _) => self.needed_by(name).to_owned(),
-                (false, _, false) => idle.to_owned(),
-                (false, _, true) => "no output needs it".to_owned(),
-            };
-            PlannedStage {
-                name,
-                runs,
-                on_host: ON_HOST.contains(&name),
-                why,
-                gives,
-                over: if runs { over } else { 0 },
-                each: match name {
-                    "calibrate" | "change" => "value",
-                    "touches" | "fit" => "taxel",
-                    "self_contacts" => "touch",
-                    _ => "field",
-                },
-                memberships: if runs { memberships } else { 0 },
-                bytes_up: if name == "calibrate" { self.bytes_up() } else { 0 },
-                bytes_down: self.bytes_from(name),
-            }
+        rows.into_iter().map(|row| self.planned(row)).collect()
+    }
+
+    fn planned(&self, (name, runs, (over, memberships), idle): Row) -> PlannedStage {
+        let gives = match name {
+            "self_contacts" => Outputs::SELF_CONTACTS,
+            _ => Outputs::of_stage(name),
         };
-        rows.iter().map(row).collect()
+        let mut asked: Vec<String> = (self.outputs() & gives).names().collect();
+        if name == "fit" {
+            let outputs = self.touch_outputs().unwrap_or(TouchOutputs::empty()) & TouchOutputs::FIT;
+            asked.extend(outputs.names().map(|name| format!("touches.{name}")));
+        }
+        let why = match (runs, asked.is_empty(), idle.is_empty()) {
+            (true, false, _) => format!("asked for: {}", asked.join(", ")),
+            (true, true, _) => self.needed_by(name).to_owned(),
+            (false, _, false) => idle.to_owned(),
+            (false, _, true) => "no output needs it".to_owned(),
+        };
+        PlannedStage {
+            name,
+            runs,
+            on_host: ON_HOST.contains(&name),
+            why,
+            gives,
+            over: if runs { over } else { 0 },
+            each: match name {
+                "calibrate" | "change" => "value",
+                "touches" | "fit" => "taxel",
+                "self_contacts" => "touch",
+                _ => "field",
+            },
+            memberships: if runs { memberships } else { 0 },
+            bytes_up: if name == "calibrate" { self.bytes_up() } else { 0 },
+            bytes_down: self.bytes_from(name),
+        }
     }
 
     /// Why a stage runs that gives nothing that is asked for.

@@ -2,7 +2,8 @@
 //! bound on what single precision may lose.
 //!
 //! A stage has one name everywhere: `crates/engine/src/stage/<stage>.rs` says what is right, `shaders/<stage>.wgsl` and
-//! `crates/engine/src/backend/cpu/<stage>.rs` compute it in f32.
+//! `crates/engine/src/backend/cpu/<stage>.rs` compute it in f32. The stages shear, temperature and proximity are the host's alone, in f64
+//! (`crates/engine/src/engine/letters.rs`): they have neither a shader nor a bound, and give the same bits on every backend.
 //!
 //! **Bounds.** u = 2⁻²⁴ is the unit roundoff of single precision. WebGPU promises correctly rounded +, −, ×, and ÷ to
 //! 2.5 ulp (5u); a product may be fused into a sum, which only takes a rounding away. Every bound here is first order in

@@ -1,4 +1,4 @@
-//! Senses beside pressure: how raw values become temperatures, distances and tangential forces. In double precision.
+//! What the other letters are made of: how raw values become temperatures, distances and tangential forces. In double precision.
 //!
 //! Temperature: T = gain · r(raw − baseline) + offset, in °C, or with r(baseline − raw) if it is inverted. Distance: the same in m. r is
 //! the raw value itself, a table, or the temperature of a thermistor in a divider, by its B parameter: 1/T = 1/298.15 K + ln(R/R₂₅)/B.

@@ -95,12 +95,7 @@ impl Calibration {
         let (mut shear, matrix_at) = (file.shear.read(text)?, file.shear.matrix_at());
         let mut table_of = HashMap::new();
         for (id, keys) in named {
-            let index = id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
-                let made_for = file.body.as_ref().map_or(String::new(), |body| format!(" (the file is for `{body}`)"));
-                let name = id.get_ref();
-                let what = format!("[taxel.{name}] names a taxel that the body does not have; remove it{made_for}");
-                text.wrong(id.span(), what)
-            })?;
+            let index = index_of(&id, ids, file.body.as_deref(), text)?;
             if let Some(before) = table_of.insert(index, id.get_ref().clone()) {
                 let what = format!(
                     "[taxel.{}] is taxel {}, which has the table [taxel.{before}] already; keep one of the two",
@@ -156,6 +151,16 @@ impl Calibration {
         }
         Ok(made)
     }
+}
+
+/// The place among `ids` of the taxel whose table is called `id`, in a file that is for `body`.
+fn index_of(id: &Spanned<String>, ids: &[u32], body: Option<&str>, text: Text<'_>) -> Result<usize> {
+    id.get_ref().parse().ok().and_then(|id: u32| ids.binary_search(&id).ok()).ok_or_else(|| {
+        let made_for = body.map_or(String::new(), |body| format!(" (the file is for `{body}`)"));
+        let name = id.get_ref();
+        let what = format!("[taxel.{name}] names a taxel that the body does not have; remove it{made_for}");
+        text.wrong(id.span(), what)
+    })
 }
 
 fn check_checks(checks: &Checks) -> Result<()> {

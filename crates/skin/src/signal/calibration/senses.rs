@@ -1,4 +1,4 @@
-//! The tables of senses beside pressure: `[temperature]` and `[proximity]`.
+//! The tables `[temperature]` and `[proximity]`.
 
 use std::ops::{Range, RangeInclusive};
 

@@ -47,8 +47,8 @@ pub struct Truth {
     pub torsion: Option<f64>,
     /// Whether the indenter has slipped since the frame before.
     pub slips: Option<bool>,
-    /// How far the indenter's lowest point is above the skin, m, 0 while it presses; if the body has proximity taxels and the
-    /// file gives gaps.
+    /// How far the indenter's lowest point is above the skin, m, if the body has proximity taxels: 0 while it presses, else as the file's
+    /// `gap_m` has it. Absent of a touch of the whole body.
     pub gap_m: Option<f64>,
     /// The indenter's temperature, °C, if the file gives it.
     pub celsius: Option<f64>,
