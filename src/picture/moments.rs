@@ -152,7 +152,7 @@ impl Moments {
             return Err(Error::usage("the recording has no frames at that time").at(name));
         }
         let quantity = engine.plan().common_quantity().unwrap_or_default();
-        let calibrated = SenseRanges::of_calibration(engine.plan());
+        let calibrated = SenseRanges::of_calibration(engine.plan(), &senses);
         let known = match letter {
             Receptor::Temperature => calibrated.celsius.or(ranges.celsius),
             Receptor::Proximity => calibrated.distance_m.or(ranges.distance_m).map(|[_, most]| [0.0, most]),
