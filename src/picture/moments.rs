@@ -152,7 +152,7 @@ impl Moments {
             return Err(Error::usage("the recording has no frames at that time").at(name));
         }
         let quantity = engine.plan().common_quantity().unwrap_or_default();
-        let ends = ends_of(letter, &SenseRanges::of_calibration(engine.plan()), &ranges, max_force);
+        let ends = ends_of(letter, &SenseRanges::of_calibration(engine.plan(), &senses), &ranges, max_force);
         Ok(Self { shown, letter, ends, quantity })
     }
 

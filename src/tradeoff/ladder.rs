@@ -35,7 +35,7 @@ pub fn ladder(plan: &Plan) -> Vec<Rung> {
     for (index, stage) in explained.iter().enumerate() {
         let asked = plan.outputs() & stage.gives;
         let is_contact = stage.name == "contact";
-        let own = others.iter().find(|letter| letter.receptor.to_string() == stage.name);
+        let own = others.iter().find(|letter| Some(letter.receptor) == stage.letter);
         if letters.is_empty() {
             if own.is_none() {
                 continue;

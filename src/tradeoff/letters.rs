@@ -18,7 +18,7 @@ use crate::error::Result;
 use crate::field::FieldSet;
 use crate::percept::Outputs;
 use crate::scene::Plan;
-use crate::signal::{Calibration, Channel, Frame, Letter};
+use crate::signal::{Calibration, Channel, Frame, Letter, Receptor};
 
 /// The part of the whole time in which letters take turns.
 pub(super) const TIME_SHARE: f64 = 0.1;
@@ -128,9 +128,9 @@ pub(super) fn letter_costs(
 
 /// What the letters of `plan` give that are not among `letters`.
 fn outputs_of_others(plan: &Plan, letters: &[Letter]) -> Outputs {
-    let is_left_out = |name: &str| letters.iter().all(|letter| letter.receptor.to_string() != name);
-    let stages = plan.explain().into_iter().filter(|stage| is_left_out(stage.name));
-    stages.fold(Outputs::empty(), |sum, stage| sum | stage.gives) & Outputs::OF_OTHER_LETTERS
+    let is_left_out = |receptor: Receptor| letters.iter().all(|letter| letter.receptor != receptor);
+    let stages = plan.explain().into_iter().filter(|stage| stage.letter.is_some_and(is_left_out));
+    stages.fold(Outputs::empty(), |sum, stage| sum | stage.gives)
 }
 
 /// The same frames with a value for each channel of `body`: what a recording lacks is made up, as a letter without values costs nothing.

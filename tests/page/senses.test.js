@@ -23,6 +23,7 @@ const about = {
   scales: {
     temperature: { least: 20, most: 40, from: "grown" },
     proximity: { least: 0, most: 0.08, from: "raw range" },
+    shear: { least: 0, most: 0.3, from: "recording" },
   },
 };
 const [GOOD, MISSING, OUT_OF_RANGE, NOT_SENT] = [0, 1, 5, 7];
@@ -73,16 +74,17 @@ test("the coldest of a scale has a colour, and what is beyond an end has that of
   assert.deepEqual([shown(40), shown(99)], [1, 1]);
 });
 
-test("the largest tangential force so far has a round scale", () => {
+test("tangential forces have the scale of pressures where that is known by more", () => {
   const senses = new Senses(about, 6);
-  const take = (u, v) => {
-    const frame = { pressure: new Float32Array(6), health: new Uint8Array(6), shear: Float32Array.of(u, v) };
-    senses.take(frame);
-    return senses.shearScale;
+  const most = (shear, from) => {
+    senses.scales = { ...about.scales, shear };
+    return senses.shearEnds({ from })?.most ?? null;
   };
-  const scales = [take(0, 0), take(0.03, 0.04), take(0, -0.19), take(0.1, 0), take(6, 6)];
-  const rounded = scales.map((scale) => scale && Number(scale.toPrecision(6)));
-  assert.deepEqual(rounded, [null, 0.05, 0.2, 0.2, 10]);
+  const ends = (from) => ({ least: 0, most: 0.3, from });
+  for (const from of ["recording", "grown"])
+    assert.deepEqual([most(ends("grown"), from), most(ends("recording"), from), most(null, from)], [0.3, 0.3, null]);
+  for (const from of ["calibration", "raw range"])
+    assert.deepEqual([most(ends("recording"), from), most(ends("raw range"), from)], [null, 0.3]);
 });
 
 test("the letter of pressure is called so where it is the only one", () => {
@@ -317,7 +319,7 @@ test("what is shown lies above, is on its own scale, and says nothing of what wa
   assert.deepEqual([await last(), await source.textContent()], [1.4, "fixed to the recording’s maximum"]);
   await choose("shear");
   assert.equal(await title.textContent(), "Shear of a taxel, N");
-  assert.deepEqual([await last(), await source.textContent()], [0.5, "grown with the data so far"]);
+  assert.deepEqual([await last(), await source.textContent()], [0.3, "fixed to the recording’s maximum"]);
   // An autoscale is of what is shown.
   await page.locator(".legend-head button").click();
   assert.equal(await last(), 0.3);

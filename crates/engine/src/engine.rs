@@ -321,8 +321,9 @@ impl Engine {
     }
 
     /// Puts into `to`, in place of what it holds, what pressed on each link in the last frame, whatever touches it is of, in the body's
-    /// order: its total, and its wrench in the link's frame. A controller takes this off what it measures. The wrench is absent if a
-    /// pressed taxel has no unit or no area, or has three axes of which one is missing or faulty.
+    /// order: its total, and its wrench in the link's frame. A controller takes this off what it measures. The wrench is absent, as a
+    /// part would pass for the whole, if a pressed taxel has no unit or no area, or has three axes and a tangential value that is
+    /// missing, faulty or out of range. Of touches that are asked for their shear or wrench, flags say which.
     /// Nothing unless [`Scene::touches`](crate::scene::Scene::touches) asks for touches.
     ///
     /// ```

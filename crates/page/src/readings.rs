@@ -135,7 +135,7 @@ impl Readings {
         self.senses.as_ref().map_or(&[], |senses| &senses.shears)
     }
 
-    /// The least and greatest temperatures and distances that were read.
+    /// The least and greatest temperatures, distances and tangential forces that were read.
     pub(super) fn sense_ranges(&self) -> SenseRanges {
         self.senses.as_ref().map_or_else(SenseRanges::default, |senses| senses.ranges)
     }
@@ -188,8 +188,8 @@ impl Readings {
     pub(super) fn taxel(&mut self, snapshot: &Snapshot, taxel: usize) -> Reading {
         let Ok(channel) = self.plan.body_taxels.binary_search(&taxel) else {
             let sensed = self.senses.as_ref().and_then(|senses| {
-                let (at, (_, _, channels)) = senses.of.taxels.all().enumerate().find(|(_, own)| own.0 == taxel)?;
-                let value = senses.of.taxels.read(&self.plan, &snapshot.raw, &snapshot.sensed).nth(at)?;
+                let taxels = &senses.of.taxels;
+                let (value, channels) = taxels.read_one(taxel, &self.plan, &snapshot.raw, &snapshot.sensed)?;
                 Some(senses.reading(&value, channels))
             });
             return sensed.unwrap_or(Reading { raw: None, pressure: None, health: Health::LeftOut });
@@ -208,6 +208,7 @@ impl Readings {
             for (taxel, &(baseline, mask)) in self.plan.calibrations.iter_mut().zip(&snapshot.baselines) {
                 (taxel.baseline, taxel.mask) = (baseline, mask);
             }
+            self.plan.set_tangential_baselines(&snapshot.tangential_baselines);
         }
         changed
     }
@@ -243,7 +244,9 @@ mod tests {
     use crate::bundled;
     use crate::field::FieldSet;
     use crate::signal::{Calibration, Channel, Quantity};
+    use somatic_engine::backend::BackendKind;
     use somatic_engine::scene::Scene;
+    use somatic_engine::{Engine, Options};
 
     #[test]
     fn what_is_wrong_with_a_taxel_is_distinguished_from_zero() {
@@ -351,6 +354,7 @@ mod tests {
         assert_eq!(readings.shears(), [0.5, -0.25, 0.0, 0.0]);
         let ranges = readings.sense_ranges();
         assert_eq!((ranges.celsius, ranges.distance_m), (Some([21.5, 21.5]), Some([0.03, 0.03])));
+        assert_eq!(ranges.shear, Some([0.0, 0.5_f64.hypot(0.25)]));
         let [warm, far] = [2, 5].map(|taxel| readings.taxel(&snapshot, taxel));
         assert_eq!((warm.raw, warm.pressure, warm.health), (Some(21.5), Some(21.5), Health::Good));
         assert_eq!((far.raw, far.pressure, far.health), (Some(90.0), None, Health::OutOfRange));
@@ -371,5 +375,41 @@ mod tests {
         readings.read(&snapshot);
         assert_eq!(readings.health()[2..], [Health::NotSent as u8; 4]);
         assert!(readings.shears().iter().all(|shear| shear.is_nan() || *shear == 0.0));
+    }
+
+    #[test]
+    fn tangential_values_are_read_from_a_tare_on_as_the_engine_reads_them() {
+        let body = of_all_kinds();
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let calibration = Calibration::parse("[all]\nunit = \"N\"\n[shear]\nbaseline = [5, 5]\n", &ids).unwrap();
+        let seen = |tare: bool| {
+            let options = Options::default().calibration(calibration.clone()).backend(BackendKind::Reference);
+            let mut engine = Engine::new(&body, options.tare(tare)).unwrap();
+            let channels = Channel::all_of(&body);
+            let senses = PageSenses::new(&body, engine.plan(), &channels, SenseRanges::default()).unwrap();
+            let value_of: Vec<Option<usize>> = (0..engine.plan().channels()).map(Some).collect();
+            let mut readings = Readings::new(engine.plan().clone(), body.taxels.len(), &value_of, Some(&senses));
+            let mut snapshot = Snapshot::new(engine.plan());
+            let mut frame = engine.frame(0.0);
+            // At rest, then pressed by 2 N and pulled by 3 N and 4 N more.
+            for (number, values) in [[0.0, 100.0, 200.0], [2.0, 103.0, 204.0]].into_iter().enumerate() {
+                frame.t_s = number as f64;
+                for (name, value) in ["0", "0.u", "0.v"].into_iter().zip(values) {
+                    let at = engine.index_of(name).unwrap();
+                    frame.values[at] = RawValue::new(value);
+                }
+                engine.process_one(&frame).unwrap();
+            }
+            snapshot.take_baselines(engine.plan());
+            snapshot.raw[0] = RawValue::new(2.0);
+            snapshot.sensed = engine.values_sensed().to_vec();
+            readings.read(&snapshot);
+            let mut by_engine = Vec::new();
+            engine.sensed(&frame, &senses.taxels, &mut by_engine);
+            assert_eq!(by_engine[0].shear.map(|along| along as f32), readings.shears()[..2]);
+            [readings.shears()[0], readings.shears()[1]]
+        };
+        assert_eq!(seen(true), [3.0, 4.0]);
+        assert_eq!(seen(false), [98.0, 199.0], "from the file's rest");
     }
 }

@@ -72,7 +72,7 @@ impl Scale {
 }
 
 /// The least of …, 0.1, 0.2, 0.5, 1, 2, 5, 10, … that is at least `value` > 0.
-fn step_up(value: f64) -> f64 {
+pub(super) fn step_up(value: f64) -> f64 {
     let decade = 10_f64.powi(value.log10().floor() as i32);
     // The next decade's first where rounding has put `value` above the last.
     [1.0, 2.0, 5.0, 10.0, 20.0].into_iter().map(|step| step * decade).find(|step| *step >= value).unwrap_or(value)

@@ -29,6 +29,8 @@ impl PageSenses {
             let own = taxels.all().filter(|&(_, receptor, _)| receptor == wanted);
             own.map(|(taxel, ..)| taxel).collect::<Vec<usize>>()
         };
+        let mut sent = sent.to_vec();
+        sent.sort_unstable();
         let pulled = of_letter(Receptor::Shear);
         let tangents = pulled.iter().map(|&taxel| body.taxels[taxel].tangents_in_link().map(|axis| axis.to_array()));
         let json = json!({
@@ -40,8 +42,8 @@ impl PageSenses {
             "distance_colours": distance_colours().to_vec(),
         });
         Some(Self {
-            is_sent: taxels.channels().iter().map(|channel| sent.contains(channel)).collect(),
-            scales: SenseScales::new(SenseRanges::of_calibration(plan), recorded),
+            is_sent: taxels.channels().iter().map(|channel| sent.binary_search(channel).is_ok()).collect(),
+            scales: SenseScales::new(SenseRanges::of_calibration(plan, &taxels), recorded),
             taxels,
             json,
         })

@@ -1,5 +1,6 @@
 //! A frame as the engine's thread hands it over: as little work as possible, in memory that is used again.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use crate::signal::{Pose, RawValue};
@@ -28,6 +29,8 @@ pub(super) struct Snapshot {
     pub(super) calibration_changes: u64,
     /// By the plan's channels, the baseline and whether the taxel is left out.
     pub(super) baselines: Vec<(f64, bool)>,
+    /// By taxel, the raw tangential values at rest of those that have their own.
+    pub(super) tangential_baselines: BTreeMap<usize, [f64; 2]>,
     /// The links that the frame poses: world_from_link.
     pub(super) poses: Vec<(u32, Pose)>,
     /// Of the fields in contact, in their order.
@@ -55,6 +58,7 @@ impl Snapshot {
             sensed: Vec::new(),
             calibration_changes: 0,
             baselines: Vec::new(),
+            tangential_baselines: BTreeMap::new(),
             poses: Vec::new(),
             percepts: Vec::with_capacity(plan.fields.len()),
             touches: TouchFrame::default(),
@@ -72,6 +76,9 @@ impl Snapshot {
             self.calibration_changes = plan.calibration_changes;
             self.baselines.clear();
             self.baselines.extend(plan.calibrations.iter().map(|taxel| (taxel.baseline, taxel.mask)));
+            // Drift compensation leaves them as they are, and each copy takes memory.
+            let changed = plan.tangential_baselines().filter(|own| **own != self.tangential_baselines);
+            changed.into_iter().for_each(|own| self.tangential_baselines.clone_from(own));
         }
     }
 }

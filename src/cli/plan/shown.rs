@@ -9,9 +9,6 @@ use super::bill::{Bill, Stage};
 use crate::cli::table::{plain, shown};
 use crate::cli::words::{count, one_line, title};
 
-/// Stages of the other letters.
-const LETTERS: [&str; 3] = ["shear", "temperature", "proximity"];
-
 impl Bill {
     pub(super) fn text(&self) -> String {
         let mut text = format!("{}\n", title(&self.body));
@@ -50,7 +47,7 @@ impl Bill {
         let of_others: usize = self
             .stages
             .iter()
-            .filter(|stage| LETTERS.contains(&stage.planned.name))
+            .filter(|stage| stage.planned.letter.is_some())
             .map(|stage| stage.planned.memberships)
             .sum();
         match [self.memberships, of_others] {

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use clap::Arg;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use somatic::{Error, Receptor};
 
 /// Headings of flags that `-h` leaves out.
@@ -27,11 +27,13 @@ pub(in crate::cli) fn first(arg: Arg) -> Arg {
 
 /// Reads a letter.
 pub(in crate::cli) fn letter() -> impl TypedValueParser<Value = Receptor> {
-    one_of::<Receptor>(&["sustained", "change", "shear", "temperature", "proximity"])
+    one_of::<Receptor>(Receptor::NAMES.map(|(name, _)| name))
 }
 
 /// Reads one of `words`.
-pub(in crate::cli) fn one_of<T>(words: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+pub(in crate::cli) fn one_of<T>(
+    words: impl IntoIterator<Item = impl Into<PossibleValue>>,
+) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err = Error> + Clone + Send + Sync + 'static,
 {

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use somatic::internal::page::Mode;
 use somatic::internal::scene::{SenseRanges, SensedTaxels};
 use somatic::source::Source;
-use somatic::{Body, Engine, Error, Frame, RawValue, Result};
+use somatic::{Body, Engine, Error, Frame, Result};
 
 use super::super::stdio::say;
 
@@ -105,19 +105,17 @@ impl Recording {
         Some(largest.fold(0.0, f64::max)).filter(|&largest| largest > 0.0)
     }
 
-    /// The temperatures and distances that taxels of `body` read, unless finding them takes long.
+    /// The temperatures, distances and tangential forces that taxels of `body` read, unless finding them takes long.
     pub(super) fn sense_ranges(&self, engine: &Engine, body: &Body) -> SenseRanges {
         let mut ranges = SenseRanges::default();
         let sensed = SensedTaxels::new(engine.plan(), body);
-        if self.frames.len() * sensed.channels().len() > MAX_SEARCHED {
+        if sensed.channels().is_empty() || self.frames.len() * self.taxels.len() > MAX_SEARCHED {
             return ranges;
         }
-        let at: Vec<Option<usize>> =
-            sensed.channels().iter().map(|channel| self.taxels.iter().position(|own| own == channel)).collect();
+        let mut values = Vec::new();
         for frame in &self.frames {
-            let values: Vec<RawValue> =
-                at.iter().map(|at| at.map_or(RawValue::MISSING, |at| frame.values[at])).collect();
-            sensed.read(engine.plan(), &[], &values).for_each(|value| ranges.see(&value));
+            engine.sensed_alone(frame, &sensed, &mut values);
+            values.iter().for_each(|value| ranges.see(value));
         }
         ranges
     }

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::{Knobs, Plan, PlanField};
+use super::{Knobs, Plan, PlanField, outputs_of};
 use crate::percept::{Component, Outputs, TouchOutputs};
 use crate::signal::{Letter, Receptor};
 
@@ -23,6 +23,9 @@ pub struct PlannedStage {
     /// The outputs that it gives.
     #[serde(skip)]
     pub gives: Outputs,
+    /// The letter that it makes, if that is not made of pressures.
+    #[serde(skip)]
+    pub letter: Option<Receptor>,
     /// How many of `each` it goes over in a frame; 0 where it does not run, and where only a frame tells.
     pub over: usize,
     /// What it goes over, one of them: `field`, of *calibrate* and *change* `value`, of *touches* and *fit* `taxel`, of the whole skin, and
@@ -177,6 +180,7 @@ impl Plan {
             on_host: ON_HOST.contains(&name),
             why,
             gives,
+            letter: Receptor::OF_HOST.into_iter().find(|&letter| outputs_of(letter) == gives),
             over: if runs { over } else { 0 },
             each: match name {
                 "calibrate" | "change" => "value",

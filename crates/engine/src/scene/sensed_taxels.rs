@@ -39,13 +39,20 @@ pub struct SensedValue {
     pub shear: [f64; 2],
 }
 
-/// Least and greatest temperatures, °C, and distances, m.
+impl SensedValue {
+    /// The least distance that is read, m: nearer ones are this one.
+    pub const LEAST_DISTANCE_M: f64 = LEAST_M;
+}
+
+/// Least and greatest temperatures, °C, distances, m, and sizes of tangential forces, in the unit of P.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SenseRanges {
     /// °C; `None` where none is known.
     pub celsius: Option<[f64; 2]>,
     /// m; `None` where none is known.
     pub distance_m: Option<[f64; 2]>,
+    /// Of single taxels, in the unit of P; `None` where none is known.
+    pub shear: Option<[f64; 2]>,
 }
 
 impl SenseRanges {
@@ -55,7 +62,8 @@ impl SenseRanges {
         let range = match value.receptor {
             Receptor::Temperature => &mut self.celsius,
             Receptor::Proximity => &mut self.distance_m,
-            _ => return,
+            Receptor::Shear => &mut self.shear,
+            Receptor::Sustained | Receptor::Change => return,
         };
         let [low, high] = range.unwrap_or([number; 2]);
         *range = Some([low.min(number), high.max(number)]);
@@ -68,35 +76,58 @@ impl SenseRanges {
             (Some([low, high]), Some([l, h])) => Some([low.min(l), high.max(h)]),
             (one, other) => one.or(other),
         };
-        Self { celsius: both(self.celsius, other.celsius), distance_m: both(self.distance_m, other.distance_m) }
+        Self {
+            celsius: both(self.celsius, other.celsius),
+            distance_m: both(self.distance_m, other.distance_m),
+            shear: both(self.shear, other.shear),
+        }
     }
 
-    /// Those that the calibration of `plan` allows, where it has ends: of temperatures by raw ranges, of distances by the range too.
+    /// Those that the calibration of `plan` allows to its `taxels`, where it has ends: by raw ranges, of distances by the range too. Of
+    /// tangential forces without what `cross_axis` makes of P.
     #[must_use]
-    pub fn of_calibration(plan: &Plan) -> Self {
-        let ends = |by: &SenseCalibration| {
-            let own = std::iter::once(&by.all).chain(by.own.values());
-            let ends = own.flat_map(|sense| sense.raw_range.map(|end| sense.read(RawValue::new(end))));
-            let known: Option<Vec<f64>> = ends
-                .map(|end| match end {
-                    Reading::Value(value, _) if value.abs() <= calibrate::HUGE => Some(value),
-                    _ => None,
-                })
-                .collect();
-            let fold = |values: Vec<f64>| {
-                values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)])
-            };
-            known.map(fold)
+    pub fn of_calibration(plan: &Plan, taxels: &SensedTaxels) -> Self {
+        let own = |wanted: Receptor| {
+            let own = taxels.all().filter(move |&(_, receptor, _)| receptor == wanted);
+            own.map(|(taxel, ..)| taxel)
+        };
+        let ends = |by: &SenseCalibration, receptor: Receptor| {
+            let read = own(receptor).map(|taxel| by.of_taxel(taxel)).filter(|sense| !sense.mask);
+            let known: Vec<f64> =
+                read.flat_map(|sense| sense.raw_range.map(|end| sense.value_at(end))).collect::<Option<_>>()?;
+            known.into_iter().map(|end| [end; 2]).reduce(|[low, high], [end, _]| [low.min(end), high.max(end)])
+        };
+        let shear = |by: &ShearCalibration| {
+            let channels = own(Receptor::Shear).filter_map(|taxel| plan.body_taxels.binary_search(&taxel).ok());
+            let read = channels.filter(|&channel| !plan.calibrations[channel].mask);
+            let known: Vec<f64> = read.map(|channel| most_shear(by, plan, channel)).collect::<Option<_>>()?;
+            known.into_iter().reduce(f64::max).map(|most| [0.0, most])
         };
         let distance = |by: &SenseCalibration| match by.range_m {
             range_m if range_m.is_finite() => Some([0.0, range_m]),
-            _ => ends(by),
+            _ => ends(by, Receptor::Proximity),
         };
         Self {
-            celsius: plan.senses.temperature.as_ref().and_then(ends),
+            celsius: plan.senses.temperature.as_ref().and_then(|by| ends(by, Receptor::Temperature)),
             distance_m: plan.senses.proximity.as_ref().and_then(distance),
+            shear: plan.senses.shear.as_ref().and_then(shear),
         }
     }
+}
+
+/// The largest tangential force that the taxel of `channel` can read, if its range has ends: at a corner of what both values can be.
+fn most_shear(by: &ShearCalibration, plan: &Plan, channel: usize) -> Option<f64> {
+    let (taxel, calibration) = (plan.body_taxels[channel], &plan.calibrations[channel]);
+    let gains = by.gains_of(taxel, calibration.gain, calibration.unit_factor);
+    let [low, high] = by.range_of(taxel);
+    let corners = [[low, low], [low, high], [high, low], [high, high]];
+    let sizes = corners.map(|corner| {
+        let [along, across] = by.forces(by.rest_of(taxel), gains, 0.0, corner);
+        libm::hypot(along, across)
+    });
+    // Where there are no ends, a corner may be NaN.
+    let are_known = sizes.iter().all(|&size| size <= calibrate::HUGE);
+    are_known.then(|| sizes.into_iter().fold(0.0, f64::max))
 }
 
 impl SensedTaxels {
@@ -151,32 +182,49 @@ impl SensedTaxels {
         raw: &'a [RawValue],
         sensed: &'a [RawValue],
     ) -> impl Iterator<Item = SensedValue> + 'a {
+        self.taxels.iter().map(move |own| own.read(plan, raw, sensed))
+    }
+
+    /// The same of the taxel at `taxel` in the body alone, if it is one of them, with which of [`SensedTaxels::channels`] its values are.
+    #[must_use]
+    pub fn read_one(
+        &self,
+        taxel: usize,
+        plan: &Plan,
+        raw: &[RawValue],
+        sensed: &[RawValue],
+    ) -> Option<(SensedValue, [usize; 2])> {
+        let own = &self.taxels[self.taxels.binary_search_by_key(&taxel, |own| own.taxel).ok()?];
+        Some((own.read(plan, raw, sensed), own.values))
+    }
+}
+
+impl SensedTaxel {
+    fn read(&self, plan: &Plan, raw: &[RawValue], sensed: &[RawValue]) -> SensedValue {
         let value = |at: usize| sensed.get(at).copied().unwrap_or(RawValue::MISSING);
-        self.taxels.iter().map(move |own| {
-            let (raw_value, senses) = (value(own.values[0]), &plan.senses);
-            let (reading, shear) = match own.receptor {
-                Receptor::Shear => match &senses.shear {
-                    Some(by) => pulled(by, plan, own.taxel, raw, own.values.map(value)),
-                    None => (Reading::Missing, [0.0; 2]),
-                },
-                Receptor::Proximity => {
-                    let by = senses.proximity.as_ref().map(|by| (by.of_taxel(own.taxel), by.range_m));
-                    let reading = by.map_or(Reading::Missing, |(sense, range_m)| match sense.read(raw_value) {
-                        Reading::Value(distance_m, _) => {
-                            let is_near = distance_m <= range_m && !sense.end_beyond(raw_value).is_gt();
-                            Reading::Value(distance_m.max(LEAST_M), is_near)
-                        }
-                        reading => reading,
-                    });
-                    (reading, [0.0; 2])
-                }
-                _ => {
-                    let by = senses.temperature.as_ref();
-                    (by.map_or(Reading::Missing, |by| by.of_taxel(own.taxel).read(raw_value)), [0.0; 2])
-                }
-            };
-            SensedValue { taxel: own.taxel, receptor: own.receptor, raw: raw_value, reading, shear }
-        })
+        let (raw_value, senses) = (value(self.values[0]), &plan.senses);
+        let (reading, shear) = match self.receptor {
+            Receptor::Shear => match &senses.shear {
+                Some(by) => pulled(by, plan, self.taxel, raw, self.values.map(value)),
+                None => (Reading::Missing, [0.0; 2]),
+            },
+            Receptor::Proximity => {
+                let by = senses.proximity.as_ref().map(|by| (by.of_taxel(self.taxel), by.range_m));
+                let reading = by.map_or(Reading::Missing, |(sense, range_m)| match sense.read(raw_value) {
+                    Reading::Value(distance_m, _) => {
+                        let is_near = distance_m <= range_m && !sense.end_beyond(raw_value).is_gt();
+                        Reading::Value(distance_m.max(LEAST_M), is_near)
+                    }
+                    reading => reading,
+                });
+                (reading, [0.0; 2])
+            }
+            _ => {
+                let by = senses.temperature.as_ref();
+                (by.map_or(Reading::Missing, |by| by.of_taxel(self.taxel).read(raw_value)), [0.0; 2])
+            }
+        };
+        SensedValue { taxel: self.taxel, receptor: self.receptor, raw: raw_value, reading, shear }
     }
 }
 
@@ -206,5 +254,114 @@ fn pulled(
         Ok(Tangential { forces, .. }) => (Reading::Value(libm::hypot(forces[0], forces[1]), true), forces),
         Err(Unknown::Missing) => (Reading::Missing, [0.0; 2]),
         Err(Unknown::Faulty | Unknown::OutOfRange) => (Reading::Faulty, [0.0; 2]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundled;
+    use crate::field::FieldSet;
+    use crate::percept::Outputs;
+    use crate::scene::Scene;
+    use crate::signal::{Calibration, Letter};
+    use crate::touch;
+
+    fn sensing_hand() -> Body {
+        Body::from_bytes("sensing-hand", bundled::SENSING_HAND).unwrap()
+    }
+
+    fn plan(body: &Body, scene: &Scene, text: &str) -> Plan {
+        let kinds: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
+        let calibration = Calibration::parse_for(text, &kinds).unwrap();
+        Plan::new(body, &FieldSet::new(body).unwrap(), scene, &calibration).unwrap()
+    }
+
+    fn ranges(body: &Body, text: &str) -> SenseRanges {
+        let plan = plan(body, &Scene::default(), text);
+        SenseRanges::of_calibration(&plan, &SensedTaxels::new(&plan, body))
+    }
+
+    /// The indices of the taxels of `body` that `receptor` reads.
+    fn of_kind(body: &Body, receptor: Receptor) -> Vec<usize> {
+        (0..body.taxels.len()).filter(|&taxel| receptor.reads(body.taxels[taxel].modality)).collect()
+    }
+
+    #[test]
+    fn a_masked_taxel_and_a_code_without_a_reading_leave_the_ends_of_a_scale_as_they_are() {
+        let body = sensing_hand();
+        let [first, second] = [0, 1].map(|at| body.taxels[of_kind(&body, Receptor::Temperature)[at]].id);
+        let near = body.taxels[of_kind(&body, Receptor::Proximity)[0]].id;
+        let ranges = |text: &str| ranges(&body, text);
+        let text = "[temperature]\ngain = 0.5\nraw_range = [0, 8190]\n[proximity]\nraw_range = [10, 90]\n";
+        let plain = ranges(text);
+        assert_eq!((plain.celsius, plain.distance_m), (Some([0.0, 4095.0]), Some([0.01, 0.09])));
+        assert_eq!(ranges(&text.replace("8190]", "8190]\nmissing = [8190]")), plain);
+        let masked = format!("{text}[taxel.{first}]\nmask = true\n[taxel.{near}]\nmask = true\n");
+        assert_eq!(ranges(&masked), plain);
+        // One that is read counts, one that is not does not.
+        let own = |mask: bool| ranges(&format!("{text}[taxel.{second}]\nraw_range = [0, 9000]\nmask = {mask}\n"));
+        assert_eq!((own(false).celsius, own(true)), (Some([0.0, 4500.0]), plain));
+        // No temperature is under 0 K, and none is made up.
+        assert_eq!(ranges("[temperature]\nraw_range = [-300, 50]\n").celsius, None);
+        assert_eq!(ranges("").celsius, None);
+    }
+
+    #[test]
+    fn the_most_shear_is_that_of_the_farthest_corner_of_the_raw_range() {
+        let body = sensing_hand();
+        let shear = |text: &str| ranges(&body, &format!("[all]\nunit = \"N\"\n{text}")).shear;
+        let pulled = body.taxels[of_kind(&body, Receptor::Shear)[0]].id;
+        // From rest at 10 and 20 to −290 and −280, times 0.01 and 0.02.
+        let own = "[shear]\nbaseline = [10, 20]\ngain = [0.01, 0.02]\nraw_range = [-290, 100]\n";
+        let [_, most] = shear(own).unwrap();
+        assert!((most - 3.0_f64.hypot(6.2)).abs() < 1e-12, "{most}");
+        let wider = |mask: bool| {
+            let all = "[all]\nunit = \"N\"\n";
+            let taxel = format!("[taxel.{pulled}]\nshear_raw_range = [-9990, 0]\nmask = {mask}\n");
+            ranges(&body, &format!("{all}{own}{taxel}")).shear.unwrap()[1]
+        };
+        assert!((wider(false) - 100.0_f64.hypot(200.2)).abs() < 1e-9 && wider(true) == most);
+        assert_eq!([shear(""), shear("[shear]\ngain = 2\n")], [None; 2]);
+    }
+
+    #[test]
+    fn taxels_of_temperature_are_read_for_touches_alone() {
+        let body = sensing_hand();
+        let warm = of_kind(&body, Receptor::Temperature);
+        let read = |scene: Scene| {
+            let plan = plan(&body, &scene.outputs(Outputs::TOTAL), "");
+            let sensed = SensedTaxels::new(&plan, &body);
+            let of_letter = |wanted: Receptor| {
+                let own = sensed.all().filter(|&(_, receptor, _)| receptor == wanted);
+                own.map(|(taxel, ..)| taxel).collect::<Vec<_>>()
+            };
+            [Receptor::Temperature, Receptor::Shear, Receptor::Proximity].map(of_letter)
+        };
+        let touches = || Scene::default().touches(touch::Options::default());
+        assert!(!warm.is_empty());
+        assert_eq!(read(touches()), [warm, of_kind(&body, Receptor::Shear), Vec::new()]);
+        // What reads pressures alone has neither.
+        let none: [Vec<usize>; 3] = Default::default();
+        assert_eq!(read(touches().letters(Letter::all_of(&[Receptor::Sustained], &[]))), none);
+        assert_eq!(read(Scene::default()), none);
+    }
+
+    #[test]
+    fn one_taxel_reads_what_it_reads_among_all() {
+        let body = sensing_hand();
+        let text = "[all]\nunit = \"N\"\n[proximity]\nrange = 80\n";
+        let plan = plan(&body, &Scene::default().touches(touch::Options::default()), text);
+        let taxels = SensedTaxels::new(&plan, &body);
+        let values = |count: usize| (0..count).map(|at| RawValue::new((at % 50) as f64)).collect::<Vec<_>>();
+        let (raw, sensed) = (values(plan.channels()), values(taxels.channels().len()));
+        let all: Vec<SensedValue> = taxels.read(&plan, &raw, &sensed).collect();
+        let channels = taxels.all().map(|(_, _, channels)| channels);
+        assert!(all.len() > 10);
+        for (value, channels) in all.iter().zip(channels) {
+            assert_eq!(taxels.read_one(value.taxel, &plan, &raw, &sensed), Some((*value, channels)));
+        }
+        let others = (0..body.taxels.len()).filter(|taxel| all.iter().all(|value| value.taxel != *taxel));
+        assert!(others.map(|taxel| taxels.read_one(taxel, &plan, &raw, &sensed)).all(|read| read.is_none()));
     }
 }

@@ -23,6 +23,7 @@
 use super::layout::Knot;
 use super::{SLACK, U};
 use crate::percept::Flags;
+pub(crate) use crate::signal::HUGE;
 use crate::signal::{RawValue, Response, TaxelCalibration};
 
 /// Bit of a taxel's status that leaves it out of every sum; the other bits are [`Flags`].
@@ -269,8 +270,6 @@ fn knots_up_to<K>(knots: &[K], raw: impl Fn(&K) -> f64, x: f64) -> usize {
     if is_there { guess + 1 } else { knots.partition_point(|knot| raw(knot) <= x) }
 }
 
-/// 2⁶⁰.
-pub(crate) const HUGE: f64 = 1_152_921_504_606_846_976.0;
 /// 2⁻⁶⁰.
 pub(crate) const TINY: f64 = 1.0 / HUGE;
 

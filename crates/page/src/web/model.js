@@ -84,18 +84,17 @@ export class Model extends Reported {
   get scaleMax() {
     // Shares of a scale of their own.
     if (this.sense === "temperature" || this.sense === "proximity") return 1;
-    return this.autoscale ?? this.grownShear ?? this.scale.max;
+    return this.autoscale ?? this.shearEnds?.most ?? this.scale.max;
   }
 
   /** Where the scale comes from. */
   get scaleFrom() {
-    return this.grownShear === null ? this.scale.from : "grown";
+    return this.shearEnds?.from ?? this.scale.from;
   }
 
-  /** The upper end of the scale of tangential forces, where the one of pressures is of what was read; else null. */
-  get grownShear() {
-    const isOfData = this.scale.from === "recording" || this.scale.from === "grown";
-    return this.sense === "shear" && isOfData ? (this.senses?.shearScale ?? null) : null;
+  /** While tangential forces are shown, their scale where it is not the one of pressures; else null. */
+  get shearEnds() {
+    return this.sense === "shear" ? (this.senses?.shearEnds(this.scale) ?? null) : null;
   }
 
   /** Whether a body without a source is shown. */
@@ -182,10 +181,8 @@ export class Model extends Reported {
     if (frame.pressure && frame.health) {
       this.pressure = frame.pressure;
       this.health = frame.health;
-      const before = this.grownShear;
       this.senses?.take(frame);
       this.showSense();
-      if (this.grownShear !== before) this.tell("scale");
       if (this.autoscale !== null) this.autoscale = Math.max(this.autoscale, this.largestPressure());
     }
     if (frame.pose) this.pose(frame.pose);

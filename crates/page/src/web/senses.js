@@ -4,7 +4,7 @@ import { HEALTH } from "./wire.js";
 
 /** @typedef {"pressure" | "shear" | "temperature" | "proximity"} Sense */
 /** @typedef {{least: number, most: number, from: string}} Ends */
-/** @typedef {{temperature: Ends | null, proximity: Ends | null}} SenseScales */
+/** @typedef {{temperature: Ends | null, proximity: Ends | null, shear: Ends | null}} SenseScales */
 /** @typedef {{shear: number[], tangents: number[][][], temperature: number[], proximity: number[], temperature_colours: number[][],
  *   distance_colours: number[][], scales: SenseScales}} SensesOfWelcome */
 
@@ -34,8 +34,6 @@ export class Senses {
     this.health = new Uint8Array(taxels).fill(HEALTH.indexOf("missing"));
     /** Along both tangents. @type {Float32Array} */
     this.shear = new Float32Array(2 * about.shear.length);
-    /** The largest tangential force of all frames so far. */
-    this.largestShear = 0;
   }
 
   /** @param {import("./wire.js").Frame} frame */
@@ -43,18 +41,17 @@ export class Senses {
     if (frame.pressure) this.values = frame.pressure;
     if (frame.health) this.health = frame.health;
     if (frame.shear) this.shear = frame.shear;
-    for (const taxel of this.pulled.keys()) {
-      const shear = this.shownShear(taxel);
-      if (shear > this.largestShear) this.largestShear = shear;
-    }
   }
 
-  /** The upper end of a scale of what was pulled so far, in steps of 1, 2 and 5; null where nothing was. */
-  get shearScale() {
-    if (!(this.largestShear > 0)) return null;
-    const power = 10 ** Math.floor(Math.log10(this.largestShear));
-    const steps = [1, 2, 5, 10].map((digit) => digit * power);
-    return steps.find((step) => step >= this.largestShear) ?? this.largestShear;
+  /**
+   * The scale of tangential forces, where it is not the one of pressures, `pressures`: one that is known is for both, but for a range
+   * of their own.
+   * @param {{from: string}} pressures
+   */
+  shearEnds(pressures) {
+    const own = this.scales.shear;
+    const isOfData = pressures.from === "recording" || pressures.from === "grown";
+    return own && (isOfData || own.from === "raw range") ? own : null;
   }
 
   /**
@@ -85,7 +82,7 @@ export class Senses {
   }
 
   /**
-   * The ends of a sense's scale, °C or m; null of pressures and shear, which have that of P, or where nothing is known.
+   * The ends of a sense's scale, °C or m; null of pressures and shear, which are in the unit of P, or where nothing is known.
    * @param {Sense} sense
    */
   ends(sense) {

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use super::calibration::{Calibration, TaxelCalibration};
 use super::frame::RawValue;
 use super::response::Response;
-use super::sense::{Reading, UNBELIEVABLE};
+use super::sense::{HUGE, Reading};
 use crate::body::{Body, Modality};
 use crate::error::{Result, failed};
 
@@ -76,7 +76,7 @@ pub(super) struct Corrected {
 
 /// The number of `raw`, unless it is too large for one.
 fn believed(raw: RawValue) -> Option<f64> {
-    raw.number().filter(|number| number.abs() <= UNBELIEVABLE)
+    raw.number().filter(|number| number.abs() <= HUGE)
 }
 
 impl Calibration {

@@ -34,6 +34,8 @@ pub use fsr::FsrCircuit;
 pub use intake::{Intake, IntakeState};
 pub use letter::{Letter, Mark, Receptor};
 pub use response::{FsrResponse, FsrSignal, Response};
+#[doc(hidden)]
+pub use sense::HUGE;
 pub use sense::{Reading, Sense, SenseCalibration, SenseResponse, ShearCalibration};
 pub use unit::{Quantity, UnitOfP};
 pub use wiring::{WiredBoard, Wiring};

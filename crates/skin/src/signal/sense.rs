@@ -12,8 +12,9 @@ use super::response::Response;
 
 /// 0 °C, K.
 pub(super) const ZERO_CELSIUS_K: f64 = 273.15;
-/// Sizes beyond which a raw value is not believed, as of pressures.
-pub(super) const UNBELIEVABLE: f64 = 1_152_921_504_606_846_976.0;
+/// 2⁶⁰: what is larger is not believed, be it a raw value or what is made of one.
+#[doc(hidden)]
+pub const HUGE: f64 = 1_152_921_504_606_846_976.0;
 
 /// What a raw value is in a sense.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,17 +139,26 @@ impl Sense {
         if raw.is_missing() {
             return Reading::Missing;
         }
-        let Some(number) = raw.number().filter(|number| !self.mask && number.abs() <= UNBELIEVABLE) else {
+        let Some(number) = raw.number().filter(|number| !self.mask && number.abs() <= HUGE) else {
             return Reading::Faulty;
         };
         if self.missing.contains(&(number as f32)) {
             return Reading::Missing;
         }
-        let value = self.response.at(self.above(number)).map(|response| self.gain * response + self.offset);
-        match value.filter(|&value| value.abs() <= UNBELIEVABLE && value >= self.least) {
+        match self.value_at(number) {
             Some(value) => Reading::Value(value, (self.raw_range[0]..=self.raw_range[1]).contains(&number)),
             None => Reading::Faulty,
         }
+    }
+
+    /// What the raw value `number` stands for, °C or m, also if the taxel is masked or `missing` lists it; `None` if it cannot be.
+    #[must_use]
+    pub fn value_at(&self, number: f64) -> Option<f64> {
+        if number.abs() > HUGE {
+            return None;
+        }
+        let value = self.response.at(self.above(number)).map(|response| self.gain * response + self.offset);
+        value.filter(|&value| value.abs() <= HUGE && value >= self.least)
     }
 }
 
@@ -341,6 +351,12 @@ mod tests {
         assert_eq!(sense.read(RawValue::new(30_000.0)), Reading::Missing);
         assert_eq!(sense.read(RawValue::FAULTY), Reading::Faulty);
         assert_eq!(sense.read(RawValue::new(1e19)), Reading::Faulty);
-        assert_eq!(Sense { mask: true, ..sense }.read(RawValue::new(1.0)), Reading::Faulty);
+        let masked = Sense { mask: true, ..sense };
+        assert_eq!(masked.read(RawValue::new(1.0)), Reading::Faulty);
+        // What the numbers stand for is known all the same.
+        assert_eq!(
+            [1.0, 30_000.0, 1e19, f64::INFINITY].map(|number| masked.value_at(number)),
+            [Some(1.0), Some(30_000.0), None, None]
+        );
     }
 }

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::percept::{Outputs, TouchOutputs};
 use crate::signal::Receptor;
 use crate::stage::calibrate::Table;
-use crate::stage::{Sums, layout};
+use crate::stage::{Sums, force, layout};
 
 impl Plan {
     /// The taxels of its fields, as indices of the body, and how many values each has: three where its shear is asked for.
@@ -41,10 +41,31 @@ impl Plan {
         &self.members[field.first..field.first + field.count]
     }
 
+    /// How many newtons are one unit of P of `channel`, by its unit and its taxel's area; `None` if one of these is not known.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn newtons_per_p(&self, channel: usize) -> Option<f64> {
+        force::newtons_per_p(self.calibrations[channel].quantity, self.areas[channel])
+    }
+
     /// The weight of member `member` of `field`, as the layout has it.
     #[doc(hidden)]
     pub fn weight(&self, field: &PlanField, member: usize) -> f64 {
         field.weights.get(member).copied().unwrap_or_else(|| self.members[field.first + member].weight.into())
+    }
+
+    /// By the taxel's place in the body, the raw tangential values at rest of those that have their own, where any are read: what a tare
+    /// changes of them.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn tangential_baselines(&self) -> Option<&BTreeMap<usize, [f64; 2]>> {
+        self.senses.shear.as_ref().map(|shear| &shear.own_baselines)
+    }
+
+    /// Takes these over, where any are read.
+    #[doc(hidden)]
+    pub fn set_tangential_baselines(&mut self, baselines: &BTreeMap<usize, [f64; 2]>) {
+        self.senses.shear.iter_mut().for_each(|shear| shear.own_baselines.clone_from(baselines));
     }
 
     /// How many taxels' pressures percepts keep.
@@ -60,8 +81,13 @@ impl Plan {
 
     /// Whether a letter or touches give what `receptor` reads, beside wrenches.
     pub(in super::super) fn gives(&self, receptor: Receptor) -> bool {
-        let of_touches = self.touch_outputs.is_some_and(|outputs| outputs.contains(TouchOutputs::SHEAR));
-        self.letters.iter().any(|letter| letter.receptor == receptor) || (receptor == Receptor::Shear && of_touches)
+        let of_touches = match receptor {
+            Receptor::Shear => TouchOutputs::SHEAR,
+            Receptor::Temperature => TouchOutputs::TEMPERATURE,
+            Receptor::Sustained | Receptor::Change | Receptor::Proximity => TouchOutputs::empty(),
+        };
+        self.letters.iter().any(|letter| letter.receptor == receptor)
+            || self.touch_outputs.is_some_and(|outputs| outputs.intersects(of_touches))
     }
 
     /// Keeps the pressures that touches of the whole body are found in: those of the first letter `sustained`.

@@ -19,8 +19,6 @@ const FLOAT32: u8 = 7;
 const POINT_BYTES: usize = 20;
 const PRESSURE_AT: usize = 12;
 const TAXEL_AT: usize = 16;
-/// Nearer distances are read as this one, m, and are written as 0.
-const LEAST_M: f64 = 1e-4;
 
 pub(super) fn vector(v: DVec3) -> Vector3 {
     Vector3 { x: v.x, y: v.y, z: v.z }
@@ -70,7 +68,10 @@ fn numbers_of(value: &SensedValue) -> Option<[f64; 2]> {
     match (value.receptor, value.reading) {
         (Receptor::Shear, Reading::Value(..)) => Some(value.shear),
         (Receptor::Temperature, Reading::Value(celsius, _)) => Some([celsius; 2]),
-        (Receptor::Proximity, Reading::Value(distance_m, _)) if distance_m <= LEAST_M => Some([0.0; 2]),
+        // Nearer ones are read as this one.
+        (Receptor::Proximity, Reading::Value(distance_m, _)) if distance_m <= SensedValue::LEAST_DISTANCE_M => {
+            Some([0.0; 2])
+        }
         // Also where it is out of range: it is not missing, and a calibration says what is in range.
         (Receptor::Proximity, Reading::Value(distance_m, _)) => Some([distance_m * 1e3; 2]),
         _ => None,

@@ -18,8 +18,8 @@ const NAMED_LINKS: usize = 4;
 /// The links whose wrench can be computed.
 pub(super) struct LinkWrenches {
     links: Vec<LinkWrench>,
-    /// By value of a frame, which of these links its taxel is of; and that taxel, if the value counts only while it is pressed.
-    link_of_value: Vec<Option<(usize, Option<usize>)>>,
+    /// By value of a frame, which of these links its taxel is of, if it is a normal value: tangential ones count only while it is pressed.
+    link_of_value: Vec<Option<usize>>,
     /// Which of them lack values in this frame; memory.
     lacks: Vec<bool>,
     /// Why others have none, a line each.
@@ -95,8 +95,8 @@ impl LinkWrenches {
             }
         }
         let value = |sent: Option<(usize, Axis)>| {
-            let (taxel, axis) = sent?;
-            Some((link_of_taxel[taxel]?, Some(taxel).filter(|_| axis != Axis::Normal)))
+            let (taxel, _) = sent.filter(|(_, axis)| *axis == Axis::Normal)?;
+            link_of_taxel[taxel]
         };
         let link_of_value = sent.into_iter().map(value).collect();
         let is_none_known = links.is_empty() && unknown.len() == 1;
@@ -123,8 +123,10 @@ impl LinkWrenches {
     }
 
     /// The wrench of each link, by its place among [`Self::names`]: Σ Aᵢ(−Pᵢnᵢ + sᵢ) over all of its taxels, whatever touches they are
-    /// of, and the torque about the link's origin. A link with a missing value has none, tangential ones where nothing presses
-    /// aside: a part would pass for the whole. A value that came and was rejected adds nothing, as in all sums.
+    /// of, and the torque about the link's origin. A link has none in a frame that lacks the normal value of one of its taxels, or in
+    /// which it is not known how a pressed one pulls: where a tangential value is missing, faulty or out of range. A part would pass
+    /// for the whole. A normal value that came and was rejected adds nothing, as in all sums. Who reads the topic sees its messages pause:
+    /// stamps tell how old the last one is.
     pub(super) fn messages(
         &mut self,
         time_ns: u64,
@@ -133,12 +135,9 @@ impl LinkWrenches {
     ) -> impl Iterator<Item = (usize, WrenchStamped)> {
         let Self { links, link_of_value, lacks, .. } = self;
         lacks.fill(false);
-        let is_pressed = |taxel: usize| readings.pressure(taxel).is_some_and(|pressure| pressure > 0.0);
-        let counts = |(_, taxel): &(usize, Option<usize>)| taxel.is_none_or(is_pressed);
-        let missing = missing.iter().filter_map(|&value| *link_of_value.get(value)?).filter(counts);
-        missing.for_each(|(link, _)| lacks[link] = true);
+        missing.iter().filter_map(|&value| *link_of_value.get(value)?).for_each(|link| lacks[link] = true);
         let whole = links.iter().enumerate().zip(lacks).filter(|(_, lacks)| !**lacks);
-        whole.map(move |((index, link), _)| (index, link.message(time_ns, readings)))
+        whole.filter_map(move |((index, link), _)| Some((index, link.message(time_ns, readings)?)))
     }
 }
 
@@ -150,7 +149,7 @@ fn wrench_taxels(
     sent: &BTreeSet<(usize, Axis)>,
     is_read: impl Fn(Channel) -> bool,
 ) -> Result<Vec<WrenchTaxel>, Unknown> {
-    if plan.letters().first().is_none_or(|letter| letter.receptor != Receptor::Sustained) {
+    if !plan.letters().iter().any(|letter| letter.receptor == Receptor::Sustained) {
         return Err(Unknown::NotSustained);
     }
     let mut taxels = Vec::new();
@@ -161,12 +160,10 @@ fn wrench_taxels(
             continue;
         }
         let taxel = &body.taxels[index];
-        let newton_at_one = match calibration.quantity {
-            Quantity::Count => return Err(Unknown::NoUnit),
-            Quantity::Pascal if taxel.area > 0.0 => taxel.area,
-            Quantity::Pascal => return Err(Unknown::NoArea),
-            Quantity::Newton => 1.0,
-        };
+        let newton_at_one = plan.newtons_per_p(channel).ok_or(match calibration.quantity {
+            Quantity::Count => Unknown::NoUnit,
+            Quantity::Pascal | Quantity::Newton => Unknown::NoArea,
+        })?;
         let has_pulls = taxel.modality == Modality::Force3;
         let pulls = || [Axis::U, Axis::V].into_iter();
         if has_pulls && !pulls().all(|axis| is_read(Channel::of_taxel(taxel.id, axis))) {
@@ -187,19 +184,21 @@ fn wrench_taxels(
 }
 
 impl LinkWrench {
-    fn message(&self, time_ns: u64, readings: &Readings) -> WrenchStamped {
+    /// `None` if it is not known how a pressed taxel with three axes pulls.
+    fn message(&self, time_ns: u64, readings: &Readings) -> Option<WrenchStamped> {
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
         for taxel in &self.taxels {
             let Some(pressure) = readings.pressure(taxel.taxel).filter(|&pressure| pressure > 0.0) else { continue };
             let mut own = taxel.force_at_one_in_link * pressure;
-            if let Some((tangents, [su, sv])) = taxel.pulls_at_one_in_link.zip(readings.pull(taxel.taxel)) {
+            if let Some(tangents) = taxel.pulls_at_one_in_link {
+                let [su, sv] = readings.pull(taxel.taxel)?;
                 own += su * tangents[0] + sv * tangents[1];
             }
             force += own;
             torque += taxel.position_in_link.cross(own);
         }
         let wrench = Wrench { force: vector(force), torque: vector(torque) };
-        WrenchStamped { header: header(time_ns, &self.name), wrench }
+        Some(WrenchStamped { header: header(time_ns, &self.name), wrench })
     }
 }
 
@@ -212,6 +211,7 @@ pub(super) fn of_touch(time_ns: u64, link: &str, wrench: &percept::Wrench) -> Wr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::Letter;
     use crate::{BackendKind, Calibration, Engine, Options, RawValue, Scene, bundled, touch};
 
     fn hand() -> (Body, Vec<u32>) {
@@ -321,9 +321,12 @@ mod tests {
         assert_eq!(remarks(&body, newtons, with_touches(), &ids), "");
     }
 
+    /// Beyond the range of tangential values.
+    const BEYOND: f64 = 1000.0;
+
     /// A hand with taxels of three axes, pressed and pulled: an engine and its frame.
     fn pulled_hand(body: &Body, ids: &[u32], scene: Scene) -> (Engine, crate::Frame) {
-        let calibration = "[all]\ngain = 0.01\nunit = \"N\"\n[shear]\ngain = 0.02\n";
+        let calibration = "[all]\ngain = 0.01\nunit = \"N\"\n[shear]\ngain = 0.02\nraw_range = [-99, 999]\n";
         let engine = engine(body, ids, calibration, scene);
         let mut frame = engine.frame(0.0);
         for (index, value) in frame.values.iter_mut().enumerate() {
@@ -376,11 +379,33 @@ mod tests {
         frame.values[taxel] = RawValue::new(0.0);
         let (right, unpressed) = by_engine(&frame);
         assert!(right.contains_key(link) && unpressed.contains_key(link), "what nothing presses pulls nowhere");
-        // A value that was rejected adds nothing, and its taxel's normal force stays.
+        // Nor is it known what is rejected: a part would pass for the whole.
         frame.values[taxel] = RawValue::new((taxel * 7 % 11) as f64);
-        frame.values[at] = RawValue::FAULTY;
-        let (right, faulty) = by_engine(&frame);
-        assert!(!right.contains_key(link) && ![&found[link], &unpressed[link]].contains(&&faulty[link]));
+        for rejected in [RawValue::FAULTY, RawValue::new(BEYOND)] {
+            frame.values[at] = rejected;
+            let (right, unknown) = by_engine(&frame);
+            assert!(!right.contains_key(link) && !unknown.contains_key(link), "{rejected:?}");
+            assert!(unknown.len() + 1 == found.len(), "the other links have theirs");
+        }
+    }
+
+    #[test]
+    fn pressures_are_known_in_whatever_order_the_letters_are() {
+        let body = Body::from_bytes("sensing-hand", bundled::body("sensing-hand").unwrap()).unwrap();
+        let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
+        let found = |letters: &[Receptor]| {
+            let scene = Scene::default().letters(Letter::all_of(letters, &[])).touches(None);
+            let (engine, frame) = pulled_hand(&body, &ids, scene);
+            let mut wrenches = LinkWrenches::new(&body, engine.plan(), &Channel::all_of(&body));
+            let by_link = wrenches_by_link(&mut wrenches, &body, &engine, &frame);
+            (by_link, wrenches.remarks().join("\n"))
+        };
+        let (usual, remarks) = found(&[Receptor::Sustained, Receptor::Shear]);
+        assert!(usual.len() > 1 && remarks.is_empty(), "{remarks}");
+        assert_eq!(found(&[Receptor::Shear, Receptor::Sustained]), (usual.clone(), remarks.clone()));
+        assert_eq!(found(&[Receptor::Change, Receptor::Shear, Receptor::Sustained]), (usual, remarks));
+        let (none, why) = found(&[Receptor::Shear, Receptor::Change]);
+        assert!(none.is_empty() && why.contains("add letter sustained"), "{why}");
     }
 
     #[test]
