@@ -258,7 +258,7 @@ impl Engine {
         post.flag_restart(&raw, 0, &mut self.percepts);
         orient_again(&self.plan, &raw, &mut self.percepts, &mut self.pressed);
         let first_bound = check.as_ref().map_or(0, |check| check.bounds.len());
-        post.place(frames, &raw, 0, &mut self.percepts, &self.post);
+        post.place(frames, &raw, 0, &mut self.percepts, &mut self.post);
         for (offset, frame) in frames.iter().enumerate() {
             // As the backend left them: post-processing may put the last frame's percepts in their place.
             let left = check.is_some().then(|| FieldState::after(&self.plan, &self.percepts, raw.first + offset));

@@ -79,7 +79,7 @@ impl Check {
         }
         post.flag_restart(raw, offset, &mut self.right);
         let before: Vec<world_motion::Memory> = self.post.fields.iter().map(|field| field.world_motion).collect();
-        post.place(std::slice::from_ref(frame), raw, offset, &mut self.right, &self.post);
+        post.place(std::slice::from_ref(frame), raw, offset, &mut self.right, &mut self.post);
         for (field, bound) in post.plan.fields.iter().zip(&mut bounds) {
             // Such a position is made of the raw values alone, alike on both sides.
             if !field.parts.is_empty()

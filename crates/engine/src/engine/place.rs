@@ -20,13 +20,14 @@ const FRAMES_IN_TURN: usize = 16;
 /// Cells whose normals are brought to unit length together.
 const AT_ONCE: usize = 16;
 
-/// Puts the centroids of `of.frames` on the skin: positions, normals, and whether they are in the world.
-pub(super) fn all_frames(of: Frames<'_>, percepts: &mut Percepts) {
+/// Puts the centroids of `of.frames` on the skin: positions, normals, and whether they are in the world. `now` is memory for what is
+/// known of a frame.
+pub(super) fn all_frames(of: Frames<'_>, percepts: &mut Percepts, now: &mut Now) {
     let (fields, frames) = (of.plan.fields.len(), of.frames.len());
     let threads = parallel::threads().min((frames * fields).div_ceil(CELLS_A_TASK));
     let mut cells = percepts.place_cells(of.raw.first + of.offset, frames);
     if threads < 2 {
-        run_of_frames(of, 0..frames, &mut cells);
+        run_of_frames(of, 0..frames, &mut cells, now);
         return;
     }
     let a_run = frames.div_ceil(4 * threads).max(CELLS_A_TASK.div_ceil(fields));
@@ -37,22 +38,22 @@ pub(super) fn all_frames(of: Frames<'_>, percepts: &mut Percepts) {
         runs.push((range, run));
         cells = later;
     }
-    parallel::for_each(threads, runs, |(range, mut cells)| run_of_frames(of, range, &mut cells));
+    parallel::for_each(threads, runs, |(range, mut cells)| run_of_frames(of, range, &mut cells, &mut Now::default()));
 }
 
-fn run_of_frames(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>) {
+fn run_of_frames(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>, now: &mut Now) {
     let (plan, links, frames) = (of.plan, of.links, &of.frames[range.clone()]);
     let first = of.number_of(range.start);
     with_widest!(Level::new(), simd => with_vectors_of(simd, plan, links, (first, frames), cells));
     if !plan.spread_slots.is_empty() {
-        link_by_link(of, range, cells);
+        link_by_link(of, range, cells, now);
     }
 }
 
 /// Places the fields on several links once more, each member by its own link, in the frames that say where links are.
-fn link_by_link(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>) {
+fn link_by_link(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>, now: &mut Now) {
     let fields = of.plan.fields.len();
-    let mut now = Now::default();
+    now.forget();
     for (row, frame) in range.enumerate().filter(|&(_, frame)| of.links.may_pose(&of.frames[frame])) {
         let in_world = of.links.are_posed(&of.frames[frame]);
         for (index, field) in of.plan.fields.iter().enumerate() {
@@ -60,7 +61,7 @@ fn link_by_link(of: Frames<'_>, range: Range<usize>, cells: &mut PlaceCells<'_>)
             if field.parts.is_empty() || cells.flags[cell].contains(Flags::NO_CONTACT) {
                 continue;
             }
-            match of.position(field, frame, &mut now) {
+            match of.position(field, frame, now) {
                 Ok(position) => cells.put(cell, position, DVec3::ZERO, in_world),
                 Err(why) => {
                     // Of its touches some may be in the world all the same.

@@ -145,10 +145,11 @@ impl Post<'_> {
         raw: &RawBatch<'_>,
         offset: usize,
         percepts: &mut Percepts,
-        state: &PostState,
+        state: &mut PostState,
     ) {
         if self.plan.stages().position {
-            place::all_frames(self.frames(frames, raw, offset, &state.raw_before), percepts);
+            let frames = self.frames(frames, raw, offset, &state.raw_before);
+            place::all_frames(frames, percepts, &mut state.room.now);
         }
     }
 
