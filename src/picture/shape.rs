@@ -233,9 +233,13 @@ impl Dots {
         let mut slices = Vec::with_capacity(2 * self.places.len());
         for (taxel, colours) in of_taxel.iter_mut().enumerate() {
             let radius = self.radii[taxel];
-            let lift = if self.are_dots[taxel] { self.dot_lift_m / radius } else { LIFT };
+            // Lifts are in radii of each slice: one that is much higher than its radius has the same height with its rim.
+            let [rim_lift, lift] = match self.are_dots[taxel] {
+                true => [1.0 / RIM, 1.0].map(|share| share * self.dot_lift_m / radius),
+                false => [LIFT; 2],
+            };
             if rims {
-                slices.push(self.slice(taxel, middle, (RIM * radius, lift), colour::RIM, (0.0, TAU)));
+                slices.push(self.slice(taxel, middle, (RIM * radius, rim_lift), colour::RIM, (0.0, TAU)));
             }
             if colours.is_empty() {
                 colours.push(colour::REST);
@@ -376,6 +380,10 @@ mod tests {
         let slices = all.slices(&[], DVec3::ZERO, false);
         let lift_m = |taxel: usize| slices[taxel].lift * slices[taxel].radius;
         assert!(lift_m(16) > lift_m(0) && slices.len() == 18, "{} and {}", lift_m(16), lift_m(0));
+        // Each over its own rim.
+        let slices = all.slices(&[], DVec3::ZERO, true);
+        let lifts_m: Vec<f32> = slices.iter().map(|slice| slice.lift * slice.radius).collect();
+        assert!(lifts_m.len() == 36 && lifts_m.chunks(2).all(|own| own[1] > own[0]), "{lifts_m:?}");
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl Numbers {
         let low = if low > 0.0 && low < 0.5 * high { 0.0 } else { low };
         let high = if high < 0.0 && high > 0.5 * low { 0.0 } else { high };
         let [low, high] = if low == high {
-            let half = if low == 0.0 { 1.0 } else { low.abs() * 0.1 };
+            let half = if low == 0.0 || self == Self::Whole { 1.0 } else { low.abs() * 0.1 };
             [if low == 0.0 { 0.0 } else { low - half }, high + half]
         } else {
             let step = self.step(high - low, 8);
@@ -94,6 +94,7 @@ mod tests {
             (range, numbers.ticks(range, 4))
         };
         assert_eq!(axis(Numbers::Whole, [9.0, 9.0]), ([8.0, 10.0], vec![8.0, 9.0, 10.0]));
+        assert_eq!(axis(Numbers::Whole, [205.0, 205.0]).1, [204.0, 205.0, 206.0]);
         assert_eq!(axis(Numbers::Whole, [8.0, 9.0]), ([8.0, 9.0], vec![8.0, 9.0]));
         assert_eq!(axis(Numbers::Whole, [200.0, 213.0]), ([200.0, 214.0], vec![200.0, 205.0, 210.0]));
         assert_eq!(axis(Numbers::Any, [9.0, 9.0]).1, [8.5, 9.0, 9.5], "what is not whole");
