@@ -131,8 +131,9 @@ fn each_quantity_is_plotted_in_the_letter_that_gives_it_with_its_unit() {
 fn a_panel_without_values_says_why() {
     let skin = Skin::new();
     std::fs::write(skin.at("senses.toml"), "[all]\nunit = \"kPa\"\n[proximity]\nunit = \"mm\"\nrange = 10\n").unwrap();
-    let svg = skin.plot("nearest,slip_ratio,torsion,warmest_taxel").join("\n");
-    for text in ["nothing in range", "no slips_at in the calibration", "only one taxel pressed", "torsion [Pa m]"] {
+    let svg = skin.plot("nearest,slip_ratio,torsion,warmest_taxel,total_sigma").join("\n");
+    for text in ["nothing in range", "no slips_at in the calibration", "no noise in the calibration", "torsion [Pa m]"]
+    {
         assert_eq!(svg.matches(text).count(), 1, "{text}");
     }
     // The ids of its axis are whole: 11 and its neighbours.
