@@ -168,15 +168,7 @@ impl Moments {
         }
         let quantity = engine.plan().common_quantity().unwrap_or_default();
         let calibrated = SenseRanges::of_calibration(engine.plan());
-        let known = match letter {
-            Receptor::Temperature => calibrated.celsius.or(ranges.celsius),
-            Receptor::Proximity => calibrated.distance_m.or(ranges.distance_m).map(|[_, most]| [0.0, most]),
-            _ => Some([0.0, max_force]),
-        };
-        let ends = match known.unwrap_or_default() {
-            [least, most] if least < most => [least, most],
-            [least, _] => [least, least + 1.0],
-        };
+        let ends = ends_of(letter, &calibrated, &ranges, max_force);
         Ok(Self { shown, letter, ends, quantity })
     }
 
@@ -264,6 +256,19 @@ impl Moments {
             }
         }
         Ok(pictures)
+    }
+}
+
+/// The ends of the colours of `letter`, in SI units: those of the calibration, or of all that was `read`.
+fn ends_of(letter: Receptor, calibrated: &SenseRanges, read: &SenseRanges, max_force: f64) -> [f64; 2] {
+    let known = match letter {
+        Receptor::Temperature => calibrated.celsius.or(read.celsius),
+        Receptor::Proximity => calibrated.distance_m.or(read.distance_m).map(|[_, most]| [0.0, most]),
+        _ => Some([0.0, max_force]),
+    };
+    match known.unwrap_or_default() {
+        [least, most] if least < most => [least, most],
+        [least, _] => [least, least + 1.0],
     }
 }
 

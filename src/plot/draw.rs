@@ -234,12 +234,18 @@ impl<'a> Plot<'a> {
         for quantity in [PEAK, INTEGRAL] {
             self.draw_key(pen, quantity, &gathered.p_unit, self.page.maps(column, quantity))?;
         }
-        let [peaks, integrals] = [PEAK, INTEGRAL].map(|quantity| self.page.maps(column, quantity));
-        // Taxels of one map are never as near to the other as those that a line parts.
-        let between = (peaks.right() + integrals.left) / 2;
-        pen.line(&[(between, peaks.top), (between, peaks.bottom())], FAINT, 1.0)?;
+        let areas: Vec<Area> = [PEAK, INTEGRAL]
+            .into_iter()
+            .flat_map(|quantity| (0..count).map(move |index| self.page.map(column, quantity, index, count)))
+            .collect();
+        // No two maps look like one.
+        for pair in areas.windows(2) {
+            let between = (pair[0].right() + pair[1].left) / 2;
+            pen.line(&[(between, pair[0].top), (between, pair[0].bottom())], FAINT, 1.0)?;
+        }
         // Below the keys, where no map reaches.
-        self.draw_length(pen, (integrals.right(), integrals.bottom() + 52))
+        let last = self.page.maps(column, INTEGRAL);
+        self.draw_length(pen, (last.right(), last.bottom() + 52))
     }
 
     /// A length, which is the same in all maps.
