@@ -33,7 +33,7 @@ struct Plotted {
 impl Plotted {
     fn gather(mut self, wanted: Outputs, fields: &[String], raised: &mut Option<PyErr>) -> Result<Option<Gathered>> {
         let body = &self.body.inner;
-        let wanted = wanted_of(body, wanted);
+        let wanted = wanted_of(body, fields, wanted)?;
         let scene = Scene::default().outputs(outputs_for(wanted)).fields(fields.to_vec());
         let calibration = self.calibration.map(|calibration| calibration.inner);
         let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(BATCH);

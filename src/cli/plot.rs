@@ -69,13 +69,13 @@ pub(super) struct Arguments {
     #[command(flatten)]
     export: ExportFlags,
 
-    /// Begin at this time of the recording, such as 60s.
+    /// Begin at this time after the recording's start, such as 60s [default: 0].
     ///
-    /// A bare number is in seconds.
+    /// A bare number is in seconds. The axis has the recording's own times.
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     from: Option<f64>,
 
-    /// End at this time of the recording, such as 90s.
+    /// End at this time after the recording's start, such as 90s [default: its end].
     ///
     /// A bare number is in seconds.
     #[arg(long, value_name = "TIME", value_parser = seconds)]
@@ -154,7 +154,7 @@ fn gather(asked: &Setup, wanted: Outputs, stop: &AtomicBool, to: &Path) -> Resul
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let mut source = input.open(&Channel::all_of(&body), asked)?;
     source.report_stale();
-    let wanted = wanted_of(&body, wanted);
+    let wanted = wanted_of(&body, &asked.fields, wanted)?;
     let mut options = asked.options(&body, &ids, RECORDED_BATCH)?;
     options.scene.outputs = outputs_for(wanted);
     let mut engine = Engine::new(&body, options)?;

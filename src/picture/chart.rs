@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::colour::{PAPER, linear};
 use super::labels::{self, Labels, PlacedId, half_of_id};
-use super::shape::{Disc, Dots, RIM};
+use super::shape::{Disc, DiscKind, Dots, RIM};
 use super::touch::Moment;
 use super::view::{Arrangement, View};
 use super::{FieldColours, Options, Picture, arranged, arrows, checked, counted, fan};
@@ -41,7 +41,7 @@ pub struct ChartPicture<'a> {
     modalities: Vec<Modality>,
     /// By place in the chart, the axes x, y and z of the taxel's link along u and v, as its tangents lie in the chart.
     link_axes: Vec<[DVec2; 3]>,
-    /// For the colours of fields.
+    /// For the colours of fields; with ids, each as large as any kind leaves room for.
     dots: Dots,
     /// For what taxels read, each as large as its own kind leaves room for; with ids, as any kind.
     dots_by_kind: Dots,
@@ -78,9 +78,12 @@ impl<'a> ChartPicture<'a> {
         let side = held.iter().map(|&taxel| body.taxels[taxel].area.sqrt()).fold(0.0, f64::max);
         let extent = field.radius_m().max(10.0 * side);
         let dots = Dots::at(held.iter().map(|&taxel| places[taxel]).collect(), vec![DVec3::Z; held.len()], extent);
-        // No disc may cover the id of another.
         let kinds = held.iter().map(|&taxel| &body.taxels[taxel]);
-        let dots_by_kind = if ids { dots.clone() } else { dots.clone().by_kind(kinds) };
+        // No disc may cover the id of another.
+        let [dots, dots_by_kind] = match ids {
+            true => [dots.clone(), dots],
+            false => [dots.clone().of_all_kinds(kinds.clone()), dots.by_kind(kinds)],
+        };
         let kind = format!("{:?}", chart.kind).to_lowercase();
         let taxels = counted(field.members.len(), "taxel");
         let about = format!(" · {taxels}, {kind} chart, distortion {:.1} %", 100.0 * chart.distortion);
@@ -150,7 +153,7 @@ impl<'a> ChartPicture<'a> {
         };
         // The colours of what taxels read replace those of fields.
         let (title, key) = (moment.titled(&self.name), vec![(None, time)]);
-        let on = |place: usize| (discs[place].colour, discs[place].is_other);
+        let on = |place: usize| (discs[place].colour, discs[place].kind != DiscKind::Shown);
         let (mut picture, arrangement) = self.drawn(&title, key, (dots, slices), on, label)?;
         let Some(most) = moment.shear_ends() else { return Ok(picture) };
         let arrow = |&(taxel, force): &(usize, DVec3)| {

@@ -62,7 +62,7 @@ pub struct Options {
 /// # Errors
 /// There is nothing to draw, no adapter, a size that cannot be drawn, or a device that stopped answering.
 pub fn of_body(body: &Body, fields: &[Field], options: &Options) -> Result<Picture> {
-    let dots = Dots::from_body(body);
+    let dots = Dots::from_body(body).of_all_kinds(body.taxels.iter());
     let shown = FieldColours::for_fields(fields, &options.fields, &dots);
     let title = format!("{} · {}", stem(&body.name), counted(body.taxels.len(), "taxel"));
     let prepared = Prepared::new(body, dots, (fields, options), &title, shown.key(fields))?;

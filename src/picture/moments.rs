@@ -46,6 +46,19 @@ impl Times {
         }
     }
 
+    /// Why no frame of the recording is shown, whose least and greatest times are `span_s`, if it has frames.
+    fn missed(self, span_s: Option<[f64; 2]>) -> String {
+        let Some([first_s, last_s]) = span_s else { return "the recording has no frames".to_owned() };
+        let asked = match self {
+            Self::Most => String::new(),
+            Self::At(t_s) => format!(" up to {t_s} s"),
+            Self::Span { from_s, to_s, .. } if to_s == f64::INFINITY => format!(" from {from_s} s on"),
+            Self::Span { from_s, to_s, .. } if from_s == f64::NEG_INFINITY => format!(" up to {to_s} s"),
+            Self::Span { from_s, to_s, .. } => format!(" from {from_s} to {to_s} s"),
+        };
+        format!("the recording has no frames{asked}; give a time of its own, from {first_s} to {last_s} s")
+    }
+
     /// How long an animation shows each picture, s.
     #[must_use]
     pub fn picture_s(self) -> f64 {
@@ -108,8 +121,10 @@ impl Moments {
         let (mut shown, mut max_force) = (Vec::<Shown>::new(), 0.0_f64);
         let (mut next_s, mut most) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         let mut list = Vec::new();
+        let mut span_s: Option<[f64; 2]> = None;
         for frame in frames {
             let frame = frame?;
+            span_s = Some(span_s.map_or([frame.t_s; 2], |[l, m]| [l.min(frame.t_s), m.max(frame.t_s)]));
             engine.process_one(&frame)?;
             let found = engine.percepts().touches(0);
             found.iter().for_each(|found| trails.follow(frame.t_s, found));
@@ -149,7 +164,7 @@ impl Moments {
             shown.push(Shown { t_s: frame.t_s, touches, ..read(body, letter, &list, &sensed) });
         }
         if shown.is_empty() {
-            return Err(Error::usage("the recording has no frames at that time").at(name));
+            return Err(Error::usage(times.missed(span_s)).at(name));
         }
         let quantity = engine.plan().common_quantity().unwrap_or_default();
         let ends = ends_of(letter, &SenseRanges::of_calibration(engine.plan(), &senses), &ranges, max_force);

@@ -18,14 +18,19 @@ const SMOOTH_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 const RADIUS_SHARE: f64 = 0.40;
 /// Maximum radius of a disc, in typical radii.
 const MAX_RADIUS_RATIO: f64 = 2.0;
+/// Radius of discs of one size at most, as a share of the distance to the nearest other: their rims touch.
+const TOUCHING_SHARE: f64 = 0.43;
+/// Taxels of another kind are dots of this share of the radius of small discs of the kind that is shown.
+const OTHER_SHARE: f64 = 0.45;
 /// Radius of the dark rim, in radii.
 pub(super) const RIM: f64 = 1.16;
 /// Radius of the rim of a taxel that is part of a touch, in radii.
 const TOUCHED_RIM: f64 = 1.32;
 /// Offset of discs towards the eye, in radii, so that a curved surface does not hide them; of discs of another kind, which are
-/// behind.
+/// behind; and of small ones over them, in radii of the largest of those.
 const LIFT: f64 = 0.6;
 const OTHER_LIFT: f64 = 0.3;
+const DOT_LIFT: f64 = 0.85;
 /// Fields with taxels nearer than this many typical distances are neighbours.
 const NEIGHBOUR_SPACINGS: f64 = 1.6;
 /// Maximum number of slices of a disc.
@@ -39,10 +44,18 @@ pub(super) struct Disc {
     pub(super) colour: [u8; 3],
     /// The colour of the wide rim of a taxel that is part of a touch.
     pub(super) touched: Option<[u8; 3]>,
-    /// Whether it measures something else than what is shown: it is behind, and as large as the nearest of any kind leaves room for.
-    pub(super) is_other: bool,
-    /// The share of its radius that is drawn.
-    pub(super) share: f64,
+    /// What it measures.
+    pub(super) kind: DiscKind,
+}
+
+/// Whether a taxel measures what is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DiscKind {
+    Shown,
+    /// It does not: a disc behind others, as large as they are.
+    Behind,
+    /// It does not: a small dot behind others.
+    Small,
 }
 
 /// The discs of taxels.
@@ -53,8 +66,9 @@ pub(super) struct Dots {
     pub(super) normals: Vec<DVec3>,
     /// m.
     pub(super) radii: Vec<f64>,
-    /// Those that the nearest of any kind leaves room for, m.
-    narrow_radii: Vec<f64>,
+    /// Which lie over the others as dots, and how far these are lifted towards the eye, m.
+    are_dots: Vec<bool>,
+    dot_lift_m: f64,
     /// Typical distance of neighbours, m.
     spacing_m: f64,
 }
@@ -74,7 +88,6 @@ impl Dots {
         for (radius, taxel) in dots.radii.iter_mut().zip(&body.taxels) {
             *radius = radius.min(largest_radius(taxel));
         }
-        dots.narrow_radii.clone_from(&dots.radii);
         dots
     }
 
@@ -83,40 +96,51 @@ impl Dots {
         let gaps = gaps(&places);
         let spacing_m = median(&gaps).unwrap_or((0.1 * extent_m).max(1e-3));
         let radii: Vec<f64> = gaps.iter().map(|gap| radius(*gap, spacing_m)).collect();
-        Self { places, normals, narrow_radii: radii.clone(), radii, spacing_m }
+        Self { are_dots: vec![false; places.len()], dot_lift_m: 0.0, places, normals, radii, spacing_m }
     }
 
-    /// The same of these `taxels`, each as large as the nearest of its own kind leaves room for, where others are drawn small.
+    /// The same of these `taxels`, each as large as the nearest of its own kind leaves room for, where others are drawn small or not at
+    /// all. Skin has discs that grow with its spacing; sensors in between are points, so all of a kind have one size.
     pub(super) fn by_kind<'a>(mut self, taxels: impl Iterator<Item = &'a Taxel>) -> Self {
-        // What is pressed is one skin, with one axis or three.
-        let is_skin = |kind: Modality| kind.is_pressed();
         let taxels: Vec<&Taxel> = taxels.collect();
-        let mut kinds: Vec<Modality> = Vec::new();
-        for taxel in &taxels {
-            let is_known = |kind: &Modality| *kind == taxel.modality || is_skin(*kind) && is_skin(taxel.modality);
-            if !kinds.iter().any(is_known) {
-                kinds.push(taxel.modality);
-            }
-        }
+        let kinds = kinds_of(&taxels);
         if kinds.len() < 2 {
             return self;
         }
-        let mut own_gaps = vec![None; taxels.len()];
-        for kind in &kinds {
-            let is_own = |index: &usize| {
-                let modality = taxels[*index].modality;
-                modality == *kind || is_skin(modality) && is_skin(*kind)
-            };
-            let own: Vec<usize> = (0..taxels.len()).filter(is_own).collect();
-            let places: Vec<DVec3> = own.iter().map(|&index| self.places[index]).collect();
-            own.iter().zip(gaps(&places)).for_each(|(&index, gap)| own_gaps[index] = gap);
-        }
-        let spacing_m = median(&own_gaps).unwrap_or(self.spacing_m);
-        for (index, gap) in own_gaps.into_iter().enumerate() {
-            let wide = radius(gap, spacing_m).min(largest_radius(taxels[index]));
-            self.radii[index] = wide.max(self.narrow_radii[index]);
+        let gaps_of = |own: &Vec<usize>| gaps(&own.iter().map(|&index| self.places[index]).collect::<Vec<_>>());
+        let own_gaps: Vec<Vec<Option<f64>>> = kinds.iter().map(gaps_of).collect();
+        let spacing_m = median(&own_gaps.concat()).unwrap_or(self.spacing_m);
+        for (own, gaps) in kinds.iter().zip(own_gaps) {
+            let is_skin = own.iter().any(|&index| taxels[index].modality.is_pressed());
+            let usual_m = radius(low_quarter(gaps.iter().flatten().copied()), spacing_m);
+            for (&index, gap) in own.iter().zip(gaps) {
+                let room_m = match gap {
+                    gap if is_skin => radius(gap, spacing_m),
+                    Some(gap) => usual_m.min(TOUCHING_SHARE * gap),
+                    None => usual_m,
+                };
+                self.radii[index] = room_m.min(largest_radius(taxels[index]));
+            }
         }
         self
+    }
+
+    /// The same for pictures that show all kinds: as [`Dots::by_kind`], where what is no skin, if there is any, lies as small dots over
+    /// the rest.
+    pub(super) fn of_all_kinds<'a>(self, taxels: impl Iterator<Item = &'a Taxel> + Clone) -> Self {
+        let mut dots = self.by_kind(taxels.clone());
+        let taxels: Vec<&Taxel> = taxels.collect();
+        let kinds = kinds_of(&taxels);
+        let skin = kinds.iter().max_by_key(|own| (taxels[own[0]].modality.is_pressed(), own.len()));
+        let Some(skin) = skin.filter(|_| kinds.len() > 1) else { return dots };
+        let small_m = OTHER_SHARE * low_quarter(skin.iter().map(|&index| dots.radii[index])).unwrap_or(f64::INFINITY);
+        dots.are_dots = vec![true; taxels.len()];
+        skin.iter().for_each(|&index| dots.are_dots[index] = false);
+        dots.dot_lift_m = DOT_LIFT * skin.iter().map(|&index| dots.radii[index]).fold(0.0, f64::max);
+        for (radius, _) in dots.radii.iter_mut().zip(&dots.are_dots).filter(|(_, is_dot)| **is_dot) {
+            *radius = radius.min(small_m);
+        }
+        dots
     }
 
     /// Typical distance of neighbours, m.
@@ -153,9 +177,15 @@ impl Dots {
     /// The `discs` relative to `middle`, unlit: a colour is what the legend says.
     pub(super) fn flat_slices(&self, discs: &[Disc], middle: DVec3, rims: bool) -> Vec<Slice> {
         let mut slices = Vec::with_capacity(2 * discs.len());
-        for (taxel, &Disc { colour, touched, is_other, share }) in discs.iter().enumerate() {
-            let (whole, lift) =
-                if is_other { (self.narrow_radii[taxel], OTHER_LIFT) } else { (self.radii[taxel], LIFT) };
+        let shown = discs.iter().zip(&self.radii).filter(|(disc, _)| disc.kind == DiscKind::Shown);
+        let usual_m = low_quarter(shown.map(|(_, &radius)| radius)).unwrap_or(f64::INFINITY);
+        for (taxel, &Disc { colour, touched, kind }) in discs.iter().enumerate() {
+            let own = self.radii[taxel];
+            let (whole, lift, share) = match kind {
+                DiscKind::Shown => (own, LIFT, 1.0),
+                DiscKind::Behind => (own, OTHER_LIFT, 1.0),
+                DiscKind::Small => (own.min(usual_m), OTHER_LIFT, OTHER_SHARE),
+            };
             let radius = share * whole;
             // A lift is in radii of the slice: the disc stays in front.
             match touched {
@@ -202,8 +232,14 @@ impl Dots {
         }
         let mut slices = Vec::with_capacity(2 * self.places.len());
         for (taxel, colours) in of_taxel.iter_mut().enumerate() {
+            let radius = self.radii[taxel];
+            // Lifts are in radii of each slice: one that is much higher than its radius has the same height with its rim.
+            let [rim_lift, lift] = match self.are_dots[taxel] {
+                true => [1.0 / RIM, 1.0].map(|share| share * self.dot_lift_m / radius),
+                false => [LIFT; 2],
+            };
             if rims {
-                slices.push(self.slice(taxel, middle, (RIM * self.radii[taxel], LIFT), colour::RIM, (0.0, TAU)));
+                slices.push(self.slice(taxel, middle, (RIM * radius, rim_lift), colour::RIM, (0.0, TAU)));
             }
             if colours.is_empty() {
                 colours.push(colour::REST);
@@ -213,7 +249,7 @@ impl Dots {
             for (number, &colour) in colours.iter().enumerate() {
                 // Above the rim by more than the depth resolution.
                 let piece = (number as f64 * sweep, sweep);
-                slices.push(self.slice(taxel, middle, (self.radii[taxel], LIFT + 0.1), colour, piece));
+                slices.push(self.slice(taxel, middle, (radius, lift + 0.1), colour, piece));
             }
         }
         slices
@@ -228,6 +264,26 @@ fn gaps(places: &[DVec3]) -> Vec<Option<f64>> {
         near.map(|(_, squared)| squared.sqrt()).find(|&distance| distance > COINCIDENT_M)
     };
     places.iter().map(gap).collect()
+}
+
+/// By kind of `taxels`, which of them it has. What is pressed is one skin, with one axis or three.
+fn kinds_of(taxels: &[&Taxel]) -> Vec<Vec<usize>> {
+    let mut kinds: Vec<(Modality, Vec<usize>)> = Vec::new();
+    for (index, taxel) in taxels.iter().enumerate() {
+        let kind = if taxel.modality.is_pressed() { Modality::Pressure } else { taxel.modality };
+        match kinds.iter_mut().find(|(known, _)| *known == kind) {
+            Some((_, own)) => own.push(index),
+            None => kinds.push((kind, vec![index])),
+        }
+    }
+    kinds.into_iter().map(|(_, own)| own).collect()
+}
+
+/// What a quarter of `numbers` are less than, if there are any.
+fn low_quarter(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = numbers.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 4).copied()
 }
 
 /// The median of the gaps that are known.
@@ -280,4 +336,87 @@ pub(super) fn surface(triangles: &[(usize, [DVec3; 3])], middle: DVec3) -> (Vec<
         }
     }
     (corners, (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PITCH_M: f64 = 0.006;
+
+    fn taxel(id: usize, modality: Modality, place: DVec3) -> Taxel {
+        Taxel {
+            id: id as u32,
+            link: 0,
+            position_in_link: place,
+            normal_in_link: DVec3::Z,
+            area: 0.0,
+            modality,
+            tangent_in_link: None,
+        }
+    }
+
+    /// A skin of 4 x 4, and two thermistors near to its taxels, that are 7 mm apart.
+    fn mixed() -> (Vec<Taxel>, Dots) {
+        let skin = (0..16).map(|i| DVec3::new(f64::from(i % 4), f64::from(i / 4), 0.0) * PITCH_M);
+        let places: Vec<DVec3> = skin.chain([DVec3::new(0.0005, 0.0, 0.0), DVec3::new(0.0075, 0.0, 0.0)]).collect();
+        let kind = |id: usize| if id < 16 { Modality::Pressure } else { Modality::Temperature };
+        let taxels = places.iter().enumerate().map(|(id, &place)| taxel(id, kind(id), place)).collect();
+        let normals = vec![DVec3::Z; places.len()];
+        (taxels, Dots::at(places, normals, 0.02))
+    }
+
+    #[test]
+    fn a_disc_is_as_large_as_its_own_kind_leaves_room_for() {
+        let (taxels, any) = mixed();
+        assert!((any.radii[0] - RADIUS_SHARE * 0.0005).abs() < 1e-9, "by the nearest of any kind");
+        let own = any.clone().by_kind(taxels.iter());
+        assert!(own.radii[..16].iter().all(|radius| (radius - RADIUS_SHARE * PITCH_M).abs() < 1e-9), "{:?}", own.radii);
+        assert!(own.radii[16..].iter().all(|radius| (radius - RADIUS_SHARE * 0.007).abs() < 1e-9), "{:?}", own.radii);
+        // Where all kinds are shown, thermistors are dots over the skin.
+        let all = any.of_all_kinds(taxels.iter());
+        assert_eq!(all.radii[..16], own.radii[..16]);
+        assert!(all.radii[16..].iter().all(|radius| (radius - OTHER_SHARE * own.radii[0]).abs() < 1e-9));
+        let slices = all.slices(&[], DVec3::ZERO, false);
+        let lift_m = |taxel: usize| slices[taxel].lift * slices[taxel].radius;
+        assert!(lift_m(16) > lift_m(0) && slices.len() == 18, "{} and {}", lift_m(16), lift_m(0));
+        // Each over its own rim.
+        let slices = all.slices(&[], DVec3::ZERO, true);
+        let lifts_m: Vec<f32> = slices.iter().map(|slice| slice.lift * slice.radius).collect();
+        assert!(lifts_m.len() == 36 && lifts_m.chunks(2).all(|own| own[1] > own[0]), "{lifts_m:?}");
+    }
+
+    #[test]
+    fn sensors_of_one_kind_have_one_size_but_where_two_would_overlap() {
+        let places = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 53.0, 80.0].map(|x| DVec3::new(x * 1e-3, 0.0, 0.0));
+        let places: Vec<DVec3> = places.into_iter().chain([DVec3::Y]).collect();
+        let kind = |id: usize| if id < 8 { Modality::Temperature } else { Modality::Pressure };
+        let taxels: Vec<Taxel> = (0..9).map(|id| taxel(id, kind(id), places[id])).collect();
+        let radii = Dots::at(places, vec![DVec3::Z; 9], 0.1).by_kind(taxels.iter()).radii;
+        let usual = RADIUS_SHARE * 0.010;
+        for (taxel, radius) in radii[..8].iter().enumerate() {
+            let expected = if [5, 6].contains(&taxel) { TOUCHING_SHARE * 0.003 } else { usual };
+            assert!((radius - expected).abs() < 1e-9, "{taxel}: {radius}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_shown_is_smaller_than_all_that_is() {
+        let (taxels, any) = mixed();
+        let dots = any.by_kind(taxels.iter());
+        for shown in [Modality::Pressure, Modality::Temperature] {
+            let disc = |taxel: &Taxel| {
+                let kind = if taxel.modality == shown { DiscKind::Shown } else { DiscKind::Small };
+                Disc { colour: [0; 3], touched: None, kind }
+            };
+            let discs: Vec<Disc> = taxels.iter().map(disc).collect();
+            let slices = dots.flat_slices(&discs, DVec3::ZERO, false);
+            let radii = |kind: DiscKind| {
+                slices.iter().zip(&discs).filter(move |(_, disc)| disc.kind == kind).map(|(slice, _)| slice.radius)
+            };
+            let most = radii(DiscKind::Small).fold(0.0, f32::max);
+            let least = radii(DiscKind::Shown).fold(f32::INFINITY, f32::min);
+            assert!(most > 0.0 && most <= 0.46 * least, "{shown:?}: {most} and {least}");
+        }
+    }
 }

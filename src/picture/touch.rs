@@ -7,7 +7,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::colour::{PALETTE, PAPER, RIM, linear};
 use super::edges::{Lines, seen};
 use super::labels::{INK, Labels, Legend, PlacedId, half_of_id, short, write_ids};
-use super::shape::{Disc, Dots};
+use super::shape::{Disc, DiscKind, Dots};
 use super::{Options, Picture, Prepared, arrows, stem};
 use crate::backend::gpu::raster;
 use crate::body::{Body, Modality};
@@ -33,8 +33,6 @@ const TRAIL_WIDTH: u32 = 3;
 const OLDEST_OPACITY: f64 = 0.15;
 /// Radius of a mark, in radii of a usual taxel.
 const MARK_RADII: f64 = 0.9;
-/// Taxels that measure something else than what is shown are dots of this share of their radius.
-const OTHER_SHARE: f64 = 0.45;
 /// Marks are drawn in views that the touch faces by at least this cosine.
 const MIN_FACING: f64 = 0.15;
 
@@ -146,8 +144,8 @@ impl<'a> TouchPicture<'a> {
             for taxel in (0..ids.len()).filter(|&taxel| labelled[taxel]) {
                 let at = arrangement.pixel(index, dots.places[taxel] - *middle);
                 if arrangement.views[index].holds_all(at, half_of_id(&ids[taxel])) {
-                    let Disc { colour, is_other, .. } = discs[taxel];
-                    placed.push(PlacedId { id: &ids[taxel], at, on: colour, is_behind: is_other });
+                    let Disc { colour, kind, .. } = discs[taxel];
+                    placed.push(PlacedId { id: &ids[taxel], at, on: colour, is_behind: kind != DiscKind::Shown });
                 }
             }
         }
@@ -251,10 +249,10 @@ impl Moment<'_> {
         };
         let disc = |(value, modality): (&Option<f64>, Modality)| {
             if self.letter.reads(modality) {
-                return Disc { colour: colour(*value), touched: None, is_other: false, share: 1.0 };
+                return Disc { colour: colour(*value), touched: None, kind: DiscKind::Shown };
             }
-            let share = if is_labelled { 1.0 } else { OTHER_SHARE };
-            Disc { colour: IDLE, touched: None, is_other: true, share }
+            let kind = if is_labelled { DiscKind::Behind } else { DiscKind::Small };
+            Disc { colour: IDLE, touched: None, kind }
         };
         let mut discs: Vec<Disc> = self.values.iter().zip(modalities).map(disc).collect();
         for marked in self.touches {
@@ -270,11 +268,15 @@ impl Moment<'_> {
 
     /// The legend of the colours, if there is one, and of what else `discs` look like.
     pub(super) fn legend(&self, discs: &[Disc]) -> Option<Legend> {
-        let note = match discs.iter().find(|disc| disc.is_other) {
-            _ if self.letter != Receptor::Proximity => "",
-            None => "grey: nothing in range",
-            Some(disc) if disc.share < 1.0 => "grey: nothing in range; small: taxels of another kind",
-            Some(_) => "grey: nothing in range, or of another kind",
+        let other = discs.iter().map(|disc| disc.kind).find(|kind| *kind != DiscKind::Shown);
+        let note = match (self.letter, other.unwrap_or(DiscKind::Shown)) {
+            (Receptor::Proximity, DiscKind::Shown) => "grey: nothing in range",
+            (_, DiscKind::Shown) => "",
+            (Receptor::Proximity, DiscKind::Small) => "grey: nothing in range; small: taxels of another kind",
+            (_, DiscKind::Small) => "small: taxels of another kind",
+            (Receptor::Proximity, DiscKind::Behind) => "grey: nothing in range, or of another kind",
+            (Receptor::Temperature, DiscKind::Behind) => "grey: taxels of another kind",
+            (_, DiscKind::Behind) => "grey: nothing felt, or of another kind",
         };
         Some(Legend { colours: self.map(), ends: self.ends?, unit: self.unit.to_owned(), note: note.to_owned() })
     }
@@ -402,16 +404,24 @@ mod tests {
     fn a_legend_says_what_grey_means() {
         let values = [Some(f64::INFINITY), None];
         let moment = Moment { letter: Receptor::Proximity, ends: Some([0.0, 80.0]), ..Moment::of_pressures(&values) };
-        let note = |kinds: &[Modality], are_labelled: bool| {
+        let note = |letter: Receptor, kinds: &[Modality], are_labelled: bool| {
+            let moment = Moment { letter, ..moment.clone() };
             let discs = moment.discs(kinds.iter().copied(), are_labelled);
             assert!(discs.iter().all(|disc| disc.colour == IDLE || disc.colour == UNUSED));
             moment.legend(&discs).unwrap().note
         };
         let mixed = [Modality::Proximity, Modality::Pressure];
-        assert_eq!(note(&[Modality::Proximity; 2], false), "grey: nothing in range");
-        assert_eq!(note(&mixed, false), "grey: nothing in range; small: taxels of another kind");
-        assert_eq!(note(&mixed, true), "grey: nothing in range, or of another kind");
-        let pressures = Moment { letter: Receptor::Sustained, ..moment.clone() };
-        assert!(pressures.legend(&pressures.discs(mixed.into_iter(), false)).unwrap().note.is_empty());
+        let distances = Receptor::Proximity;
+        assert_eq!(note(distances, &[Modality::Proximity; 2], false), "grey: nothing in range");
+        assert_eq!(note(distances, &mixed, false), "grey: nothing in range; small: taxels of another kind");
+        assert_eq!(note(distances, &mixed, true), "grey: nothing in range, or of another kind");
+        for letter in [Receptor::Sustained, Receptor::Temperature] {
+            let own = if letter == Receptor::Sustained { Modality::Pressure } else { Modality::Temperature };
+            assert_eq!(note(letter, &[own; 2], false), "");
+            assert_eq!(note(letter, &[own, Modality::Proximity], false), "small: taxels of another kind");
+        }
+        let of_all = [Modality::Temperature, Modality::Pressure];
+        assert_eq!(note(Receptor::Temperature, &of_all, true), "grey: taxels of another kind");
+        assert_eq!(note(Receptor::Shear, &of_all, true), "grey: nothing felt, or of another kind");
     }
 }

@@ -12,11 +12,11 @@ use super::map::{MappedTaxel, PressureMap};
 use super::page::{Area, LEFT, LEGEND, Page, TITLE};
 use super::pen::{INK, Pen, SCALE, scaled};
 use super::series::Series;
-use super::ticks::{rounded, shown, ticks};
+use super::ticks::{Numbers, shown, ticks};
+use super::units::{for_people, numbers, p_for_people, period};
 use crate::colours::pressure_colours;
 use crate::error::{Error, Result};
 use crate::ink::{self, cannot};
-use crate::percept::{Column, Outputs, Unit};
 use crate::plain;
 
 const PAPER: RGBColor = RGBColor(252, 252, 250);
@@ -78,30 +78,6 @@ struct Plot<'a> {
     pressure_colours: Vec<RGBColor>,
 }
 
-/// A quantity as people read it: times this, in this unit.
-fn for_people<'a>(column: &Column, p_unit: &'a str) -> (f64, &'a str) {
-    match column.unit {
-        Unit::P => p_for_people(p_unit),
-        Unit::Metre => (1e3, "mm"),
-        Unit::SquareMetre => (1e4, "cm²"),
-        Unit::Radian => (180.0 / std::f64::consts::PI, "°"),
-        Unit::MetrePerSecond => (1e3, "mm/s"),
-        Unit::PMetre if p_unit == "N" => (1e3, "N mm"),
-        unit => (1.0, if unit == Unit::One { "" } else { unit.symbol() }),
-    }
-}
-
-/// After how much an angle is the same again, rad: an axis after half a turn, a direction after a whole one.
-fn period(column: &Column) -> Option<f64> {
-    let is_axis = column.output == Outputs::ORIENTATION || column.output == Outputs::PRINCIPAL_AXIS;
-    (column.unit == Unit::Radian).then_some(if is_axis { std::f64::consts::PI } else { std::f64::consts::TAU })
-}
-
-/// The same of a pressure in `unit`.
-fn p_for_people(unit: &str) -> (f64, &str) {
-    if unit == "Pa" { (1e-3, "kPa") } else { (1.0, unit) }
-}
-
 impl<'a> Plot<'a> {
     fn for_fields(all: &'a [Gathered]) -> Result<Self> {
         if all.iter().all(|gathered| gathered.frames == 0 || gathered.panels.is_empty()) {
@@ -113,7 +89,7 @@ impl<'a> Plot<'a> {
         };
         let page = Page::for_fields(all);
         let per_m = all.iter().enumerate().flat_map(|(column, gathered)| {
-            let area = page.map(column, 0, 2 * gathered.maps.len());
+            let area = page.map(column, 0, 0, gathered.maps.len());
             gathered.maps.iter().map(move |map| {
                 let [low, high] = map.extent();
                 let (width_m, height_m) = ((high.0 - low.0).max(1e-6), (high.1 - low.1).max(1e-6));
@@ -147,7 +123,7 @@ impl<'a> Plot<'a> {
             pen.fitted(&gathered.name, 15, INK, (title.left, title.top + TITLE / 2), title.width)?;
             for (index, panel) in gathered.panels.iter().enumerate() {
                 let is_last = index + 1 == gathered.panels.len();
-                let range = ranges.get(panel.column.name).copied().unwrap_or([0.0, 1.0]);
+                let range = ranges.get(panel.column.name).copied();
                 self.draw_panel(&pen, gathered, panel, self.page.panel(column, index), range, is_last)?;
             }
             self.draw_maps(&pen, column, gathered)?;
@@ -157,17 +133,17 @@ impl<'a> Plot<'a> {
 
     /// By output, the range of all recordings, so that they can be compared.
     fn ranges(&self) -> BTreeMap<&'static str, [f64; 2]> {
-        let mut ranges: BTreeMap<&'static str, [f64; 2]> = BTreeMap::new();
+        let mut ranges: BTreeMap<&'static str, (Numbers, [f64; 2])> = BTreeMap::new();
         let panels = self.all.iter().flat_map(|gathered| gathered.panels.iter().map(move |panel| (gathered, panel)));
         for (gathered, panel) in panels {
             let factor = for_people(panel.column, &gathered.p_unit).0;
             for [low, high] in panel.lines.iter().flatten().filter_map(Series::range) {
                 let [low, high] = [low * factor, high * factor];
-                let known = ranges.entry(panel.column.name).or_insert([low, high]);
+                let (_, known) = ranges.entry(panel.column.name).or_insert((numbers(panel.column), [low, high]));
                 *known = [known[0].min(low), known[1].max(high)];
             }
         }
-        ranges.into_iter().map(|(name, range)| (name, rounded(range))).collect()
+        ranges.into_iter().map(|(name, (numbers, range))| (name, numbers.rounded(range))).collect()
     }
 
     fn colour(&self, line: &str) -> RGBColor {
@@ -193,13 +169,14 @@ impl<'a> Plot<'a> {
         Ok(())
     }
 
+    /// `range` is that of the quantity in all recordings, if any has a value of it.
     fn draw_panel<B: DrawingBackend>(
         &self,
         pen: &Pen<'_, B>,
         gathered: &Gathered,
         panel: &Panel,
         area: Area,
-        range: [f64; 2],
+        range: Option<[f64; 2]>,
         is_last: bool,
     ) -> Result<()> {
         let (factor, unit) = for_people(panel.column, &gathered.p_unit);
@@ -208,40 +185,29 @@ impl<'a> Plot<'a> {
         let start_s = if first_s.abs() > 10.0 * (last_s - first_s) + 1.0 { first_s } else { 0.0 };
         let span = [first_s - start_s, (last_s - start_s).max(first_s - start_s + 1e-3)];
         let x = |t: f64| f64::from(area.left) + (t - span[0]) / (span[1] - span[0]) * f64::from(area.width);
-        let y =
-            |value: f64| f64::from(area.bottom()) - (value - range[0]) / (range[1] - range[0]) * f64::from(area.height);
-        let marks = ticks(range, 4);
-        let step = if marks.len() > 1 { marks[1] - marks[0] } else { range[1] - range[0] };
-        let numbers: Vec<String> = marks.iter().map(|&mark| shown(mark, step)).collect();
-        let size = pen.fitting_size(&numbers, 11, NUMBERS)?;
-        for (&mark, number) in marks.iter().zip(&numbers) {
-            let level = y(mark).round() as i32;
-            pen.line(&[(area.left, level), (area.right(), level)], FAINT, 1.0)?;
-            pen.text(number, size, GREY, HPos::Right, (area.left - 7, level))?;
+        if let Some(range) = range {
+            draw_levels(pen, area, range, numbers(panel.column))?;
         }
-        let seconds = ticks(span, (area.width / 90) as usize);
-        let step_s = if seconds.len() > 1 { seconds[1] - seconds[0] } else { span[1] - span[0] };
-        for &second in &seconds {
-            let at = x(second).round() as i32;
-            pen.line(&[(at, area.bottom()), (at, area.bottom() + 4)], GREY, 1.0)?;
-            if is_last {
-                pen.text(&shown(second, step_s), 11, GREY, HPos::Center, (at, area.bottom() + 13))?;
-            }
-        }
-        pen.line(&[(area.left, area.bottom()), (area.right(), area.bottom())], GREY, 1.0)?;
+        draw_times(pen, area, span, is_last)?;
         if is_last {
             let since = if start_s == 0.0 { "time [s]".to_owned() } else { format!("time since t = {start_s} s [s]") };
             pen.text(&since, 12, INK, HPos::Center, (area.left + area.width / 2, area.bottom() + 30))?;
         }
         let name = panel.column.name.replace('_', " ");
         let label = if unit.is_empty() { name } else { format!("{name} [{unit}]") };
-        pen.upwards(&label, 12, INK, (area.left - LEFT + 12, area.top + area.height / 2))?;
+        let middle = area.top + area.height / 2;
+        pen.upwards(&label, 12, INK, (area.left - LEFT + 12, middle))?;
+        if let Some(why) = panel.why_empty {
+            pen.text(why, 12, GREY, HPos::Center, (area.left + area.width / 2, middle))?;
+        }
+        let range = range.unwrap_or([0.0, 1.0]);
+        let y = |value: f64| level_of(value * factor, area, range);
         for (index, (line, components)) in gathered.lines.iter().zip(&panel.lines).enumerate() {
             let is_whole = index == 0 && gathered.first_is_whole;
             let (own, width) = if is_whole { (WHOLE, WHOLE_WIDTH) } else { (self.colour(line), 1.5) };
             for (component, series) in components.iter().enumerate() {
                 let colour = paler(own, component);
-                let (across, down) = (|t| scaled(x(t - start_s)), |value| scaled(y(value * factor)));
+                let (across, down) = (|t| scaled(x(t - start_s)), |value| scaled(y(value)));
                 for run in line::points(series, period(panel.column), across, down) {
                     pen.dots(&run, colour, width)?;
                 }
@@ -259,21 +225,26 @@ impl<'a> Plot<'a> {
         let count = gathered.maps.len();
         for (index, map) in gathered.maps.iter().enumerate() {
             for quantity in [PEAK, INTEGRAL] {
-                let area = self.page.map(column, quantity * count + index, 2 * count);
-                self.draw_map(pen, map, quantity, area)?;
+                self.draw_map(pen, map, quantity, self.page.map(column, quantity, index, count))?;
             }
         }
         if count == 0 {
             return Ok(());
         }
         for quantity in [PEAK, INTEGRAL] {
-            let first = self.page.map(column, quantity * count, 2 * count);
-            let last = self.page.map(column, quantity * count + count - 1, 2 * count);
-            let area = Area { width: last.right() - first.left, ..first };
-            self.draw_key(pen, quantity, &gathered.p_unit, area)?;
+            self.draw_key(pen, quantity, &gathered.p_unit, self.page.maps(column, quantity))?;
         }
-        let last = self.page.map(column, 2 * count - 1, 2 * count);
+        let areas: Vec<Area> = [PEAK, INTEGRAL]
+            .into_iter()
+            .flat_map(|quantity| (0..count).map(move |index| self.page.map(column, quantity, index, count)))
+            .collect();
+        // No two maps look like one.
+        for pair in areas.windows(2) {
+            let between = (pair[0].right() + pair[1].left) / 2;
+            pen.line(&[(between, pair[0].top), (between, pair[0].bottom())], FAINT, 1.0)?;
+        }
         // Below the keys, where no map reaches.
+        let last = self.page.maps(column, INTEGRAL);
         self.draw_length(pen, (last.right(), last.bottom() + 52))
     }
 
@@ -345,7 +316,8 @@ impl<'a> Plot<'a> {
         let what = ["highest pressure, path of its centre", "pressure–time integral"][quantity];
         let unit = [p_unit.to_owned(), format!("{p_unit}·s")][quantity].clone();
         pen.fitted_centred(what, 13, INK, (area.left + area.width / 2, area.top - 29), area.width)?;
-        let width = area.width.min(220);
+        let beside = 8 + pen.width(&unit, 11)?;
+        let width = (area.width - 2 * beside).min(220);
         let left = area.left + (area.width - width) / 2;
         let top = area.bottom() + 12;
         for step in 0..SCALE * width {
@@ -369,6 +341,40 @@ impl<'a> Plot<'a> {
         pen.text(&unit, 11, GREY, HPos::Left, (left + width + 8, top + 4))?;
         Ok(())
     }
+}
+
+/// How far down `value` is in a panel whose axis has this range.
+fn level_of(value: f64, area: Area, [low, high]: [f64; 2]) -> f64 {
+    f64::from(area.bottom()) - (value - low) / (high - low) * f64::from(area.height)
+}
+
+/// The axis of a quantity: lines at round numbers.
+fn draw_levels<B: DrawingBackend>(pen: &Pen<'_, B>, area: Area, range: [f64; 2], numbers: Numbers) -> Result<()> {
+    let marks = numbers.ticks(range, 4);
+    let step = if marks.len() > 1 { marks[1] - marks[0] } else { range[1] - range[0] };
+    let texts: Vec<String> = marks.iter().map(|&mark| shown(mark, step)).collect();
+    let size = pen.fitting_size(&texts, 11, NUMBERS)?;
+    for (&mark, text) in marks.iter().zip(&texts) {
+        let level = level_of(mark, area, range).round() as i32;
+        pen.line(&[(area.left, level), (area.right(), level)], FAINT, 1.0)?;
+        pen.text(text, size, GREY, HPos::Right, (area.left - 7, level))?;
+    }
+    Ok(())
+}
+
+/// The axis of time, s, with its numbers if `are_shown`.
+fn draw_times<B: DrawingBackend>(pen: &Pen<'_, B>, area: Area, span: [f64; 2], are_shown: bool) -> Result<()> {
+    let seconds = ticks(span, (area.width / 90) as usize);
+    let step_s = if seconds.len() > 1 { seconds[1] - seconds[0] } else { span[1] - span[0] };
+    for &second in &seconds {
+        let across = (second - span[0]) / (span[1] - span[0]) * f64::from(area.width);
+        let at = (f64::from(area.left) + across).round() as i32;
+        pen.line(&[(at, area.bottom()), (at, area.bottom() + 4)], GREY, 1.0)?;
+        if are_shown {
+            pen.text(&shown(second, step_s), 11, GREY, HPos::Center, (at, area.bottom() + 13))?;
+        }
+    }
+    pen.line(&[(area.left, area.bottom()), (area.right(), area.bottom())], GREY, 1.0)
 }
 
 /// `colour` for component `index` of a vector.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::absences::Absences;
 use super::map::PressureMap;
 use super::path::Path;
 use super::series::Series;
@@ -10,7 +11,7 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::field::FieldSet;
 use crate::percept::{COLUMNS, Column, Outputs, Percepts, Unit};
-use crate::scene::receptor_of;
+use crate::scene::{choose_fields, receptor_of};
 use crate::signal::{Frame, Receptor};
 
 /// Most fields that are gathered, and most that are shown.
@@ -27,22 +28,29 @@ const MAX_STEP_S: f64 = 1.0;
 pub fn outputs_for(wanted: Outputs) -> Outputs {
     let usual = Outputs::TOTAL | Outputs::AREA | Outputs::named("force").unwrap_or_default();
     let panels = if wanted.is_empty() { usual } else { wanted };
-    panels | Outputs::TOTAL | Outputs::CENTROID
+    // Without a friction a ratio to it is absent for another reason.
+    let friction = if panels.contains(Outputs::SLIP_RATIO) { Outputs::FRICTION } else { Outputs::empty() };
+    panels | friction | Outputs::TOTAL | Outputs::CENTROID
 }
 
-/// The quantities that are plotted of `body`: those that are `wanted`; else none, which stands for load and area, or if no taxel is
-/// pressed what they measure.
-#[must_use]
-pub fn wanted_of(body: &Body, wanted: Outputs) -> Outputs {
-    let has = |receptor: Receptor| body.taxels.iter().any(|taxel| receptor.reads(taxel.modality));
+/// The quantities that are plotted of the `fields` of `body` that these globs name, of all without any: those that are `wanted`; else none,
+/// which stands for load and area, or if no taxel of theirs is pressed what they measure.
+///
+/// # Errors
+/// A field has no taxels, or a glob names no field.
+pub fn wanted_of(body: &Body, fields: &[String], wanted: Outputs) -> Result<Outputs> {
+    let set = FieldSet::new(body)?;
+    let chosen = choose_fields(&set, fields).map_err(|e| e.at(&body.name))?;
+    let members = || chosen.iter().flat_map(|&field| &set.fields[field].members);
+    let has = |receptor: Receptor| members().any(|member| receptor.reads(body.taxels[member.taxel].modality));
     if !wanted.is_empty() || has(Receptor::Sustained) {
-        return wanted;
+        return Ok(wanted);
     }
     let usual = [
         (Receptor::Temperature, Outputs::TEMPERATURE | Outputs::WARMEST | Outputs::COLDEST),
         (Receptor::Proximity, Outputs::NEAREST | Outputs::APPROACH_SPEED),
     ];
-    usual.into_iter().filter(|(receptor, _)| has(*receptor)).fold(Outputs::empty(), |all, (_, own)| all | own)
+    Ok(usual.into_iter().filter(|(receptor, _)| has(*receptor)).fold(Outputs::empty(), |all, (_, own)| all | own))
 }
 
 /// What is plotted of one recording.
@@ -52,7 +60,7 @@ pub struct Gathered {
     pub(super) name: String,
     /// Number of frames.
     pub(super) frames: u64,
-    /// First and last time, s.
+    /// Least and greatest time, s.
     pub(super) span_s: [f64; 2],
     /// The fields of the lines, in the order of their colours.
     pub(super) lines: Vec<String>,
@@ -71,6 +79,14 @@ pub(super) struct Panel {
     pub(super) column: &'static Column,
     /// By line, a series for each component.
     pub(super) lines: Vec<Vec<Series>>,
+    /// Why no line has a value.
+    pub(super) why_empty: Option<&'static str>,
+}
+
+impl Panel {
+    fn is_empty(&self) -> bool {
+        self.lines.iter().flatten().all(|series| series.range().is_none())
+    }
 }
 
 /// Gathers what is plotted of a recording.
@@ -78,6 +94,8 @@ pub struct Gatherer {
     name: String,
     frames: u64,
     span_s: Option<[f64; 2]>,
+    /// Time of the frame before, s.
+    last_s: Option<f64>,
     set: FieldSet,
     columns: Vec<&'static Column>,
     fields: Vec<Followed>,
@@ -106,6 +124,8 @@ struct Followed {
     is_read: bool,
     /// By column, a series for each component.
     series: Vec<Vec<Series>>,
+    /// By column, of the frames in which it has no value.
+    absences: Vec<Absences>,
     path: Path,
     most_load: f64,
     /// The integral of its load over time.
@@ -146,6 +166,7 @@ impl Gatherer {
                 pressed: in_letter(Receptor::Sustained),
                 is_read: false,
                 series: columns.iter().map(|column| vec![Series::default(); column.components]).collect(),
+                absences: vec![Absences::default(); columns.len()],
                 path: Path::default(),
                 most_load: 0.0,
                 impulse: 0.0,
@@ -165,6 +186,7 @@ impl Gatherer {
             name: name.to_owned(),
             frames: 0,
             span_s: None,
+            last_s: None,
             set,
             columns,
             fields,
@@ -191,13 +213,17 @@ impl Gatherer {
         let percepts = engine.percepts();
         for (index, frame) in frames.iter().enumerate() {
             let t_s = percepts.t_s(index);
-            let before = self.span_s.map(|[_, last]| last);
-            self.span_s = Some([self.span_s.map_or(t_s, |[first, _]| first), t_s]);
+            let before = self.last_s.replace(t_s);
+            self.span_s = Some(self.span_s.map_or([t_s; 2], |[least, most]| [least.min(t_s), most.max(t_s)]));
             self.frames += 1;
             let mut pressures = std::mem::take(&mut self.pressures);
             engine.pressures(frame, &mut pressures);
             let dt_s =
                 before.map(|before| t_s - before).filter(|dt_s| (0.0..=MAX_STEP_S).contains(dt_s)).unwrap_or(0.0);
+            if before.is_some_and(|before| t_s < before) {
+                // What follows was measured before: no way leads there.
+                self.fields.iter_mut().for_each(|field| field.path.push(None));
+            }
             self.see_fields(percepts, index, t_s, dt_s);
             for &(id, pressure) in &pressures {
                 let Some(&taxel) = self.index_of.get(&id) else { continue };
@@ -212,8 +238,14 @@ impl Gatherer {
 
     fn see_fields(&mut self, percepts: &Percepts, frame: usize, t_s: f64, dt_s: f64) {
         for field in &mut self.fields {
-            for ((column, series), &in_plan) in self.columns.iter().zip(&mut field.series).zip(&field.in_plan) {
+            let quantities = self.columns.iter().zip(&mut field.series).zip(&mut field.absences);
+            for (((column, series), absences), &in_plan) in quantities.zip(&field.in_plan) {
                 let value = in_plan.and_then(|in_plan| percepts.value(frame, in_plan, column));
+                if let (None, Some(in_plan)) = (value, in_plan) {
+                    let friction = column_of(Outputs::FRICTION);
+                    let has_friction = friction.is_some_and(|own| percepts.value(frame, in_plan, own).is_some());
+                    absences.see(column, percepts.flags(frame, in_plan), has_friction);
+                }
                 field.is_read |= value.is_some() && receptor_of(column) != Receptor::Sustained;
                 for (component, series) in series.iter_mut().enumerate() {
                     series.push(t_s, value.map(|value| value[component]));
@@ -232,18 +264,10 @@ impl Gatherer {
     #[must_use]
     pub fn finish(self) -> Gathered {
         let lines = self.lines();
-        let mut panels: Vec<Panel> = self
-            .columns
-            .iter()
-            .enumerate()
-            .map(|(index, column)| Panel {
-                column,
-                lines: lines.iter().map(|&line| self.fields[line].series[index].clone()).collect(),
-            })
-            .collect();
+        let mut panels: Vec<Panel> =
+            self.columns.iter().enumerate().map(|(index, column)| self.panel(index, column, &lines)).collect();
         // With a force, a total says nothing more; without a unit there is no force.
-        let is_there = |panel: &Panel| panel.lines.iter().flatten().any(|series| series.range().is_some());
-        let force = panels.iter().find(|panel| panel.column.name == "force").map(is_there);
+        let force = panels.iter().find(|panel| panel.column.name == "force").map(|panel| !panel.is_empty());
         match force {
             Some(true) => panels.retain(|panel| panel.column.output != Outputs::TOTAL || self.columns.len() > 3),
             Some(false) => panels.retain(|panel| panel.column.name != "force"),
@@ -274,6 +298,15 @@ impl Gatherer {
             frames: self.frames,
             span_s: self.span_s.unwrap_or([0.0; 2]),
         }
+    }
+
+    /// The quantity `index` over time, of the fields `lines`.
+    fn panel(&self, index: usize, column: &'static Column, lines: &[usize]) -> Panel {
+        let of_lines = lines.iter().map(|&line| self.fields[line].series[index].clone()).collect();
+        let panel = Panel { column, lines: of_lines, why_empty: None };
+        let mut absences = Absences::default();
+        lines.iter().for_each(|&line| absences.join(&self.fields[line].absences[index]));
+        Panel { why_empty: panel.is_empty().then(|| absences.most()), ..panel }
     }
 
     /// The fields whose lines are drawn: those that were asked for; else the topmost, and below a single one its children; and of a

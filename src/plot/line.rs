@@ -3,6 +3,11 @@
 
 use super::series::Series;
 
+/// Between two frames a line breaks if they are so many usual steps apart, as on the page, and so many dots across: what is shorter
+/// cannot be seen.
+const GAP_STEPS: f64 = 3.0;
+const GAP_DOTS: i32 = 8;
+
 /// What a plot shows of a quantity at one column of dots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stretch {
@@ -12,18 +17,25 @@ struct Stretch {
 }
 
 /// The stretches of `series`, one list for each part that is drawn without a break. An angle with a `period` that goes past its end
-/// comes back at the other one, which is not motion through all that is between: there the line breaks.
+/// comes back at the other one, which is not motion through all that is between: there the line breaks. It breaks too where time goes
+/// back, and where no frame is for longer than usual.
 fn stretches(series: &Series, period: Option<f64>, x: impl Fn(f64) -> i32) -> Vec<Vec<Stretch>> {
     let most_step = period.map_or(f64::INFINITY, |period| period / 2.0);
     let mut runs: Vec<Vec<Stretch>> = Vec::new();
     // Whether the next one begins a run.
     let mut breaks = true;
+    let gap_s = GAP_STEPS * usual_step_s(series);
+    let mut before: Option<(f64, i32)> = None;
     for bucket in &series.buckets {
+        let at = (bucket.t_s, x(bucket.t_s));
+        breaks |= before
+            .replace(at)
+            .is_some_and(|(t_s, x)| bucket.t_s < t_s || (bucket.t_s - t_s > gap_s && at.1 - x >= GAP_DOTS));
         let Some([low, high]) = bucket.range else {
             breaks = true;
             continue;
         };
-        let new = Stretch { x: x(bucket.t_s), low, high };
+        let new = Stretch { x: at.1, low, high };
         let last = runs.last_mut().filter(|_| !breaks);
         breaks = high - low > most_step;
         if breaks {
@@ -46,6 +58,14 @@ fn stretches(series: &Series, period: Option<f64>, x: impl Fn(f64) -> i32) -> Ve
         }
     }
     runs
+}
+
+/// The median of the steps forward in time, s; infinite if there is none.
+fn usual_step_s(series: &Series) -> f64 {
+    let steps = series.buckets.windows(2).map(|pair| pair[1].t_s - pair[0].t_s);
+    let mut steps: Vec<f64> = steps.filter(|&step_s| step_s > 0.0).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() { f64::INFINITY } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// The points of the line of `series`, (right, down) in dots, one list for each part that is drawn without a break: at most two at
@@ -111,5 +131,29 @@ mod tests {
         // At one dot across too, with nothing between its ends.
         let close = points(&turning, Some(std::f64::consts::PI), |_| 0, |value| value.to_degrees().round() as i32);
         assert_eq!(close, [vec![(0, 170), (0, 178)], vec![(0, 3), (0, 10)]]);
+    }
+
+    #[test]
+    fn a_line_breaks_where_time_goes_back_and_where_no_frame_is() {
+        let times = [0.0, 0.1, 0.2, 3.2, 3.3, 3.4, 2.0, 2.1, 2.3, 2.4];
+        let mut series = Series::default();
+        times.into_iter().zip(0..).for_each(|(t_s, value)| series.push(t_s, Some(f64::from(value))));
+        let drawn = |dots: f64| points(&series, None, |t| (t * dots).round() as i32, |value| value as i32);
+        let runs: Vec<Vec<i32>> =
+            drawn(100.0).iter().map(|run| run.iter().map(|&(_, value)| value).collect()).collect();
+        // A step of twice the usual length is no gap.
+        assert_eq!(runs, [vec![0, 1, 2], vec![3, 4, 5], vec![6, 7, 8, 9]]);
+        // A gap that cannot be seen is none, and time goes back all the same.
+        assert_eq!(drawn(2.0).len(), 2);
+    }
+
+    #[test]
+    fn frames_that_come_in_bunches_have_one_line() {
+        // 8 frames in a millisecond, every 16 ms, for 10 s on 1500 dots.
+        let mut series = Series::default();
+        for bunch in 0..625 {
+            (0..8).for_each(|frame| series.push(f64::from(bunch) * 0.016 + f64::from(frame) * 1e-4, Some(1.0)));
+        }
+        assert_eq!(points(&series, None, |t| (t * 150.0) as i32, |value| value as i32).len(), 1);
     }
 }

@@ -12,6 +12,8 @@ pub(super) struct PressureMap {
     pub(super) taxels: Vec<MappedTaxel>,
     /// Radius of a taxel's disc, m: that of its area, but no larger than leaves a gap between neighbours.
     pub(super) radius_m: f64,
+    /// Half the distance to a neighbour, m: what is around a taxel's place is its own.
+    half_spacing_m: f64,
     /// The path of the centre of pressure, (u, v), m.
     pub(super) path: Vec<Vec<(f64, f64)>>,
 }
@@ -48,12 +50,12 @@ impl PressureMap {
         areas.sort_by(f64::total_cmp);
         let own_m = (areas.get(areas.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::PI).sqrt();
         let radius_m = if own_m > 0.0 { own_m.min(widest_m) } else { widest_m };
-        Self { field: field.name.clone(), radius_m, taxels, path }
+        Self { field: field.name.clone(), radius_m, half_spacing_m: 0.5 * widest_m / RADIUS_SHARE, taxels, path }
     }
 
-    /// The lower and upper corner of what is drawn, m.
+    /// The lower and upper corner of the map, m: maps beside each other are farther apart than their taxels.
     pub(super) fn extent(&self) -> [(f64, f64); 2] {
-        let r = self.radius_m;
+        let r = self.radius_m.max(self.half_spacing_m);
         self.taxels.iter().fold([(f64::MAX, f64::MAX), (f64::MIN, f64::MIN)], |[low, high], taxel| {
             let (u, v) = taxel.at;
             [(low.0.min(u - r), low.1.min(v - r)), (high.0.max(u + r), high.1.max(v + r))]
@@ -75,4 +77,22 @@ fn widest_radius_m(taxels: &[MappedTaxel]) -> f64 {
         .collect();
     nearest.sort_by(f64::total_cmp);
     nearest.get(nearest.len() / 2).map_or(1e-3, |distance| RADIUS_SHARE * distance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_is_half_a_distance_of_neighbours_wider_than_its_places() {
+        let taxels: Vec<MappedTaxel> = (0..6)
+            .map(|i| MappedTaxel { at: (f64::from(i % 3) * 0.01, f64::from(i / 3) * 0.01), peak: 0.0, integral: 0.0 })
+            .collect();
+        let half_spacing_m = 0.5 * widest_radius_m(&taxels) / RADIUS_SHARE;
+        // However small the discs are.
+        let map = PressureMap { field: String::new(), taxels, radius_m: 0.001, half_spacing_m, path: Vec::new() };
+        let [low, high] = map.extent();
+        let found = [low.0, low.1, high.0, high.1];
+        assert!(found.iter().zip([-0.005, -0.005, 0.025, 0.015]).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+    }
 }

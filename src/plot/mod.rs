@@ -4,6 +4,7 @@
 //! A [`Gatherer`] sees what an engine makes of a recording, in memory that does not grow with it; [`svg()`] and [`png()`] draw
 //! what was gathered.
 
+mod absences;
 mod draw;
 mod gather;
 mod line;
@@ -13,6 +14,7 @@ mod path;
 mod pen;
 mod series;
 mod ticks;
+mod units;
 
 pub use draw::{png, svg};
 pub use gather::{Gathered, Gatherer, outputs_for, wanted_of};

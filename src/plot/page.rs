@@ -14,6 +14,9 @@ const TIME_AXIS: i32 = 46;
 const MAP_TITLE: i32 = 40;
 const MAP: i32 = 300;
 const MAP_BAR: i32 = 58;
+/// Between the maps of two quantities, and of two fields, are these parts of a column's width: more than between taxels.
+const BETWEEN_QUANTITIES: i32 = 9;
+const BETWEEN_FIELDS: i32 = 24;
 
 /// A rectangle.
 #[derive(Clone, Copy, Debug)]
@@ -85,10 +88,41 @@ impl Page {
         Area { left: self.left(column), top, width: self.width, height: PANEL }
     }
 
-    /// Where map `index` of `count` is in a column; the title is above it, the scale of its colours below.
-    pub(super) fn map(&self, column: usize, index: usize, count: usize) -> Area {
-        let width = self.width / count.max(1) as i32;
-        let left = self.left(column) + index as i32 * width;
-        Area { left: left + 4, top: self.maps_top() + MAP_TITLE, width: width - 8, height: MAP }
+    /// Where the maps of `quantity`, 0 or 1, are in a column: what they show is above them, the scale of their colours below.
+    pub(super) fn maps(&self, column: usize, quantity: usize) -> Area {
+        let between = self.width / BETWEEN_QUANTITIES;
+        let width = (self.width - between) / 2;
+        let left = self.left(column) + quantity as i32 * (width + between);
+        Area { left, top: self.maps_top() + MAP_TITLE, width, height: MAP }
+    }
+
+    /// Where map `index` of the `count` maps of `quantity` is in a column, with the field's name above it.
+    pub(super) fn map(&self, column: usize, quantity: usize, index: usize, count: usize) -> Area {
+        let (area, between) = (self.maps(column, quantity), self.width / BETWEEN_FIELDS);
+        let count = count.max(1) as i32;
+        let width = (area.width - (count - 1) * between) / count;
+        Area { left: area.left + index as i32 * (width + between), width, ..area }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_lie_apart_and_in_their_column() {
+        for columns in 1..=4 {
+            let page = Page { columns, width: [760, 520, 400, 400][columns - 1], panels: 2, has_maps: true };
+            for column in 0..columns {
+                let areas: Vec<Area> = [0, 1]
+                    .into_iter()
+                    .flat_map(|quantity| [0, 1].map(|index| page.map(column, quantity, index, 2)))
+                    .collect();
+                let gaps: Vec<i32> = areas.windows(2).map(|pair| pair[1].left - pair[0].right()).collect();
+                assert!(gaps.iter().all(|&gap| gap >= 16) && gaps[1] >= 40, "{columns}: {gaps:?}");
+                let panel = page.panel(column, 0);
+                assert!(areas[0].left >= panel.left && areas[3].right() <= panel.right(), "{columns}");
+            }
+        }
     }
 }

@@ -95,6 +95,35 @@ fn what_cannot_be_plotted_is_reported_in_a_line() {
 }
 
 #[test]
+fn no_line_goes_back_in_time_or_over_a_time_without_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    done(&["author", "--grid", "2x3", "--pitch", "1cm", "-o", text_of(&at("mat.glb"))]);
+    // To 2 s, from 5 to 6 s, and once more from 4 to 4.5 s.
+    let times = (0..=20).chain(50..=60).chain(40..=45).map(|tenth| f64::from(tenth) * 0.1);
+    let frames: String =
+        times.map(|t| format!("{{\"t\": {t:.1}, \"values\": {{\"0\": 9, \"1\": {t:.1}}}}}\n")).collect();
+    std::fs::write(at("back.ndjson"), frames).unwrap();
+    let source = format!("ndjson:{}", text_of(&at("back.ndjson")));
+    let svg = drawn(folder.path(), "a.svg", &[&source, "--body", text_of(&at("mat.glb")), "--outputs", "total"]);
+    let svg = String::from_utf8(svg).unwrap();
+    let lines = svg.split("<polyline ").filter(|line| line.contains("stroke=\"#0072B2\""));
+    let points = lines.filter_map(|line| line.split("points=\"").nth(1)?.split('"').next());
+    let across = |points: &str| -> Vec<f64> {
+        points.split_whitespace().map(|point| point.split(',').next().unwrap().parse().unwrap()).collect()
+    };
+    let mut parts: Vec<Vec<f64>> = points.map(across).collect();
+    // The first is the legend's. Two dots are a pixel, and six seconds are 760 pixels from 66 on.
+    parts.remove(0);
+    let second = |x: f64| (x / 2.0 - 66.0) / 760.0 * 6.0;
+    let ends: Vec<[f64; 2]> = parts.iter().map(|part| [part[0], part[part.len() - 1]].map(second)).collect();
+    let expected = [[0.0, 2.0], [5.0, 6.0], [4.0, 4.5]];
+    let is_near = |(own, right): (&[f64; 2], &[f64; 2])| own.iter().zip(right).all(|(a, b)| (a - b).abs() < 0.01);
+    assert!(ends.len() == 3 && ends.iter().zip(&expected).all(is_near), "{ends:?}");
+    assert!(parts.iter().all(|part| part.windows(2).all(|pair| pair[0] <= pair[1])));
+}
+
+#[test]
 fn a_noisy_line_stays_in_its_panel() {
     let folder = tempfile::tempdir().unwrap();
     let noisy = folder.path().join("noisy.csv");

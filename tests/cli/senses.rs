@@ -133,6 +133,43 @@ fn each_quantity_is_plotted_in_the_letter_that_gives_it_with_its_unit() {
 }
 
 #[test]
+fn a_panel_without_values_says_why() {
+    let skin = Skin::new();
+    std::fs::write(skin.at("senses.toml"), "[all]\nunit = \"kPa\"\n[proximity]\nunit = \"mm\"\nrange = 10\n").unwrap();
+    let svg = skin.plot("nearest,slip_ratio,torsion,warmest_taxel,total_sigma").join("\n");
+    for text in ["nothing in range", "no slips_at in the calibration", "no noise in the calibration", "torsion [Pa m]"]
+    {
+        assert_eq!(svg.matches(text).count(), 1, "{text}");
+    }
+    // The ids of its axis are whole: 11 and its neighbours.
+    let numbers: Vec<&str> = svg.lines().map(str::trim).filter(|line| line.parse::<f64>().is_ok()).collect();
+    assert!(["10", "11", "12"].iter().all(|id| numbers.contains(id)) && !numbers.contains(&"10.5"), "{numbers:?}");
+    // With something in range there is a line, and no reason.
+    let all = Skin::new().plot("nearest").join("\n");
+    assert!(!all.contains("nothing in range") && all.contains("nearest [mm]"));
+}
+
+#[test]
+fn the_usual_quantities_are_those_of_the_fields_that_are_chosen() {
+    let skin = Skin::new();
+    let [bare, body, recipe, touch, to] =
+        ["bare.glb", "parts.glb", "parts.toml", "touch.csv", "b.svg"].map(|name| skin.at(name));
+    let field = |name: &str, taxels: &str| format!("[[fields]]\nname = \"{name}\"\ntaxels = [\"{taxels}\"]\n");
+    std::fs::write(&recipe, field("pressed", "0..=1") + &field("warm", "10..=11") + &field("near", "20..=21")).unwrap();
+    done(&["author", text_of(&bare), "--recipe", text_of(&recipe), "-o", text_of(&body)]);
+    let labels = |fields: &[&str]| {
+        let from = ["plot", text_of(&touch), "--body", text_of(&body), "-o", text_of(&to), "--force"];
+        done(&[&from[..], fields].concat());
+        let svg = std::fs::read_to_string(&to).unwrap();
+        ["area", "warmest", "nearest"].map(|name| svg.contains(&format!("{name} [")))
+    };
+    assert_eq!(labels(&["--fields", "warm"]), [false, true, false]);
+    assert_eq!(labels(&["--fields", "warm", "--fields", "near"]), [false, true, true]);
+    assert_eq!(labels(&["--fields", "pressed"]), [true, false, false]);
+    assert_eq!(labels(&[]), [true, false, false]);
+}
+
+#[test]
 fn a_quantity_that_no_upper_field_has_is_plotted_of_the_first_one_that_has_it() {
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("a.svg");

@@ -115,7 +115,7 @@ def test_other_pictures_are_refused(hand: st.Body, keys: dict, why: str) -> None
 
 def test_other_touches_are_refused(touch: st.Recording) -> None:
     for keys, why in [
-        ({"at_s": -9.0}, "no frames at that time"),
+        ({"at_s": -9.0}, "no frames up to -9 s; give a time of its own, from "),
         ({"at_s": 1.0, "to_s": 2.0}, "give one of them"),
         ({"from_s": 0.0, "rate_hz": 0.0}, "not a rate"),
         ({"uv": "hand/palm"}, "neither a recording"),

@@ -39,19 +39,19 @@ pub(super) struct Flags {
 
     /// The time to show, such as 2.9s [default: when most is pressed or pulled, or it is warmest, or nearest].
     ///
-    /// A bare number is in seconds.
+    /// A bare number is in seconds. It is compared with the times of the recording's frames, which need not begin at 0.
     #[arg(long, value_name = "TIME", value_parser = seconds, conflicts_with_all = ["from", "to"])]
     at: Option<f64>,
 
     /// Show an animation from this time on, such as 1s.
     ///
-    /// A bare number is in seconds.
+    /// A bare number is in seconds. It is compared with the times of the recording's frames, which need not begin at 0.
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     from: Option<f64>,
 
     /// Show an animation up to this time, such as 4s.
     ///
-    /// A bare number is in seconds.
+    /// A bare number is in seconds. It is compared with the times of the recording's frames, which need not begin at 0.
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     to: Option<f64>,
 
