@@ -344,7 +344,7 @@ impl Source for SimulatedSource {
     }
 
     fn notices(&mut self) -> Vec<String> {
-        self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
+        self.notices.drain(..).chain(self.touches.notices()).map(|what| format!("{}: {what}", self.name)).collect()
     }
 }
 
