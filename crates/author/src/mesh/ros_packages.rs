@@ -54,7 +54,17 @@ pub(super) fn resolve(rest: &str, packages: &BTreeMap<String, PathBuf>, roots: &
             "`package://{rest}` is in the package `{package}`{searched}; say where that is: --package {package}=FOLDER"
         ))
     })?;
-    Ok(folder.join(within))
+    let path = folder.join(within);
+    if !path.exists()
+        && let Some(right) = folder.ancestors().skip(1).take(MAX_DEPTH).find(|above| above.join(within).is_file())
+    {
+        return Err(failed!(
+            "{}: no such file; did you mean --package {package}={}?",
+            path.display(),
+            if right.as_os_str().is_empty() { ".".into() } else { right.display().to_string() }
+        ));
+    }
+    Ok(path)
 }
 
 /// The package called `name` at `root` or below it. What is below a package belongs to it.

@@ -194,9 +194,7 @@ impl LinkTouch {
             }
         }
         if let Some(celsius) = self.beside.celsius {
-            for ((warmed, seat), &(_, side_m)) in
-                felt.sensed.warmed.iter_mut().zip(&self.places.warm).zip(of.warm)
-            {
+            for ((warmed, seat), &(_, side_m)) in felt.sensed.warmed.iter_mut().zip(&self.places.warm).zip(of.warm) {
                 let Some(share) = press.share_on(seat, side_m) else { continue };
                 let share = (share / press.footprint.share_on(0.0, 0.0, side_m)).min(1.0);
                 warmed[0] += share;

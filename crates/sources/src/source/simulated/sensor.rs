@@ -81,9 +81,7 @@ impl Sensor {
     /// The same of a tangential force, which has no threshold.
     pub(super) fn read_pull(&self, reading: &Reading) -> f64 {
         match self.disturbed(reading) {
-            Ok(disturbed) => {
-                self.kind.pull(without_tail(self.gains[reading.index] * reading.force_newton), disturbed)
-            }
+            Ok(disturbed) => self.kind.pull(without_tail(self.gains[reading.index] * reading.force_newton), disturbed),
             Err(stuck) => stuck.unwrap_or_else(|| self.kind.pull(0.0, 0.0)),
         }
     }

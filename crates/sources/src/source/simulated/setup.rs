@@ -282,8 +282,7 @@ impl Setup<'_> {
     fn pressed(&self, link: usize, field: Option<&str>) -> Vec<usize> {
         let field = field.and_then(|name| self.fields.fields.iter().find(|field| field.name == name));
         let Some(field) = field else { return vec![link] };
-        let links: BTreeSet<usize> =
-            field.members.iter().map(|member| self.body.taxels[member.taxel].link).collect();
+        let links: BTreeSet<usize> = field.members.iter().map(|member| self.body.taxels[member.taxel].link).collect();
         links.into_iter().collect()
     }
 
