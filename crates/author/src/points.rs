@@ -272,3 +272,91 @@ fn nearest(index: &SurfaceIndex, place: &GivenPoint) -> Option<Hit> {
         hit
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use glam::DVec3;
+
+    use crate::body::{Body, Glb, MeshData, Modality, Original};
+    use crate::field::FieldSet;
+    use crate::{Recipe, author};
+
+    /// Boxes about their links' origins: name, place of the link, half sides, m.
+    fn boxes(of: &[(&str, DVec3, [f32; 3])]) -> Original {
+        let mut glb = Glb::new();
+        for &(name, place, half) in of {
+            let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+            let corner = |i: u32| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { half[axis] } else { -half[axis] });
+            let mesh = MeshData {
+                positions: (0..8).map(corner).collect(),
+                normals: vec![[0.0, 0.0, 1.0]; 8],
+                triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+                skinning: None,
+            };
+            let node = glb.node(name, None, place);
+            glb.mesh(node, name, &mesh, None, None);
+        }
+        Original::from_bytes("boxes.glb", &glb.to_bytes().unwrap(), None).unwrap()
+    }
+
+    #[test]
+    fn a_row_comes_to_the_surface_of_its_link_and_to_the_side_of_its_normal() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = |csv: &str| {
+            std::fs::write(folder.path().join("a.csv"), csv).unwrap();
+            let recipe = Recipe::parse("a.toml", "[[place]]\ncsv = \"a.csv\"\n", folder.path()).unwrap();
+            // Fingers 1 mm apart.
+            let right = DVec3::new(0.0, 0.0, 0.003);
+            let plate = [0.01, 0.02, 0.001];
+            author(boxes(&[("left", DVec3::ZERO, plate), ("right", right, plate)]), &recipe, |_| {})
+        };
+        let place = |body: &Body, taxel: usize| {
+            let taxel = &body.taxels[taxel];
+            (body.links[taxel.link].name.clone(), taxel.position_in_link, taxel.normal_in_link)
+        };
+        let is = |found: (String, DVec3, DVec3), link: &str, z: f64, normal: DVec3| {
+            let near = (found.1.z - z).abs() < 1e-7 && found.2.distance(normal) < 1e-6;
+            assert!(found.0 == link && near, "{found:?}");
+        };
+        // The first is nearest to the right finger, in the left one's frame; the last on an edge.
+        let body = made(
+            "id,link,x,y,z,nx,ny,nz\n0,left,0,0,0.0018,,,\n1,left,0.004,0,0.0002,0,0,-1\n2,right,0.004,0.01,-0.0002,0.1,0,1\n\
+             3,left,0.01,0,0.001,1,0,0.1\n4,left,0.01,0.01,0.001,0.1,0,1\n",
+        );
+        let body = body.unwrap().body;
+        is(place(&body, 0), "left", 0.001, DVec3::Z);
+        is(place(&body, 1), "left", -0.001, DVec3::NEG_Z);
+        is(place(&body, 2), "right", 0.001, DVec3::Z);
+        is(place(&body, 3), "left", 0.001, DVec3::X);
+        is(place(&body, 4), "left", 0.001, DVec3::Z);
+        let why = made("id,link,x,y,z,nx,ny,nz\n7,left,0,0,0.09,,,\n").unwrap_err().to_string();
+        assert!(why.contains("line 2: taxel 7 lies 89.0 mm from the surface of `left`, farther than"), "{why}");
+    }
+
+    #[test]
+    fn other_kinds_join_the_field_of_their_own_side_of_a_thin_shell() {
+        let place = |first: u32, taxels: u32, kind: &str| {
+            format!("[[place]]\nname = \"{kind}\"\nfirst_id = {first}\ntaxels = {taxels}\nmodality = \"{kind}\"\n")
+        };
+        let text = place(0, 120, "pressure") + &place(1000, 40, "temperature");
+        let recipe = Recipe::parse("a.toml", &text, Path::new("")).unwrap();
+        let palm = boxes(&[("palm", DVec3::ZERO, [0.05, 0.05, 0.0005])]);
+        let body = author(palm, &recipe, |_| {}).unwrap().body;
+        let fields = FieldSet::new(&body).unwrap().fields;
+        let mut warm = 0;
+        for field in fields.iter().filter(|field| field.name.contains('/')) {
+            let of = |is_warm: bool| {
+                let members = field.members.iter().map(|member| &body.taxels[member.taxel]);
+                members.filter(move |taxel| (taxel.modality == Modality::Temperature) == is_warm)
+            };
+            for taxel in of(true) {
+                let is_beside = of(false).any(|pressed| pressed.normal_in_link.dot(taxel.normal_in_link) > 0.0);
+                assert!(is_beside || of(false).next().is_none(), "{}: {taxel:?}", field.name);
+                warm += 1;
+            }
+        }
+        assert!(warm >= 40, "{warm}");
+    }
+}

@@ -124,6 +124,12 @@ mod tests {
         assert_eq!(found("arm/a/b.stl", &["none", "src"], &["opt"], &[]), mesh(&deep));
         assert_eq!(found("/arm/a/b.stl", &["src/robots/arm"], &[], &[]), mesh(&deep));
         assert_eq!(found("arm/a/b.stl", &["src"], &["opt"], &[("arm", "/own")]), mesh(Path::new("/own")));
+        std::fs::create_dir_all(deep.join("a/a")).unwrap();
+        std::fs::write(deep.join("a/b.stl"), "").unwrap();
+        let inner = deep.join("a");
+        let why = found("arm/a/b.stl", &[], &[], &[("arm", inner.to_str().unwrap())]).unwrap_err();
+        let right = format!("a/a/b.stl: no such file; did you mean --package arm={}?", deep.display());
+        assert!(why.ends_with(&right), "{why}");
         assert_eq!(found("arm/a/b.stl", &[], &["opt"], &[]), mesh(&second));
         // A folder in a package is none, but one that is named is looked for by its name.
         assert_eq!(found("hand/a/b.stl", &["src"], &["opt"], &[]), mesh(&shared));

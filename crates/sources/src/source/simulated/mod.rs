@@ -25,6 +25,8 @@ mod senses_setup;
 mod sensor;
 mod sensors;
 mod setup;
+#[cfg(test)]
+mod tests;
 mod truth;
 mod whole;
 mod whole_setup;
