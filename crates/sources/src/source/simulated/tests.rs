@@ -124,8 +124,8 @@ fn an_indenter_that_does_not_reach_its_place_is_reported_once() {
     next(&mut wide);
     next(&mut wide);
     let [notice] = &wide.notices()[..] else { panic!("not one notice") };
-    let start = "made: touch `poke` does not reach its place on `finger` at 0.000 s: it stays 4.";
-    let end = " mm above, on `palm`, which is in the way; take a smaller indenter, or another `path`";
+    let start = "made: touch `poke` does not reach its place on `finger` at 0.000 s: it stays at least 4.";
+    let end = " mm above, as `palm` is in the way; take a smaller indenter, or another `path`";
     assert!(notice.starts_with(start) && notice.ends_with(end), "{notice}");
     assert_eq!(wide.truth()[0].link, "palm");
     wide.seek(0);

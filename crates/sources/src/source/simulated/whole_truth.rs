@@ -107,10 +107,12 @@ impl TouchOfBody {
 
 /// The message that `contact` is not at its place at `t_s`, if so.
 fn unreached(body: &Body, touch: &str, t_s: f64, contact: &Contact) -> Option<String> {
-    let [wanted, met] = [contact.unreached?, contact.link].map(|link| &body.links[link].name);
+    let link = contact.unreached?;
+    let [wanted, met] = [link, contact.link].map(|link| &body.links[link].name);
+    let met = if link == contact.link { "another part of it".to_owned() } else { format!("`{met}`") };
     let above_mm = -contact.depth_m * 1e3;
     Some(format!(
-        "touch `{touch}` does not reach its place on `{wanted}` at {t_s:.3} s: it stays {above_mm:.1} mm above, on `{met}`, which is in \
+        "touch `{touch}` does not reach its place on `{wanted}` at {t_s:.3} s: it stays at least {above_mm:.1} mm above, as {met} is in \
          the way; take a smaller indenter, or another `path`"
     ))
 }
