@@ -55,7 +55,8 @@ pub(super) fn resolve(rest: &str, packages: &BTreeMap<String, PathBuf>, roots: &
         ))
     })?;
     let path = folder.join(within);
-    if !path.exists()
+    if packages.contains_key(package)
+        && !path.exists()
         && let Some(right) = folder.ancestors().skip(1).take(MAX_DEPTH).find(|above| above.join(within).is_file())
     {
         return Err(failed!(
@@ -125,10 +126,10 @@ mod tests {
         assert_eq!(found("/arm/a/b.stl", &["src/robots/arm"], &[], &[]), mesh(&deep));
         assert_eq!(found("arm/a/b.stl", &["src"], &["opt"], &[("arm", "/own")]), mesh(Path::new("/own")));
         std::fs::create_dir_all(deep.join("a/a")).unwrap();
-        std::fs::write(deep.join("a/b.stl"), "").unwrap();
+        std::fs::write(deep.join("a/c.stl"), "").unwrap();
         let inner = deep.join("a");
-        let why = found("arm/a/b.stl", &[], &[], &[("arm", inner.to_str().unwrap())]).unwrap_err();
-        let right = format!("a/a/b.stl: no such file; did you mean --package arm={}?", deep.display());
+        let why = found("arm/a/c.stl", &[], &[], &[("arm", inner.to_str().unwrap())]).unwrap_err();
+        let right = format!("a/a/c.stl: no such file; did you mean --package arm={}?", deep.display());
         assert!(why.ends_with(&right), "{why}");
         assert_eq!(found("arm/a/b.stl", &[], &["opt"], &[]), mesh(&second));
         // A folder in a package is none, but one that is named is looked for by its name.
