@@ -264,7 +264,11 @@ fn what_a_robot_lacks_is_reported_with_its_line() {
     let path = robot(folder.path());
     assert!(why(&path, &options()).contains("line 4: `package://arm/meshes/box.stl` is in the package `arm`"));
     let mut with = options();
-    with.packages = BTreeMap::from([("arm".to_owned(), folder.path().join("elsewhere"))]);
+    with.packages = BTreeMap::from([("arm".to_owned(), folder.path().join("meshes"))]);
+    let too_deep = why(&path, &with);
+    let hint = format!("meshes/meshes/box.stl: no such file; did you mean --package arm={}?", folder.path().display());
+    assert!(too_deep.contains("line 4: ") && too_deep.ends_with(&hint), "{too_deep}");
+    with.packages = BTreeMap::from([("arm".to_owned(), PathBuf::from("/no/such"))]);
     let missing = why(&path, &with);
     assert!(missing.contains("link `hand`") && missing.contains("box.stl: no such file"), "{missing}");
     with.packages = BTreeMap::from([("arm".to_owned(), folder.path().to_owned())]);
