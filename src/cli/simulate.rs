@@ -92,6 +92,7 @@ pub(super) fn simulate(arguments: &Arguments) -> Result<u8> {
         bar.show_with_time_left(share);
     })?;
     drop(bar);
+    simulation.notices().iter().for_each(|notice| say(notice));
     let mut summary = format!("{frames} frames in {place}, the truth in {}", truth.display());
     if let Some(to) = calibration_to {
         summary += &format!(", the calibration in {}", to.name().display());

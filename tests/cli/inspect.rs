@@ -129,6 +129,30 @@ fn what_was_put_right_on_reading_is_reported_by_inspect_and_by_run() {
     assert_eq!(frame["fields"][0]["total"], 11.0, "taxel 3 is in no field");
 }
 
+#[test]
+fn kinds_of_taxels_are_not_added_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let place = |name: &str, first: u32, taxels: u32, kind: &str| {
+        format!("[[place]]\nname = \"{name}\"\nfirst_id = {first}\ntaxels = {taxels}\nmodality = \"{kind}\"\n")
+    };
+    let recipe = place("skin", 0, 60, "force3") + &place("warm", 100, 20, "temperature");
+    std::fs::write(at("kinds.toml"), recipe).unwrap();
+    done(&["author", "mat", "--recipe", &at("kinds.toml"), "-o", &at("kinds.glb")]);
+    let text = done(&["inspect", &at("kinds.glb")]);
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let line = |part: &str| *lines.iter().find(|line| line.contains(part)).unwrap_or_else(|| panic!("{part}: {text}"));
+    let area = |line: &str| -> f64 {
+        let (before, _) = line.split_once(" cm² of skin").unwrap_or_else(|| panic!("{line}"));
+        before.rsplit(' ').next().unwrap().parse().unwrap()
+    };
+    let [pressed, warm] = ["feel forces,", "20 temperature, "].map(line);
+    assert!(pressed.starts_with("taxels") && pressed.contains(" mm apart ("), "{pressed}");
+    assert!((area(pressed) / area(warm) - 1.0).abs() < 0.01, "{pressed} {warm}");
+    let plain = done(&["inspect", "mat"]);
+    assert!(!plain.contains("feel forces") && plain.contains(" cm² of skin"), "{plain}");
+}
+
 /// The triangles of a cube of half side `side` about the origin, outside out or in.
 fn cube(side: f32, is_inward: bool) -> MeshData {
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];

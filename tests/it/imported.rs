@@ -9,6 +9,7 @@ use somatic::author::mesh::{Geometry, MeshOptions, author_mjcf_skin, author_urdf
 use somatic::author::{Authored, Recipe, author, author_csv_skin, author_icub};
 use somatic::body::Body;
 use somatic::internal::author::mesh::{Up, files};
+use somatic::internal::body::Original;
 
 /// The corners and sides, counter-clockwise seen from outside, of a box of 20 × 40 × 60 from the origin on.
 const CORNERS: [[f64; 3]; 8] = [
@@ -263,7 +264,11 @@ fn what_a_robot_lacks_is_reported_with_its_line() {
     let path = robot(folder.path());
     assert!(why(&path, &options()).contains("line 4: `package://arm/meshes/box.stl` is in the package `arm`"));
     let mut with = options();
-    with.packages = BTreeMap::from([("arm".to_owned(), folder.path().join("elsewhere"))]);
+    with.packages = BTreeMap::from([("arm".to_owned(), folder.path().join("meshes"))]);
+    let too_deep = why(&path, &with);
+    let hint = format!("meshes/meshes/box.stl: no such file; did you mean --package arm={}?", folder.path().display());
+    assert!(too_deep.contains("line 4: ") && too_deep.ends_with(&hint), "{too_deep}");
+    with.packages = BTreeMap::from([("arm".to_owned(), PathBuf::from("/no/such"))]);
     let missing = why(&path, &with);
     assert!(missing.contains("link `hand`") && missing.contains("box.stl: no such file"), "{missing}");
     with.packages = BTreeMap::from([("arm".to_owned(), folder.path().to_owned())]);
@@ -420,7 +425,12 @@ fn what_is_deep_or_claims_a_lot_is_one_line_in_no_time() {
     let small = std::thread::Builder::new().stack_size(512 << 10);
     std::thread::scope(|scope| {
         let work = || {
-            assert!(skin(&write("a.xml", &mjcf(490))).contains("neither <tactile> nor touch_grid"));
+            let bare = write("a.xml", &mjcf(490));
+            let why_not = skin(&bare);
+            assert!(why_not.contains("neither <tactile> nor touch_grid"), "{why_not}");
+            assert!(why_not.contains("URDF or mesh: somatic author robot.urdf --taxels 500 -o body.glb"), "{why_not}");
+            let as_body = Original::open(&bare).unwrap_err().to_string();
+            assert!(as_body.contains("this is an MJCF, not a glTF") && as_body.contains("--mjcf-skin"), "{as_body}");
             assert!(skin(&write("a.xml", &mjcf(100_000))).contains("nested over 500 deep"));
             assert!(why(&write("a.dae", &collada(490)), &options()).contains("no <scene>"));
             assert!(why(&write("a.dae", &collada(100_000)), &options()).contains("nested over 500 deep"));

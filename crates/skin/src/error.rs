@@ -189,11 +189,18 @@ pub fn nearest<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .map(|(_, _, name)| name)
 }
 
+/// The shortest name among `known` that `asked` is the first word of.
+fn begun<'a>(asked: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let goes_on = |name: &&str| name.strip_prefix(asked).is_some_and(|rest| rest.starts_with(['_', '-', '/', '.']));
+    known.filter(|_| !asked.is_empty()).filter(goes_on).min_by_key(|name| name.len())
+}
+
 /// What to try instead of the unknown name `asked`: the nearest of the `known` names, or a list of them.
 #[must_use]
 pub fn suggestion<'a>(asked: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: BTreeSet<&str> = known.into_iter().collect();
-    if let Some(near) = nearest(asked, known.iter().copied()) {
+    let near = nearest(asked, known.iter().copied()).or_else(|| begun(asked, known.iter().copied()));
+    if let Some(near) = near {
         return format!("did you mean `{near}`?");
     }
     let first: Vec<&str> = known.iter().copied().take(MAX_SUGGESTIONS).collect();

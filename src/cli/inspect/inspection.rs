@@ -8,6 +8,12 @@ use somatic::internal::field::RestOverlap;
 
 use super::graph::SkinGraph;
 
+/// The areas of the taxels that feel forces, m², or of all if none does: each other kind divides the skin anew.
+pub(super) fn cells_of(body: &Body) -> impl Iterator<Item = f64> + '_ {
+    let any = body.taxels.iter().any(|taxel| taxel.modality.is_pressed());
+    body.taxels.iter().filter(move |taxel| taxel.modality.is_pressed() || !any).map(|taxel| taxel.area)
+}
+
 /// What is reported about a body.
 pub(super) struct Inspection {
     pub(super) body: Body,

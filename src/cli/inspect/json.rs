@@ -6,7 +6,7 @@ use somatic::body::{Body, Modality};
 use somatic::field::{Field, WORLD};
 use somatic::internal::author::cell_spread;
 
-use super::inspection::Inspection;
+use super::inspection::{Inspection, cells_of};
 
 /// One object and a newline.
 pub(super) fn text(seen: &Inspection) -> String {
@@ -55,7 +55,7 @@ pub(super) fn text(seen: &Inspection) -> String {
             })).collect::<Vec<_>>(),
         },
     });
-    if let Some([low, high]) = cell_spread(body.taxels.iter().map(|taxel| taxel.area)) {
+    if let Some([low, high]) = cell_spread(cells_of(body)) {
         whole["cells"] = json!({"p5": low, "p95": high});
     }
     if let Some(errors) = &seen.errors {

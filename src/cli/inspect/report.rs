@@ -6,12 +6,12 @@ use comfy_table::ColumnConstraint;
 use console::style;
 use rstar::RTree;
 use somatic::author::Coverage;
-use somatic::body::{Body, ChartKind, Modality};
+use somatic::body::{Body, ChartKind, Modality, Taxel};
 use somatic::field::{Field, WORLD};
 use somatic::internal::author::cell_spread;
 use somatic::internal::field::RestOverlap;
 
-use super::inspection::Inspection;
+use super::inspection::{Inspection, cells_of};
 use crate::cli::expected;
 use crate::cli::table::{TextTable, plain, shown};
 use crate::cli::words::{bullet, count, millimetres, one_line, spread, title};
@@ -25,11 +25,13 @@ pub(super) fn text(seen: &Inspection) -> String {
     line("links", body.links.len().to_string());
     let surfaces = count(triangles as u64, "triangle");
     line("surfaces", format!("{} with {surfaces}", body.surfaces.len()));
-    line("taxels", taxels(body));
+    for (number, what) in taxels(body).into_iter().enumerate() {
+        line(if number == 0 { "taxels" } else { "" }, what);
+    }
     if let Some(kinds) = kinds(body) {
         line("kinds", kinds);
     }
-    if let Some(cells) = cell_spread(body.taxels.iter().map(|taxel| taxel.area)) {
+    if let Some(cells) = cell_spread(cells_of(body)) {
         line("cells", format!("{} of the median area, 5th to 95th percentile", spread(cells)));
     }
     for (what, value) in seen.errors.iter().flat_map(expected::lines) {
@@ -74,11 +76,28 @@ fn kinds(body: &Body) -> Option<String> {
     has_others.then(|| kinds.join(", "))
 }
 
-/// Number of taxels, how far they lie apart, and the area they stand for.
-fn taxels(body: &Body) -> String {
-    let mut text = body.taxels.len().to_string();
-    let places: Vec<[f64; 3]> = body
-        .taxels
+/// Number of taxels, how far they lie apart, and the area they stand for; a line for those that feel forces, and one for each other
+/// kind, as each divides the skin anew.
+fn taxels(body: &Body) -> Vec<String> {
+    let mut kinds: BTreeMap<Option<u32>, Vec<&Taxel>> = BTreeMap::new();
+    for taxel in &body.taxels {
+        let kind = (!taxel.modality.is_pressed()).then(|| taxel.modality.code());
+        kinds.entry(kind).or_default().push(taxel);
+    }
+    let (alone, all) = (kinds.len() < 2, body.taxels.len());
+    let of_kind = |taxels: Vec<&Taxel>| match taxels.first() {
+        Some(first) if !alone && !first.modality.is_pressed() => {
+            spaced(body, &taxels, &format!(" {}", first.modality.name()))
+        }
+        _ if alone => spaced(body, &taxels, ""),
+        _ => spaced(body, &taxels, &format!(" of {all} feel forces")),
+    };
+    if kinds.is_empty() { vec!["0".to_owned()] } else { kinds.into_values().map(of_kind).collect() }
+}
+
+fn spaced(body: &Body, taxels: &[&Taxel], what: &str) -> String {
+    let mut text = format!("{}{what}", taxels.len());
+    let places: Vec<[f64; 3]> = taxels
         .iter()
         .map(|taxel| body.links[taxel.link].body_from_link.transform_point3(taxel.position_in_link).to_array())
         .collect();
@@ -90,11 +109,11 @@ fn taxels(body: &Body) -> String {
         let [least, middle, most] = [*least, gaps[gaps.len() / 2], *most].map(millimetres);
         text += &format!(", {middle} mm apart ({least} to {most})");
     }
-    let area: f64 = body.taxels.iter().map(|taxel| taxel.area).sum();
+    let area: f64 = taxels.iter().map(|taxel| taxel.area).sum();
     if area > 0.0 {
         text += &format!(", {:.1} cm² of skin", area * 1e4);
     }
-    let unknown = body.taxels.iter().filter(|taxel| taxel.area == 0.0).count();
+    let unknown = taxels.iter().filter(|taxel| taxel.area == 0.0).count();
     if unknown > 0 {
         text += &format!(", {unknown} without an area");
     }

@@ -30,7 +30,8 @@ pub(super) struct ChartNotes {
 impl ChartNotes {
     pub(super) fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        if let [(_, _, why), ..] = &self.split[..] {
+        if !self.split.is_empty() {
+            let why = reason(self.split.iter().map(|(name, _, why)| (name, why.clone())));
             let names = fields(self.split.iter().map(|(name, ..)| name));
             let parts: usize = self.split.iter().map(|(_, parts, _)| parts).sum();
             lines.push(format!("{names} split into {parts} parts: {why}"));
@@ -52,7 +53,8 @@ impl ChartNotes {
                 _ => &format!("; {SPLIT}"),
             };
             let names = fields(alike.iter().map(|(name, ..)| name));
-            lines.push(format!("{names} without a chart, so without orientation: {}{advice}", plain(why)));
+            let why = reason(alike.iter().map(|(name, why, _)| (name, plain(why))));
+            lines.push(format!("{names} without a chart, so without orientation: {why}{advice}"));
         }
         if let Some((worst, most)) = self.poor.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
             let names = fields(self.poor.iter().map(|(name, _)| name));
@@ -77,6 +79,13 @@ fn fields<'a>(names: impl Iterator<Item = &'a String>) -> String {
             _ => format!("fields {}:", names.join(", ")),
         },
     }
+}
+
+/// Why fields are as they are: the reason of all, else of the first as an example.
+fn reason<'a>(fields: impl Iterator<Item = (&'a String, String)>) -> String {
+    let mut fields = fields.peekable();
+    let Some((name, first)) = fields.next() else { return String::new() };
+    if fields.all(|(_, why)| why == first) { first } else { format!("for example in `{name}` {first}") }
 }
 
 /// Reasons that are reported together.
@@ -135,17 +144,22 @@ mod tests {
     #[test]
     fn a_line_on_charts_says_what_to_write() {
         let around = NoChart::CutLocus { taxel: 12, distance_m: 0.035 };
-        let bare = [("limb", around.clone(), false), ("arm", around, false), ("all", NoChart::SeveralLinks(3), true)];
+        let other = NoChart::CutLocus { taxel: 20, distance_m: 0.05 };
+        let bare = [("limb", around.clone(), false), ("arm", other, false), ("all", NoChart::SeveralLinks(3), true)];
         let bare = bare.map(|(name, why, is_parent)| (name.to_owned(), why, is_parent)).to_vec();
         let few = vec!["leg/front_1".to_owned()];
         let poor = vec![("palm".to_owned(), 0.3), ("back".to_owned(), 0.4)];
+        let split = [("leg", 2, "it wraps"), ("foot", 3, "it is bent")];
+        let split = split.map(|(name, parts, why)| (name.to_owned(), parts, why.to_owned())).to_vec();
+        let alike = ChartNotes { split: vec![split[0].clone(); 2], ..ChartNotes::default() };
+        assert_eq!(alike.lines(), ["fields `leg`, `leg`: split into 4 parts: it wraps"]);
         assert_eq!(
-            ChartNotes { split: vec![("leg".to_owned(), 2, "it wraps".to_owned())], bare, poor, few }.lines(),
+            ChartNotes { split, bare, poor, few }.lines(),
             [
-                "field `leg`: split into 2 parts: it wraps",
+                "fields `leg`, `foot`: split into 5 parts: for example in `leg` it wraps",
                 "field `leg/front_1`: without a chart, so without orientation: too few taxels to split",
-                "fields `limb`, `arm`: without a chart, so without orientation: it goes all the way around: two paths of 35.0 \
-                 mm lead to taxel 12; to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]",
+                "fields `limb`, `arm`: without a chart, so without orientation: for example in `limb` it goes all the way around: \
+                 two paths of 35.0 mm lead to taxel 12; to split a field, write `wrap = \"split\"` or smaller `patches` in a recipe's [[fields]]",
                 "field `all`: without a chart, so without orientation: its taxels sit on 3 links that move against each \
                  other; for a field on each link, write `each = \"link\"` in a recipe's [[fields]]",
                 "fields `palm`, `back`: with a distorted chart, distances up to 40 % off in `back`; smaller \

@@ -38,7 +38,8 @@ impl Grouper<'_> {
         Ok(())
     }
 
-    /// `patches`, each also with the taxels that feel no pressure and are nearest to one of its taxels on the same link.
+    /// `patches`, each also with the taxels that feel no pressure and are nearest to one of its taxels on the same link, on their own
+    /// side of it if there is one: those of the other side of a thin shell may be nearer.
     fn join_other_kinds(&self, mut patches: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
         let body = self.body;
         let of_link: BTreeSet<usize> = patches.iter().flatten().map(|&taxel| body.taxels[taxel].link).collect();
@@ -51,12 +52,15 @@ impl Grouper<'_> {
         let joined = others.into_iter().filter_map(|other| {
             let own = &body.taxels[other];
             let apart = |&taxel: &usize| body.taxels[taxel].position_in_link.distance_squared(own.position_in_link);
+            let is_behind = |&taxel: &usize| body.taxels[taxel].normal_in_link.dot(own.normal_in_link) < 0.0;
             let nearest = |patch: &Vec<usize>| {
                 let beside = patch.iter().filter(|&&taxel| body.taxels[taxel].link == own.link);
-                beside.map(apart).min_by(f64::total_cmp)
+                let sided = beside.map(|taxel| (is_behind(taxel), apart(taxel)));
+                sided.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
             };
             let by_patch = patches.iter().enumerate().filter_map(|(index, patch)| Some((nearest(patch)?, index)));
-            by_patch.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, patch)| (patch, other))
+            let best = by_patch.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            best.map(|(_, patch)| (patch, other))
         });
         for (patch, other) in joined.collect::<Vec<_>>() {
             patches[patch].push(other);

@@ -54,7 +54,18 @@ pub(super) fn resolve(rest: &str, packages: &BTreeMap<String, PathBuf>, roots: &
             "`package://{rest}` is in the package `{package}`{searched}; say where that is: --package {package}=FOLDER"
         ))
     })?;
-    Ok(folder.join(within))
+    let path = folder.join(within);
+    if packages.contains_key(package)
+        && !path.exists()
+        && let Some(right) = folder.ancestors().skip(1).take(MAX_DEPTH).find(|above| above.join(within).is_file())
+    {
+        return Err(failed!(
+            "{}: no such file; did you mean --package {package}={}?",
+            path.display(),
+            if right.as_os_str().is_empty() { ".".into() } else { right.display().to_string() }
+        ));
+    }
+    Ok(path)
 }
 
 /// The package called `name` at `root` or below it. What is below a package belongs to it.
@@ -114,6 +125,12 @@ mod tests {
         assert_eq!(found("arm/a/b.stl", &["none", "src"], &["opt"], &[]), mesh(&deep));
         assert_eq!(found("/arm/a/b.stl", &["src/robots/arm"], &[], &[]), mesh(&deep));
         assert_eq!(found("arm/a/b.stl", &["src"], &["opt"], &[("arm", "/own")]), mesh(Path::new("/own")));
+        std::fs::create_dir_all(deep.join("a/a")).unwrap();
+        std::fs::write(deep.join("a/c.stl"), "").unwrap();
+        let inner = deep.join("a");
+        let why = found("arm/a/c.stl", &[], &[], &[("arm", inner.to_str().unwrap())]).unwrap_err();
+        let right = format!("a/a/c.stl: no such file; did you mean --package arm={}?", deep.display());
+        assert!(why.ends_with(&right), "{why}");
         assert_eq!(found("arm/a/b.stl", &[], &["opt"], &[]), mesh(&second));
         // A folder in a package is none, but one that is named is looked for by its name.
         assert_eq!(found("hand/a/b.stl", &["src"], &["opt"], &[]), mesh(&shared));

@@ -236,6 +236,9 @@ impl Elements<'_> {
     }
 }
 
+/// How far into a file its first element is looked for.
+const MJCF_HEAD: usize = 4096;
+
 /// Rejects `bytes` of a file called `name` whose extension is that of another format.
 pub(super) fn refuse_other_formats(name: &str, bytes: &[u8]) -> Result<()> {
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
@@ -247,6 +250,12 @@ pub(super) fn refuse_other_formats(name: &str, bytes: &[u8]) -> Result<()> {
         Some("dae") => "a COLLADA mesh",
         Some("ply") => "a PLY mesh",
         Some("urdf" | "xacro") => "a URDF",
+        _ if text.starts_with(b"<") && text.windows(7).take(MJCF_HEAD).any(|word| word == b"<mujoco") => {
+            return Err(failed!(
+                "this is an MJCF, not a glTF; make one of its tactile sensors: somatic author --mjcf-skin {name} -o body.glb, or place \
+                 taxels on the robot's URDF or mesh: somatic author robot.urdf --taxels 500 -o body.glb"
+            ));
+        }
         _ => return Ok(()),
     };
     Err(failed!("this is {what}, not a glTF; make one of it: somatic author {name} --taxels 500 -o body.glb"))

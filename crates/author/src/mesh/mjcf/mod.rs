@@ -58,7 +58,8 @@ struct Skin {
 
 fn build(model: &Model, path: &Path, options: &MeshOptions) -> Result<Authored> {
     if model.sensors.is_empty() {
-        let what = "it has neither <tactile> nor touch_grid sensors; place taxels on a mesh instead: --taxels 500";
+        let what = "it has neither <tactile> nor touch_grid sensors, and taxels are not placed on an MJCF; do that on the \
+                    robot's URDF or mesh: somatic author robot.urdf --taxels 500 -o body.glb";
         return Err(Error::failed(what));
     }
     let mut skin = Skin::default();

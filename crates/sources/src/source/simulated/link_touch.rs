@@ -24,13 +24,20 @@ pub(super) struct LinkTouch {
     pub(super) places: Arc<Places>,
 }
 
-/// Positions and normals of taxels in a link's frame at rest.
+/// Taxels in a link's frame at rest.
 pub(super) struct Places {
-    pressed: Vec<(DVec3, DVec3)>,
+    pressed: Vec<Seat>,
     /// Of the pressed taxels, where any has three axes.
     tangents: Vec<[DVec3; 2]>,
-    warm: Vec<(DVec3, DVec3)>,
-    near: Vec<(DVec3, DVec3)>,
+    warm: Vec<Seat>,
+    near: Vec<Seat>,
+}
+
+struct Seat {
+    position: DVec3,
+    normal: DVec3,
+    /// Whether it is on a link that the touch presses: others are seen, but do not feel it.
+    is_touched: bool,
 }
 
 /// The taxels of a body by what they measure: indices in the body, and sides of squares of their areas, m.
@@ -53,13 +60,16 @@ pub(super) struct Felt<'a> {
 }
 
 impl Places {
-    /// The taxels `of` `body` in the frame of `link`.
-    pub(super) fn new(body: &Body, link: usize, of: Kinds<'_>) -> Self {
+    /// The taxels `of` `body` in the frame of `link`, for touches that press the links `pressed`.
+    pub(super) fn new(body: &Body, link: usize, pressed: &[usize], of: Kinds<'_>) -> Self {
         let place = |&(taxel, _): &(usize, f64)| {
             let taxel: &Taxel = &body.taxels[taxel];
             let link_from_taxel = body.rest_transform(link, taxel.link);
-            let normal = link_from_taxel.transform_vector3(taxel.normal_in_link);
-            (link_from_taxel.transform_point3(taxel.position_in_link), normal)
+            Seat {
+                position: link_from_taxel.transform_point3(taxel.position_in_link),
+                normal: link_from_taxel.transform_vector3(taxel.normal_in_link),
+                is_touched: pressed.contains(&taxel.link),
+            }
         };
         let tangents = |&(taxel, _): &(usize, f64)| {
             let taxel: &Taxel = &body.taxels[taxel];
@@ -85,11 +95,10 @@ struct Press<'a> {
 }
 
 impl Press<'_> {
-    /// The share of the force on a square with sides of `side_m` at `position`, which faces along `normal`; `None` if it is not
-    /// under the indenter.
-    fn share_on(&self, position: DVec3, normal: DVec3, side_m: f64) -> Option<f64> {
-        let (offset, up) = (position - self.place.position_in_link, self.place.normal_in_link);
-        let is_under = normal.dot(up) > 0.0 && offset.dot(up).abs() <= self.footprint.depth_m();
+    /// The share of the force on a square with sides of `side_m` at `seat`; `None` if it is not under the indenter.
+    fn share_on(&self, seat: &Seat, side_m: f64) -> Option<f64> {
+        let (offset, up) = (seat.position - self.place.position_in_link, self.place.normal_in_link);
+        let is_under = seat.is_touched && seat.normal.dot(up) > 0.0 && offset.dot(up).abs() <= self.footprint.depth_m();
         is_under.then(|| self.footprint.share_on(offset.dot(self.across), offset.dot(self.along), side_m))
     }
 }
@@ -122,8 +131,8 @@ impl LinkTouch {
         let across = along.cross(place.normal_in_link);
         if let Some(gap_m) = gap_m {
             let solid = Solid::new(&touch.indenter, place.position_in_link, place.normal_in_link, along, gap_m);
-            for (distance, &(position, normal)) in felt.sensed.distances_m.iter_mut().zip(&self.places.near) {
-                *distance = solid.seen_from(position, normal).map_or(*distance, |seen| distance.min(seen));
+            for (distance, seat) in felt.sensed.distances_m.iter_mut().zip(&self.places.near) {
+                *distance = solid.seen_from(seat.position, seat.normal).map_or(*distance, |seen| distance.min(seen));
             }
         }
         let before = before_s.filter(|&t_s| touch.is_there(t_s));
@@ -176,19 +185,17 @@ impl LinkTouch {
     fn push(&self, press: &Press<'_>, of: Kinds<'_>, felt: &mut Felt<'_>) -> Vec<Pulled> {
         let mut pulled = Vec::new();
         let taxels = felt.forces_newton.iter_mut().zip(&self.places.pressed).zip(of.pressed).enumerate();
-        for (taxel, ((force, &(position, normal)), &(_, side_m))) in taxels {
-            let Some(share) = press.share_on(position, normal, side_m) else { continue };
+        for (taxel, ((force, seat), &(_, side_m))) in taxels {
+            let Some(share) = press.share_on(seat, side_m) else { continue };
             let force_newton = press.force_newton * share;
             *force += force_newton;
             if of.has_pulls && force_newton > 0.0 {
-                pulled.push(Pulled { taxel, offset: position - press.place.position_in_link, force_newton });
+                pulled.push(Pulled { taxel, offset: seat.position - press.place.position_in_link, force_newton });
             }
         }
         if let Some(celsius) = self.beside.celsius {
-            for ((warmed, &(position, normal)), &(_, side_m)) in
-                felt.sensed.warmed.iter_mut().zip(&self.places.warm).zip(of.warm)
-            {
-                let Some(share) = press.share_on(position, normal, side_m) else { continue };
+            for ((warmed, seat), &(_, side_m)) in felt.sensed.warmed.iter_mut().zip(&self.places.warm).zip(of.warm) {
+                let Some(share) = press.share_on(seat, side_m) else { continue };
                 let share = (share / press.footprint.share_on(0.0, 0.0, side_m)).min(1.0);
                 warmed[0] += share;
                 warmed[1] += share * celsius;
@@ -221,7 +228,7 @@ impl LinkTouch {
         };
         let stand = Stand { position: press.place.position_in_link, normal, turned };
         let pull = friction.move_to(stand, &grip);
-        let axes = |taxel: usize| (self.places.pressed[taxel].1, self.places.tangents[taxel]);
+        let axes = |taxel: usize| (self.places.pressed[taxel].normal, self.places.tangents[taxel]);
         friction::spread(&pull, normal, press.force_newton, pulled, axes, felt.pulls_newton);
         Some(pull)
     }

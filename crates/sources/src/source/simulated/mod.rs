@@ -25,6 +25,8 @@ mod senses_setup;
 mod sensor;
 mod sensors;
 mod setup;
+#[cfg(test)]
+mod tests;
 mod truth;
 mod whole;
 mod whole_setup;
@@ -344,7 +346,7 @@ impl Source for SimulatedSource {
     }
 
     fn notices(&mut self) -> Vec<String> {
-        self.notices.drain(..).map(|what| format!("{}: {what}", self.name)).collect()
+        self.notices.drain(..).chain(self.touches.notices()).map(|what| format!("{}: {what}", self.name)).collect()
     }
 }
 
@@ -393,7 +395,12 @@ fn load_body(text: Text<'_>, file: &File, folder: &Path) -> Result<Body> {
         return Body::from_bytes(body.get_ref(), bytes);
     }
     Body::load(folder.join(body.get_ref())).map_err(|e| {
-        if e.kind() == ErrorKind::NotFound {
+        let is_path = Path::new(body.get_ref()).extension().is_some() || body.get_ref().contains('/');
+        if e.kind() == ErrorKind::NotFound && is_path {
+            let what =
+                "no such file; `body` is a path from the simulation's folder, or hand, sensing-hand, mat or humanoid";
+            text.wrong(body.span(), format!("{}: {what}", folder.join(body.get_ref()).display()))
+        } else if e.kind() == ErrorKind::NotFound {
             text.unknown(body, "body", bundled::BODIES)
         } else {
             text.wrong(body.span(), e.to_string())

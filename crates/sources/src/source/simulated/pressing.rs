@@ -68,8 +68,9 @@ impl Touches {
                 (Err(_), WrongTouch::LeaveOut) => continue,
                 (touch, _) => touch?,
             };
-            let in_link = || Arc::new(Places::new(body, touch.link, of));
-            let places = Arc::clone(places.entry(touch.link).or_insert_with(in_link));
+            let in_link = || Arc::new(Places::new(body, touch.link, &touch.pressed, of));
+            let places = places.entry((touch.link, touch.pressed.clone())).or_insert_with(in_link);
+            let places = Arc::clone(places);
             let link = body.links[touch.link].name.clone();
             let beside = setup.beside(keys.get_ref(), layer, touch.indenter.is_long())?;
             all.push(Pressing::Link(Box::new(LinkTouch { touch, beside, link, places })));
@@ -86,6 +87,14 @@ impl Touches {
         let mut all = self.all.iter().filter_map(of_touch);
         let first = all.next()?;
         all.all(|other| other == first).then_some(first)
+    }
+
+    /// What is to be said of them since the last call.
+    pub(super) fn notices(&mut self) -> impl Iterator<Item = String> {
+        self.all.iter_mut().filter_map(|touch| match touch {
+            Pressing::Link(_) => None,
+            Pressing::Body(touch) => touch.take_notice(),
+        })
     }
 
     /// Forgets what indenters hold.

@@ -53,6 +53,9 @@ pub(super) struct Sensor {
     pub(super) faults: Vec<Option<Fault>>,
 }
 
+/// Forces under this size, N, are tails of footprints: sensors read them as 0. The engine flags values under 2⁻⁶⁰ as faulty.
+const LEAST_NEWTON: f64 = 1.0 / (1_u64 << 50) as f64;
+
 /// A taxel in a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reading {
@@ -71,14 +74,14 @@ impl Sensor {
             Err(stuck) => return stuck.unwrap_or_else(|| self.kind.value(0.0, 0.0)),
         };
         let force_newton = self.gains[reading.index] * reading.force_newton;
-        let felt = if force_newton > self.threshold_newton { force_newton } else { 0.0 };
+        let felt = if force_newton > self.threshold_newton { without_tail(force_newton) } else { 0.0 };
         self.kind.value(felt, disturbed)
     }
 
     /// The same of a tangential force, which has no threshold.
     pub(super) fn read_pull(&self, reading: &Reading) -> f64 {
         match self.disturbed(reading) {
-            Ok(disturbed) => self.kind.pull(self.gains[reading.index] * reading.force_newton, disturbed),
+            Ok(disturbed) => self.kind.pull(without_tail(self.gains[reading.index] * reading.force_newton), disturbed),
             Err(stuck) => stuck.unwrap_or_else(|| self.kind.pull(0.0, 0.0)),
         }
     }
@@ -133,6 +136,11 @@ impl Kind {
     }
 }
 
+/// `force_newton`, or 0 where it is but a footprint's tail.
+fn without_tail(force_newton: f64) -> f64 {
+    if force_newton.abs() < LEAST_NEWTON { 0.0 } else { force_newton }
+}
+
 /// `level` as a converter with `bits` gives it. Halves round up.
 fn converted(level: f64, bits: Option<u32>) -> f64 {
     bits.map_or(level, |bits| (level + 0.5).floor().clamp(0.0, f64::from((1_u32 << bits) - 1)))
@@ -173,6 +181,17 @@ mod tests {
         let sensor = Sensor { gains: vec![1.0, 1.5], threshold_newton: 2.0, ..sensor(Kind::Ideal, vec![None; 2]) };
         assert_eq!([1.0, 2.0, 2.5].map(|f| sensor.read(&reading(0, f))), [0.0, 0.0, 2.5]);
         assert_eq!([1.0, 2.0, 2.5].map(|f| sensor.read(&reading(1, f))), [0.0, 3.0, 3.75]);
+    }
+
+    #[test]
+    fn a_footprints_tail_reads_zero() {
+        let ideal = sensor(Kind::Ideal, vec![None]);
+        let unrounded = sensor(Kind::Linear { offset: 0.0, gain: 1e-3, bits: None }, vec![None]);
+        for tail in [3.2e-23, -3.2e-23, 8e-16] {
+            assert_eq!([ideal.read_pull(&reading(0, tail)), unrounded.read_pull(&reading(0, tail))], [0.0; 2]);
+            assert_eq!([ideal.read(&reading(0, tail.abs())), unrounded.read(&reading(0, tail.abs()))], [0.0; 2]);
+        }
+        assert_eq!([ideal.read(&reading(0, 1e-12)), ideal.read_pull(&reading(0, -1e-12))], [1e-12, -1e-12]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Checks the file's keys and builds the touches on the body's surface.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -25,6 +25,8 @@ const MAX_ASPECT: f64 = 10.0;
 pub(super) struct Touch {
     pub(super) name: String,
     pub(super) link: usize,
+    /// The links whose taxels feel it: its own, or those of its field's taxels.
+    pub(super) pressed: Vec<usize>,
     pub(super) field: Option<String>,
     pub(super) indenter: Indenter,
     /// rad
@@ -74,7 +76,8 @@ pub(super) struct Setup<'a> {
     pub(super) text: Text<'a>,
     pub(super) body: &'a Body,
     pub(super) fields: &'a FieldSet,
-    pub(super) surfaces: BTreeMap<usize, Arc<SurfaceIndex>>,
+    /// By link, and whether it is of that link alone.
+    pub(super) surfaces: BTreeMap<(usize, bool), Arc<SurfaceIndex>>,
     pub(super) duration_s: f64,
 }
 
@@ -122,8 +125,10 @@ impl Setup<'_> {
         let indenter = self.indenter(keys)?;
         let (in_chart, waypoints) = self.waypoints(keys)?;
         let (link, field, frame) = if in_chart { self.on_field(keys)? } else { self.on_link(keys)? };
-        let surface = self.surfaces.entry(link).or_insert_with(|| Arc::new(self.body.surface_in_link(link)));
-        let surface = Arc::clone(surface);
+        let pressed = self.pressed(link, field.as_deref());
+        let body = self.body;
+        let in_link = || Arc::new(if in_chart { body.surface_in_link(link) } else { surface_of(body, link) });
+        let surface = Arc::clone(self.surfaces.entry((link, in_chart)).or_insert_with(in_link));
         if surface.is_empty() {
             return Err(self.text.wrong(keys.on.span(), "the body has no surface that could be touched"));
         }
@@ -131,6 +136,7 @@ impl Setup<'_> {
         let touch = Touch {
             name: keys.name.clone().unwrap_or_else(|| format!("touch {}", index + 1)),
             link,
+            pressed,
             field,
             indenter,
             angle: self.angle(keys, indenter.is_long())?,
@@ -272,6 +278,14 @@ impl Setup<'_> {
         }
     }
 
+    /// The links that a touch on `link` presses, ascending: it alone, or those of the taxels of `field`.
+    fn pressed(&self, link: usize, field: Option<&str>) -> Vec<usize> {
+        let field = field.and_then(|name| self.fields.fields.iter().find(|field| field.name == name));
+        let Some(field) = field else { return vec![link] };
+        let links: BTreeSet<usize> = field.members.iter().map(|member| self.body.taxels[member.taxel].link).collect();
+        links.into_iter().collect()
+    }
+
     /// The names of fields and links that can be touched.
     fn names(&self) -> impl Iterator<Item = &str> {
         let fields = self.fields.fields.iter().map(|field| field.name.as_str());
@@ -372,4 +386,12 @@ impl Setup<'_> {
         let newton = keys.hold.as_ref().map_or(Ok(0.0), |hold| text.not_negative("newton", &hold.get_ref().newton))?;
         Ok(Profile::new(vec![(0.0, newton), (f64::MAX, newton)]))
     }
+}
+
+/// The surface that moves with `link`, in its frame; that of the whole body if none does.
+fn surface_of(body: &Body, link: usize) -> SurfaceIndex {
+    let own = body.surfaces.iter().filter(|surface| surface.is_carried_by(link));
+    let own = own.filter_map(|surface| Some((surface, surface.link_from_mesh(body, link)?)));
+    let own = SurfaceIndex::of_triangles(own.flat_map(|(surface, way)| surface.corners_through(way)));
+    if own.is_empty() { body.surface_in_link(link) } else { own }
 }

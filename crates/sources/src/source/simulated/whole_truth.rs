@@ -19,6 +19,9 @@ pub(super) struct TouchOfBody {
     drag: Option<Drag>,
     /// The frame, and the place of each indenter at rest.
     last: Option<(u64, Vec<DVec3>)>,
+    /// What is to be said of it, if that has not been said.
+    notice: Option<String>,
+    is_noticed: bool,
 }
 
 /// A frame that is read.
@@ -33,12 +36,17 @@ pub(super) struct Moment {
 
 impl TouchOfBody {
     pub(super) fn new(touch: BodyTouch, drag: Option<Drag>) -> Self {
-        Self { touch, drag, last: None }
+        Self { touch, drag, last: None, notice: None, is_noticed: false }
     }
 
     /// μ, if it has friction that is felt.
     pub(super) fn friction(&self) -> Option<f64> {
         self.drag.as_ref().map(Drag::coefficient)
+    }
+
+    /// That it does not reach its place, once.
+    pub(super) fn take_notice(&mut self) -> Option<String> {
+        self.notice.take()
     }
 
     /// Lets go of the skin.
@@ -63,6 +71,11 @@ impl TouchOfBody {
         let off = |t_s: f64| Error::failed(format!("touch `{}`: {}", touch.name, leaves_skin(t_s)));
         let force = (force_newton, self.drag.is_some());
         let contacts = touch.press(skin, t_s, force, forces_newton).ok_or_else(|| off(t_s))?;
+        if let Some(notice) = contacts.iter().find_map(|contact| unreached(body, &touch.name, t_s, contact))
+            && !std::mem::replace(&mut self.is_noticed, true)
+        {
+            self.notice = Some(notice);
+        }
         let drag = self.drag.as_mut();
         let pulls = drag.map(|drag| drag.pull((skin, layer), t_s, &contacts, pulls_newton));
         let places = |contacts: &[Contact]| contacts.iter().map(|contact| contact.position).collect::<Vec<DVec3>>();
@@ -90,6 +103,18 @@ impl TouchOfBody {
         };
         Ok(contacts.iter().enumerate().map(of_indenter).collect())
     }
+}
+
+/// The message that `contact` is not at its place at `t_s`, if so.
+fn unreached(body: &Body, touch: &str, t_s: f64, contact: &Contact) -> Option<String> {
+    let link = contact.unreached?;
+    let [wanted, met] = [link, contact.link].map(|link| &body.links[link].name);
+    let met = if link == contact.link { "another part of it".to_owned() } else { format!("`{met}`") };
+    let above_mm = -contact.depth_m * 1e3;
+    Some(format!(
+        "touch `{touch}` does not reach its place on `{wanted}` at {t_s:.3} s: it stays at least {above_mm:.1} mm above, as {met} is in \
+         the way; take a smaller indenter, or another `path`"
+    ))
 }
 
 /// The truth of `contact`, which moves with `velocity` on the body at rest, and does `pull` along the skin.

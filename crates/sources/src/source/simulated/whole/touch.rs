@@ -14,6 +14,9 @@ use super::press::{Pressure, Skin};
 use super::surface::WholeSurface;
 use crate::body::{Body, Modality};
 
+/// An indenter that stays above the place of its path by more than this share of its size does not reach it.
+const UNREACHED: f64 = 0.25;
+
 /// What a taxel feels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::source::simulated) enum Covers {
@@ -62,6 +65,8 @@ pub(in crate::source::simulated) struct Contact {
     pub(in crate::source::simulated) direction: Option<DVec3>,
     /// The place of the path under it, and the way that it faces there.
     pub(in crate::source::simulated) stands_at: DVec3,
+    /// The link of that place, if what is in the way keeps the indenter well above it.
+    pub(in crate::source::simulated) unreached: Option<usize>,
     pub(in crate::source::simulated) along: DVec3,
     /// Of the even disc with the second moment of its pressure, m.
     pub(in crate::source::simulated) radius_m: f64,
@@ -239,6 +244,8 @@ impl BodyTouch {
                 principal_axis,
                 direction: self.tool.is_long().then_some(flat),
                 stands_at: pose.spot.position,
+                unreached: (-pressure.depth_m > UNREACHED * shape.size_m())
+                    .then(|| skin.surface.facet(pose.spot.facet).link),
                 along: flat,
                 radius_m,
                 forces_newton: own,
