@@ -43,6 +43,13 @@ pub fn coloured_lines(text: &str) -> Cow<'_, str> {
     escape(text, is_hidden_in_text, colour)
 }
 
+/// A time in seconds in few digits: to a microsecond, and in powers of ten where it is huge.
+#[must_use]
+pub fn seconds(t_s: f64) -> String {
+    let rounded = (t_s * 1e6).round() / 1e6;
+    if rounded.abs() < 1e15 { rounded.to_string() } else { format!("{t_s:e}") }
+}
+
 /// `text` without the colours that [`coloured_line`] keeps.
 #[must_use]
 pub fn without_colours(text: &str) -> String {

@@ -193,6 +193,14 @@ fn explained(error: &serde_json::Error, line: u64) -> Error {
     Error::failed(what).at(format!("line {line}, column {}", error.column()))
 }
 
+/// The time that `value` is, s; else what to write.
+fn time_of(value: &serde_json::Value) -> Result<f64, String> {
+    value.as_f64().ok_or_else(|| {
+        let given: String = value.to_string().chars().take(40).collect();
+        format!("`t` is {given}; give the time in seconds, a number without quotes")
+    })
+}
+
 /// Passes whatever is there to a visitor.
 struct Parse<V>(V);
 
@@ -223,7 +231,7 @@ impl<'de> Visitor<'de> for FrameVisitor<'_> {
         while let Some(key) = map.next_key_seed(Parse(KeyVisitor))? {
             let seen = match key {
                 Key::Time => {
-                    self.frame.t_s = map.next_value()?;
+                    self.frame.t_s = time_of(&map.next_value()?).map_err(A::Error::custom)?;
                     &mut has_time
                 }
                 Key::Values => {

@@ -3,6 +3,7 @@
 use toml::value::{Datetime, Offset};
 
 use crate::error::{Error, Result, failed};
+use crate::plain;
 
 /// How times are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,7 +176,8 @@ impl TimeColumn {
     pub(super) fn doubt(&mut self) -> Option<String> {
         let step = self.long_step.take()?;
         Some(format!(
-            "the time rises by {step} s a frame; if it is in milliseconds, head its column `t [ms]`, else `t [s]`"
+            "the time rises by {} s a frame; if it is in milliseconds, head its column `t [ms]`, else `t [s]`",
+            plain::seconds(step)
         ))
     }
 
