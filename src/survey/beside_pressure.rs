@@ -159,6 +159,7 @@ mod tests {
         let text = found.calibration("pad");
         assert!(text.contains("[taxel.1]\n") && text.contains("shear_baseline = [510, 530]"), "{text}");
         assert!(text.contains("shear_baseline = [7, 9]"), "{text}");
+        assert_eq!([1, 2, 3].map(|id| found.tangential_baselines(id)[0]), [Some(510.0), Some(7.0), None]);
         // At rest there is no shear, as `run` reads the file.
         let kinds: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
         let calibration = Calibration::parse_for(&text, &kinds).unwrap();

@@ -120,6 +120,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn times_are_short() {
+        let told = [0.0, 3.760_000_000_000_000_2, -1.5, 1_764_453_600.25, 1e300, f64::INFINITY].map(seconds);
+        assert_eq!(told, ["0", "3.76", "-1.5", "1764453600.25", "1e300", "inf"]);
+    }
+
+    #[test]
     fn what_a_terminal_obeys_is_escaped_and_all_else_stays() {
         let title = "\x1b]0;P\x07";
         assert_eq!(line(title), "\\u001b]0;P\\u0007");

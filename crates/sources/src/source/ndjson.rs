@@ -442,6 +442,19 @@ mod tests {
     }
 
     #[test]
+    fn a_time_that_is_no_number_is_told_in_plain_words() {
+        let of = |t: &str| why(&format!("{{\"t\":{t},\"values\":{{}}}}\n"));
+        assert!(
+            of("\"0\"").ends_with("`t` is \"0\"; give the time in seconds, a number without quotes"),
+            "{}",
+            of("\"0\"")
+        );
+        assert!(of("null").contains("`t` is null; give the time in seconds"));
+        let long = of(&format!("[{}1]", "1,".repeat(1000)));
+        assert!(long.contains("; give the time in seconds") && long.len() < 160, "{long}");
+    }
+
+    #[test]
     fn a_line_is_a_frame() {
         let text = "\u{feff}{\"t\":0.5,\"values\":{\"9\":12,\"4\":-1.5}}\r\n\n\
             {\"values\":{\"7\":\"nan\",\"4\":\"-INF\",\"9\":null},\"t\":1}\n{\"t\":2,\"values\":{\"7\":1e60,\"9\":0}}";

@@ -250,6 +250,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_step_that_is_hardly_one_is_told_shortly() {
+        let mut column = TimeColumn::new(None);
+        for t in [0.0, 1e300] {
+            column.read("", Some(t)).unwrap();
+        }
+        assert!(column.doubt().unwrap().starts_with("the time rises by 1e300 s a frame; "));
+    }
+
+    #[test]
     fn a_head_says_that_a_column_is_time_and_its_unit() {
         let unit = |word: &str| unit_in_head(word).unwrap();
         for plain in ["t", "T", "time", " Timestamp ", "elapsed"] {
