@@ -400,7 +400,7 @@ fn json_of(findings: &Findings) -> String {
             "taxel": found.id, "baseline": found.baseline, "strays": found.noise, "noise": found.sigma,
             "dead_band": found.dead_band, "travel": found.travel, "full": found.full, "gain": found.gain,
         });
-        if findings.with_axes.contains(&found.id) {
+        if !findings.with_axes.is_empty() {
             sensor["shear_baseline"] = json!(findings.tangential_baselines(found.id));
             sensor["shear_noise"] = json!(findings.shear_noise(found.id));
         }
