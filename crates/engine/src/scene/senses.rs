@@ -118,6 +118,9 @@ pub(super) fn letters_and_outputs(
     } else {
         scene.letters.clone()
     };
+    if let Some(why) = lacks_pressure(scene, outputs, has(Receptor::Sustained), finds_touches) {
+        return Err(Error::usage(why).at(&body.name));
+    }
     let there: Vec<Receptor> = others.into_iter().filter(|&other| has(other)).collect();
     let is_any_read = letters.iter().any(|letter| has(letter.receptor));
     let is_empty = |receptor: &Receptor| match receptor {
@@ -128,9 +131,6 @@ pub(super) fn letters_and_outputs(
     };
     if let Some(empty) = letters.iter().map(|letter| letter.receptor).find(is_empty) {
         return Err(Error::usage(without_taxels(empty, &there)).at(&body.name));
-    }
-    if let Some(why) = lacks_pressure(scene, outputs, has(Receptor::Sustained), finds_touches) {
-        return Err(Error::usage(why).at(&body.name));
     }
     let mut given = outputs - Outputs::OF_OTHER_LETTERS;
     for receptor in others {
