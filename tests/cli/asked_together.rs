@@ -42,7 +42,7 @@ const IDS: &str = "0,1,2,3,4,5";
 
 fn run<'a>(read: &'a [String; 6], more: &[&'a str]) -> Vec<&'a str> {
     let begin = ["run", "--backend", "reference", "--quiet"];
-    begin.into_iter().chain(read.iter().map(String::as_str)).chain(more.iter().copied().collect::<Vec<_>>()).collect()
+    begin.into_iter().chain(read.iter().map(String::as_str)).chain(more.iter().copied()).collect()
 }
 
 #[test]
