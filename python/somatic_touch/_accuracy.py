@@ -174,7 +174,7 @@ def _wish(path: _Path) -> tuple[str | None, str | None]:
 
 
 class Calibrated(Table):
-    """What `calibrate` has found, a row for each sensor: `taxel`, `baseline`, `noise`, `dead_band`, `travel`, `full` and `gain`, in raw units.
+    """What `calibrate` has found, a row for each sensor: `taxel`, `baseline`, `strays` (how far from it), `noise` (σ), `dead_band`, `travel`, `full` and `gain`, in raw units.
 
     Of `gains_from` it is `taxel`, `gain`, by which factor it feels more than others, and `pressed`, by how many touches.
     """

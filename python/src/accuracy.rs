@@ -309,10 +309,15 @@ pub(crate) fn calibrate(
     };
     let (findings, text) = found().or_raise(py)?;
     let sensors = findings.sensors.iter().map(|found| {
-        json!({
-            "taxel": found.id, "baseline": found.baseline, "noise": found.noise, "dead_band": found.dead_band,
-            "travel": found.travel, "full": found.full, "gain": found.gain,
-        })
+        let mut sensor = json!({
+            "taxel": found.id, "baseline": found.baseline, "strays": found.noise, "noise": found.sigma,
+            "dead_band": found.dead_band, "travel": found.travel, "full": found.full, "gain": found.gain,
+        });
+        if !findings.with_axes.is_empty() {
+            sensor["shear_baseline"] = json!(findings.tangential_baselines(found.id));
+            sensor["shear_noise"] = json!(findings.shear_noise(found.id));
+        }
+        sensor
     });
     let about = json!({
         "invert": findings.invert, "raw_range": findings.raw_range, "remarks": findings.remarks(), "losses": losses,

@@ -127,13 +127,19 @@ pub(super) fn bench(arguments: &Arguments) -> Result<u8> {
         write_first_call(folder, &shape, &mut skins[0])?;
     }
     if !arguments.letters.is_empty() {
-        skins.push(Skin::new(&shape, &[], arguments.backend, outputs)?);
+        skins.push(Skin::new(&shape, &[], arguments.backend, of_pressures(outputs))?);
     }
     let times = measure(&mut skins, &shape, arguments.calls, &stop)?;
     let ChosenBackend { name, device, .. } = skins[0].engine.backend();
     let report = Report { shape, letters: &arguments.letters, backend: name, device, times: &times };
     print(&if arguments.json { report.json() } else { report.text() })?;
     Ok(DONE)
+}
+
+/// Those of `outputs` that pressures give, for the skin that has nothing else; the usual ones where there are none.
+fn of_pressures(outputs: Outputs) -> Outputs {
+    let asked = outputs - Outputs::OF_OTHER_LETTERS;
+    if asked.is_empty() { Outputs::USUAL } else { asked }
 }
 
 /// A skin that is measured.

@@ -365,22 +365,25 @@ fn table_of(findings: &Findings) -> String {
         count(findings.sensors.len() as u64, "sensor"),
         if findings.invert { "fall" } else { "rise" }
     );
-    let mut table = plain(["taxel", "at rest", "noise", "dead band", "travel", "full at", "gain"], 0..7);
+    let mut head = vec!["taxel", "at rest", "strays by", "noise", "dead band", "travel", "full at", "gain"];
+    let has_axes = !findings.tangential.is_empty();
+    if has_axes {
+        head.extend(["u at rest", "v at rest", "noise of u, v"]);
+    }
+    let mut table = plain(head.iter().copied(), 0..head.len());
     // Four digits, and no zeros after the point: most sensors count in whole numbers.
     let number =
         |value: f64| format!("{value:.3e}").parse().map_or_else(|_| value.to_string(), |short: f64| short.to_string());
     let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), number);
     let row = |found: &Found| {
-        let Found { id, baseline, noise, dead_band, travel, full, gain, .. } = *found;
-        [
-            id.to_string(),
-            or_dash(baseline),
-            number(noise),
-            number(dead_band),
-            or_dash(travel),
-            or_dash(full),
-            number(gain),
-        ]
+        let Found { id, baseline, noise: strays, sigma, dead_band, travel, full, gain, .. } = *found;
+        let mut cells = vec![id.to_string(), or_dash(baseline), number(strays), or_dash(sigma), number(dead_band)];
+        cells.extend([or_dash(travel), or_dash(full), number(gain)]);
+        if has_axes {
+            let [u, v] = findings.tangential_baselines(id);
+            cells.extend([or_dash(u), or_dash(v), or_dash(findings.shear_noise(id))]);
+        }
+        cells
     };
     for found in findings.sensors.iter().take(LISTED) {
         table.add_row(row(found));
@@ -393,10 +396,15 @@ fn table_of(findings: &Findings) -> String {
 
 fn json_of(findings: &Findings) -> String {
     let sensors = findings.sensors.iter().map(|found| {
-        json!({
-            "taxel": found.id, "baseline": found.baseline, "noise": found.noise, "dead_band": found.dead_band,
-            "travel": found.travel, "full": found.full, "gain": found.gain,
-        })
+        let mut sensor = json!({
+            "taxel": found.id, "baseline": found.baseline, "strays": found.noise, "noise": found.sigma,
+            "dead_band": found.dead_band, "travel": found.travel, "full": found.full, "gain": found.gain,
+        });
+        if !findings.with_axes.is_empty() {
+            sensor["shear_baseline"] = json!(findings.tangential_baselines(found.id));
+            sensor["shear_noise"] = json!(findings.shear_noise(found.id));
+        }
+        sensor
     });
     let json = json!({
         "invert": findings.invert, "raw_range": findings.raw_range, "sensors": sensors.collect::<Vec<_>>(),

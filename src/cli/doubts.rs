@@ -1,6 +1,7 @@
 //! Warnings in the first second of a run: a source for another body, sensors that are pressed at rest, or links that are nowhere.
 
-use somatic::{Body, Frame, Outputs, Plan};
+use somatic::internal::signal::{Axis, Channel};
+use somatic::{Body, Frame, Outputs, Plan, Receptor};
 
 use super::words::count;
 
@@ -26,6 +27,8 @@ pub(super) struct Doubts {
     ids: Vec<u32>,
     /// Per value of a frame, the index of its taxel in the body; `None` of a tangential one.
     taxel_of_value: Vec<Option<usize>>,
+    /// Per value of a frame, the index of the taxel whose tangential value it is.
+    pulled_of_value: Vec<Option<usize>>,
     /// Whether frames have a slot for every taxel of the body, as on standard input.
     holds_any: bool,
     /// Whether a taxel's pressure is its raw value.
@@ -49,6 +52,7 @@ impl Doubts {
             source: source.to_owned(),
             body: body.name.clone(),
             taxel_of_value: indices(ids, &of_body),
+            pulled_of_value: pulled(ids, &of_body),
             ids: of_body,
             holds_any,
             is_raw,
@@ -67,6 +71,7 @@ impl Doubts {
         let mut told = self.told(plan);
         source.clone_into(&mut self.source);
         self.taxel_of_value = indices(ids, &self.ids);
+        self.pulled_of_value = pulled(ids, &self.ids);
         self.seen = vec![ValueHistory::default(); ids.len()];
         (self.begin_s, self.is_over, self.has_poses, self.is_told) = (None, false, false, false);
         told.extend(self.of_taxels(plan));
@@ -80,7 +85,7 @@ impl Doubts {
 
     /// Before the first frame: a warning if the source lacks taxels of the fields of `plan`.
     pub(super) fn of_taxels(&self, plan: &Plan) -> Option<String> {
-        if self.holds_any { None } else { self.of_body(plan, |_| true) }
+        if self.holds_any { None } else { self.of_body(plan, |_| true).or_else(|| self.of_axes(plan, |_| true)) }
     }
 
     /// Checks `frames`; returns whether the check is over.
@@ -116,7 +121,9 @@ impl Doubts {
 
     fn of_frames(&self, plan: &Plan) -> Vec<String> {
         // Single frames on standard input may have few taxels.
-        let of_body = (self.holds_any && self.is_over).then(|| self.of_body(plan, |seen| seen.came)).flatten();
+        let came = |seen: &ValueHistory| seen.came;
+        let is_told = !(self.holds_any && self.is_over);
+        let of_body = if is_told { None } else { self.of_body(plan, came).or_else(|| self.of_axes(plan, came)) };
         let rests = self.is_raw.then(|| self.of_rest(plan)).flatten();
         of_body.into_iter().chain(rests).chain(self.of_poses(plan)).collect()
     }
@@ -166,6 +173,30 @@ impl Doubts {
         ))
     }
 
+    /// A warning if over half of the taxels with three axes of a field of letter `shear` never deliver both tangential values.
+    fn of_axes(&self, plan: &Plan, comes: impl Fn(&ValueHistory) -> bool) -> Option<String> {
+        let mut axes = vec![0; self.ids.len()];
+        for (taxel, seen) in self.pulled_of_value.iter().zip(&self.seen) {
+            if let Some(taxel) = taxel.filter(|_| comes(seen)) {
+                axes[taxel] += 1;
+            }
+        }
+        let there: Vec<bool> = axes.iter().map(|&axes| axes == 2).collect();
+        let is_of_shear = |field: &usize| plan.letters()[plan.letter_of(*field)].receptor == Receptor::Shear;
+        let field = (0..plan.fields().len()).filter(is_of_shear).find(|&field| {
+            let (here, all) = self.among(plan, field, &there);
+            2 * (all - here) > all
+        })?;
+        let (here, all) = self.among(plan, field, &there);
+        let first = plan.taxels_of(field).next().map_or(0, |taxel| self.ids[taxel]);
+        Some(format!(
+            "{} has both tangential values, such as `{first}.u` and `{first}.v`, of {here} of the {all} taxels of {}; without them there is no \
+             shear or friction, and fields are incomplete; add them, or leave that letter out with --letters",
+            self.source,
+            plan.label(field),
+        ))
+    }
+
     /// A warning if all taxels of most fields of pressures are pressed all the time.
     fn of_rest(&self, plan: &Plan) -> Option<String> {
         let pressed = self.where_in_body(|seen| seen.came && !seen.rested);
@@ -205,4 +236,11 @@ impl Doubts {
 /// Per channel of `ids`, the place of its taxel among those of the body, if that is its own value.
 fn indices(ids: &[u32], of_body: &[u32]) -> Vec<Option<usize>> {
     ids.iter().map(|id| of_body.binary_search(id).ok()).collect()
+}
+
+/// Per channel of `ids`, the place of its taxel among those of the body, if that is one of its tangential values.
+fn pulled(ids: &[u32], of_body: &[u32]) -> Vec<Option<usize>> {
+    let is_tangential = |channel: &Channel| channel.axis() != Axis::Normal;
+    let taxel = |&id: &u32| of_body.binary_search(&Some(Channel(id)).filter(is_tangential)?.taxel()).ok();
+    ids.iter().map(taxel).collect()
 }

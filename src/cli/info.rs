@@ -242,7 +242,8 @@ fn text(name: &str, known: &Contents, contacts: Option<&FoundContacts>) -> Strin
     let whole = if losses.is_empty() { "" } else { " whole" };
     line("frames", format!("{}{whole}{rate}", rhythm.frames));
     if let (Some(duration), Some([start, _])) = (known.duration_s(), rhythm.span_s) {
-        line("duration", format!("{} ({duration} s from t = {start} s)", span(duration)));
+        let [length, start] = [duration, start].map(somatic::internal::plain::seconds);
+        line("duration", format!("{} ({length} s from t = {start} s)", span(duration)));
     }
     line("taxels", format!("{taxels}{}", layout.as_ref().map_or(String::new(), panels)));
     if let Some(layout) = layout {
@@ -252,7 +253,12 @@ fn text(name: &str, known: &Contents, contacts: Option<&FoundContacts>) -> Strin
         "gaps",
         match rhythm.longest_gap_s {
             Some([longest, after]) => {
-                format!("{}, the longest {} after t = {after} s", rhythm.gaps, span(longest))
+                format!(
+                    "{}, the longest {} after t = {} s",
+                    rhythm.gaps,
+                    span(longest),
+                    somatic::internal::plain::seconds(after)
+                )
             }
             None => "none".to_owned(),
         },

@@ -11,6 +11,7 @@ use super::serve::Sinks;
 use super::unfit::UnfitReport;
 use crate::engine::Engine;
 use crate::error::Result;
+use crate::plain;
 use crate::signal::Frame;
 use crate::sink::{InputFrames, News, Question, Sink};
 #[cfg(any(feature = "serial", feature = "zenoh"))]
@@ -320,6 +321,7 @@ fn of_recording(recording: &str, text: &str) -> String {
 /// are `absent` for this reason.
 #[must_use]
 pub fn left_out(recording: &str, frames: u64, t_s: f64, progress: Option<f64>, absent: &[String]) -> String {
+    let t_s = plain::seconds(t_s);
     let mut text = match frames {
         0 => format!("{recording}: interrupted before its first frame"),
         1 => format!("{recording} after t = {t_s} s: interrupted after 1 frame"),

@@ -2,7 +2,9 @@
 
 use super::SceneFile;
 use crate::error::{Error, Result};
-use crate::percept::Outputs;
+use crate::percept::{COLUMNS, Column, Outputs};
+use crate::scene::receptor_of;
+use crate::signal::Receptor;
 use crate::sink::SinkSpec;
 use crate::source::SourceSpec;
 
@@ -42,6 +44,7 @@ impl SceneFile {
         self.check_joints()?;
         self.check_sinks()?;
         self.check_numbers()?;
+        self.check_letters()?;
         if let Some(touch) = self.touch {
             touch.check()?;
             if self.touches().is_none() {
@@ -52,6 +55,24 @@ impl SceneFile {
             return Err(Error::usage("`contact_tolerance_m` is for self_contacts; add them to `outputs`"));
         }
         self.filter().map(drop)
+    }
+
+    /// Whether it names an output for each letter that it names, if it names both: touches are made of letters, too.
+    fn check_letters(&self) -> Result<()> {
+        let outputs = self.outputs();
+        if self.outputs.is_empty() || self.touches().is_some() || outputs.contains(Outputs::SELF_CONTACTS) {
+            return Ok(());
+        }
+        let gives = |receptor: Receptor, column: &Column| match receptor_of(column) {
+            of if of.is_of_pressure() => receptor.is_of_pressure(),
+            of => of == receptor,
+        };
+        let is_idle = |receptor: &&Receptor| !outputs.columns().any(|column| gives(**receptor, column));
+        let Some(&idle) = self.letters.iter().find(is_idle) else { return Ok(()) };
+        let such_as = COLUMNS.iter().find(|column| gives(idle, column)).map_or("", |column| column.name);
+        Err(Error::usage(format!(
+            "`outputs` has none of letter `{idle}`; add one, such as `{such_as}`, or leave the letter out of `letters`"
+        )))
     }
 
     /// Whether what it asks for is for several recordings, if it names several.

@@ -8,6 +8,7 @@ const TRAVEL: Colour = [120, 170, 220];
 const DEAD: Colour = [225, 150, 60];
 const BASE: Colour = [30, 60, 110];
 const LOST: Colour = [200, 40, 40];
+const ALONG: Colour = [60, 150, 90];
 
 impl Findings {
     /// The figure as SVG, text being text.
@@ -25,7 +26,8 @@ impl Findings {
         let place = |found: &Found| f64::from(found.id);
         let ends = self.sensors.iter().flat_map(|found| {
             let baseline = found.baseline.unwrap_or(0.0);
-            [baseline, baseline + side * found.travel.unwrap_or(0.0)]
+            let [u, v] = self.tangential_baselines(found.id).map(|along| along.unwrap_or(baseline));
+            [baseline, baseline + side * found.travel.unwrap_or(0.0), u, v]
         });
         let mut range = ends.fold([0.0_f64, 1.0_f64], |[low, high], end| [low.min(end), high.max(end)]);
         if let Some([low, high]) = self.raw_range {
@@ -45,7 +47,7 @@ impl Findings {
         };
         let width = (600.0 / self.sensors.len().max(1) as f64).clamp(0.6, 6.0);
         let layer = |mark: Mark, colour: Colour, name: &'static str| Layer { mark, colour, name: Some(name.into()) };
-        let layers = vec![
+        let mut layers = vec![
             layer(Mark::Lines { runs: travels, width }, TRAVEL, "pressed"),
             layer(Mark::Lines { runs: bands, width: 1.4 * width }, DEAD, "dead band"),
             layer(dots(&|f| !self.is_lost(f), &|f| f.baseline.unwrap_or(0.0)), BASE, "at rest"),
@@ -55,6 +57,11 @@ impl Findings {
                 "never pressed, or lost",
             ),
         ];
+        let along = |found: &Found| self.tangential_baselines(found.id).map(|at| Some((place(found), at?)));
+        let points: Vec<(f64, f64)> = self.sensors.iter().flat_map(along).flatten().collect();
+        if !points.is_empty() {
+            layers.push(layer(Mark::Dots { points, radius: 1.6 }, ALONG, "u and v at rest"));
+        }
         let margin = 0.03 * (range[1] - range[0]);
         let x = Axis { label: "taxel", range: [first - 1.0, last + 1.0], ticks: ticks(first, last) };
         let y = Axis {

@@ -55,15 +55,21 @@ fn of(values: &[RawValue], places: &[usize]) -> Vec<RawValue> {
 }
 
 impl Findings {
-    /// The raw values of taxel `id` at rest along t and n × t, if both are known and not both 0.
+    /// The raw values of taxel `id` at rest along t and n × t, where they are known.
+    #[must_use]
+    pub fn tangential_baselines(&self, id: u32) -> [Option<f64>; 2] {
+        [Axis::U, Axis::V].map(|axis| *self.tangential.get(&Channel::of_taxel(id, axis).0)?)
+    }
+
+    /// The same if both are known and not both 0.
     pub(super) fn shear_baseline(&self, id: u32) -> Option<[f64; 2]> {
-        let along = |axis| *self.tangential.get(&Channel::of_taxel(id, axis).0)?;
-        let both = [along(Axis::U)?, along(Axis::V)?];
-        (both != [0.0; 2]).then_some(both)
+        let [Some(u), Some(v)] = self.tangential_baselines(id) else { return None };
+        ([u, v] != [0.0; 2]).then_some([u, v])
     }
 
     /// The noise of the tangential values of taxel `id`, raw units: the larger of its two, if both are known.
-    pub(super) fn shear_noise(&self, id: u32) -> Option<f64> {
+    #[must_use]
+    pub fn shear_noise(&self, id: u32) -> Option<f64> {
         let along = |axis| self.tangential_sigmas.get(&Channel::of_taxel(id, axis).0).copied();
         Some(along(Axis::U)?.max(along(Axis::V)?))
     }
@@ -153,6 +159,7 @@ mod tests {
         let text = found.calibration("pad");
         assert!(text.contains("[taxel.1]\n") && text.contains("shear_baseline = [510, 530]"), "{text}");
         assert!(text.contains("shear_baseline = [7, 9]"), "{text}");
+        assert_eq!([1, 2, 3].map(|id| found.tangential_baselines(id)[0]), [Some(510.0), Some(7.0), None]);
         // At rest there is no shear, as `run` reads the file.
         let kinds: Vec<_> = body.taxels.iter().map(|taxel| (taxel.id, taxel.modality)).collect();
         let calibration = Calibration::parse_for(&text, &kinds).unwrap();

@@ -187,7 +187,8 @@ mod tests {
     }
 
     fn of_letters(receptors: &[Receptor]) -> Scene {
-        let scene = Scene::default().outputs(Outputs::TOTAL | Outputs::CENTROID | Outputs::TEMPERATURE);
+        let of_pressure = receptors.contains(&Receptor::Sustained).then_some(Outputs::TOTAL | Outputs::CENTROID);
+        let scene = Scene::default().outputs(Outputs::TEMPERATURE | of_pressure.unwrap_or_default());
         scene.letters(Letter::all_of(receptors, &[])).fields(["hand/palm"])
     }
 

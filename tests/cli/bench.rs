@@ -194,6 +194,11 @@ fn letters_are_compared_with_pressures_alone() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "8 fields of 5 sensors, out of 60; sustained, shear, 1 frame a call");
     assert!(lines.len() == 5 && lines[3].contains("times as long as pressures alone, median "), "{text}");
+    // Pressures alone have none of what letters beside them give.
+    for outputs in ["shear", "total,shear"] {
+        let text = done(&with(&["--letters", "sustained,shear", "--outputs", outputs, "--backend", "cpu"]));
+        assert!(text.contains("times as long as pressures alone"), "{text}");
+    }
 }
 
 #[test]

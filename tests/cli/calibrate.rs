@@ -22,7 +22,7 @@ fn a_survey_becomes_a_calibration_under_which_rest_is_nothing_and_a_press_is_fel
     for id in [0, 18, 25] {
         let number = |key: &str| sensor(id)[key].as_f64().unwrap();
         assert_eq!(number("baseline"), 1023.0);
-        assert!((2.0..=8.0).contains(&number("noise")) && number("travel") > 500.0, "{}", sensor(id));
+        assert!((2.0..=8.0).contains(&number("strays")) && number("travel") > 500.0, "{}", sensor(id));
     }
     // It is dead, by the simulation; and the remark says so.
     assert!(sensor(17)["travel"].is_null());

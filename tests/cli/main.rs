@@ -1,6 +1,7 @@
 //! The command, driven as people and scripts drive it: the real binary, its output and its exit code.
 
 mod arduino;
+mod asked_together;
 mod author;
 mod axes;
 #[cfg(unix)]

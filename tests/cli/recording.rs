@@ -277,7 +277,9 @@ fn a_process_that_is_killed_loses_less_than_a_second() {
         assert_eq!((code, &info["ended"]), (Some(3), &false.into()));
         let kept_s = info["start"].as_f64().unwrap() + info["duration"].as_f64().unwrap();
         let [lost] = &info["losses"].as_array().unwrap()[..] else { panic!("{info}") };
-        assert!(lost.as_str().unwrap().contains(&format!("what came after t = {kept_s} s is missing")), "{info}");
+        let told_s =
+            lost.as_str().and_then(|lost| lost.split_once("what came after t = ")?.1.split_once(" s is missing"));
+        assert!((told_s.unwrap().0.parse::<f64>().unwrap() - kept_s).abs() < 1e-6, "{info}");
         assert!(last_s - kept_s < 1.0, "delivered up to {last_s} s, kept up to {kept_s} s");
         // What is there replays, with its body, and what it gives is what was given.
         let replay = output(&["run", "--source", &source(&path), "--backend", "cpu"]);
@@ -429,10 +431,12 @@ fn damage_is_placed_in_time_whoever_reads() {
         bytes[chunks[chunk].start + 1000] ^= 1;
         std::fs::write(&path, &bytes).unwrap();
         let (first, end) = (first_of(chunk), if chunk + 1 < chunks.len() { first_of(chunk + 1) } else { all.len() });
+        // As it is told: to a microsecond.
+        let t_s = |index: usize| (all[index].t_s * 1e6).round() / 1e6;
         let when = match (first, end) {
-            (0, end) => format!("before t = {} s", all[end].t_s),
-            (first, end) if end == all.len() => format!("after t = {} s", all[first - 1].t_s),
-            (first, end) => format!("between t = {} s and t = {} s", all[first - 1].t_s, all[end].t_s),
+            (0, end) => format!("before t = {} s", t_s(end)),
+            (first, end) if end == all.len() => format!("after t = {} s", t_s(first - 1)),
+            (first, end) => format!("between t = {} s and t = {} s", t_s(first - 1), t_s(end)),
         };
         let left = all.len() - (end - first);
         let said = fails(3, &["info", text_of(&path)]);

@@ -1,6 +1,7 @@
 //! What of a file was whole, and what was not.
 
 use super::summary::{Summary, Trust};
+use crate::plain::seconds;
 
 /// Counts what is whole in a file, and tells what is not.
 pub(super) struct Account {
@@ -135,7 +136,7 @@ impl Account {
         }
         let what = if cut.bytes > 0 { format!("; {} bytes of an incomplete chunk", cut.bytes) } else { String::new() };
         let missing = match self.last_s {
-            Some(t_s) => format!("what came after t = {t_s} s is missing"),
+            Some(t_s) => format!("what came after t = {} s is missing", seconds(t_s)),
             None => format!("it has no complete {}", self.thing),
         };
         Some(format!("it is cut off: {missing}{what}"))
@@ -149,9 +150,11 @@ impl Account {
             places => format!("{places} places, the first"),
         };
         let when = match (self.after_s, self.before_s) {
-            (Some(after), Some(before)) => format!("between t = {after} s and t = {before} s"),
-            (Some(after), None) => format!("after t = {after} s"),
-            (None, Some(before)) => format!("before t = {before} s"),
+            (Some(after), Some(before)) => {
+                format!("between t = {} s and t = {} s", seconds(after), seconds(before))
+            }
+            (Some(after), None) => format!("after t = {} s", seconds(after)),
+            (None, Some(before)) => format!("before t = {} s", seconds(before)),
             (None, None) => format!("before any {thing}"),
         };
         let missing = self.missing().map_or(String::new(), |words| format!("; {words}"));

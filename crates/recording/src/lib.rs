@@ -34,7 +34,7 @@ mod view;
 mod yaml_list;
 
 use somatic_skin::signal::Channel;
-use somatic_skin::{body, error, limits, output, signal};
+use somatic_skin::{body, error, limits, output, plain, signal};
 
 pub use self::bag::{BAG_METADATA, BagTopic, BagType, BagWriter};
 pub use self::bag_reader::{BagMessage, BagReader, DefinedTopic, WantedTopics, topics_of_bag};

@@ -43,6 +43,13 @@ pub fn coloured_lines(text: &str) -> Cow<'_, str> {
     escape(text, is_hidden_in_text, colour)
 }
 
+/// A time in seconds in few digits: to a microsecond, and in powers of ten where it is huge.
+#[must_use]
+pub fn seconds(t_s: f64) -> String {
+    let rounded = (t_s * 1e6).round() / 1e6;
+    if rounded.abs() < 1e15 { rounded.to_string() } else { format!("{t_s:e}") }
+}
+
 /// `text` without the colours that [`coloured_line`] keeps.
 #[must_use]
 pub fn without_colours(text: &str) -> String {
@@ -111,6 +118,12 @@ fn escape(text: &str, is_wrong: impl Fn(char) -> bool, keeps: impl Fn(&str) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_are_short() {
+        let told = [0.0, 3.760_000_000_000_000_2, -1.5, 1_764_453_600.25, 1e300, f64::INFINITY].map(seconds);
+        assert_eq!(told, ["0", "3.76", "-1.5", "1764453600.25", "1e300", "inf"]);
+    }
 
     #[test]
     fn what_a_terminal_obeys_is_escaped_and_all_else_stays() {

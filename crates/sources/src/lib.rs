@@ -17,5 +17,5 @@ use somatic_bodies as bundled;
 #[cfg(feature = "mcap")]
 use somatic_recording as recording;
 #[allow(unused_imports, reason = "which of them are used depends on features")]
-use somatic_skin::{body, error, field, keys, length, limits, output, random, signal};
+use somatic_skin::{body, error, field, keys, length, limits, output, plain, random, signal};
 use somatic_wire as wire;

@@ -107,6 +107,8 @@ const ON_HOST: [&str; 11] = [
 
 /// Of a stage its name, whether it runs, what it goes over and of how many memberships, and why it might not run.
 type Row = (&'static str, bool, (usize, usize), &'static str);
+/// Why a stage of pressures does not run.
+const NO_PRESSURE: &str = "no field is read as pressures";
 
 impl Plan {
     /// All stages, in the order that they run in.
@@ -132,7 +134,7 @@ impl Plan {
         let rows: [Row; _] = [
             ("calibrate", true, slots, ""),
             ("change", self.has_changes(), (self.slots() - slots.0, 0), "no letter is `change`"),
-            ("contact", true, counts(&all), ""),
+            ("contact", self.presses(), counts(&all), NO_PRESSURE),
             ("centroid", stages.centroid, counts(&all), ""),
             ("orientation", stages.orientation, counts(&charted), ""),
             ("principal_axis", stages.principal_axis, counts(&charted), ""),
@@ -171,6 +173,7 @@ impl Plan {
         let why = match (runs, asked.is_empty(), idle.is_empty()) {
             (true, false, _) => format!("asked for: {}", asked.join(", ")),
             (true, true, _) => self.needed_by(name).to_owned(),
+            (false, false, _) if !self.presses() => NO_PRESSURE.to_owned(),
             (false, _, false) => idle.to_owned(),
             (false, _, true) => "no output needs it".to_owned(),
         };
@@ -218,7 +221,12 @@ impl Plan {
     #[must_use]
     pub fn bytes_down(&self) -> usize {
         let numbers = numbers().filter(|(_, wanted_for)| self.read_back().intersects(*wanted_for)).count();
-        self.fields.len() * (1 + numbers) * size_of::<f32>() + self.kept_pressures() * size_of::<f32>()
+        self.fields_read_back() * (1 + numbers) * size_of::<f32>() + self.kept_pressures() * size_of::<f32>()
+    }
+
+    /// How many fields have results that come back; none where the host makes all of them.
+    fn fields_read_back(&self) -> usize {
+        if self.presses() { self.fields.len() } else { 0 }
     }
 
     /// What of [`Plan::bytes_down`] is there for the sake of `stage`.
@@ -228,7 +236,7 @@ impl Plan {
         let status = usize::from(stage == "contact");
         let keeps = if self.touched_from.is_some() { "touches" } else { "force" };
         let kept = if stage == keeps { self.kept_pressures() } else { 0 };
-        (self.fields.len() * (status + numbers) + kept) * size_of::<f32>()
+        (self.fields_read_back() * (status + numbers) + kept) * size_of::<f32>()
     }
 }
 

@@ -335,7 +335,11 @@ impl Plan {
         let has_p = |field: &&PlanField| {
             !matches!(self.letters[field.letter].receptor, Receptor::Temperature | Receptor::Proximity)
         };
-        let mut quantities = self.fields.iter().filter(has_p).map(|field| field.quantity);
+        let of_fields = self.fields.iter().filter(has_p).map(|field| field.quantity);
+        // Touches have P also where no field has.
+        let of_touches = self.touched_from.is_some() && !self.fields.iter().any(|field| has_p(&field));
+        let touched = self.calibrations.iter().filter(|_| of_touches).map(|taxel| taxel.quantity);
+        let mut quantities = of_fields.chain(touched);
         let first = quantities.next().unwrap_or_default();
         quantities.all(|other| other == first).then_some(first)
     }

@@ -82,8 +82,9 @@ pub(crate) fn outputs_of(receptor: Receptor) -> Outputs {
     }
 }
 
-/// The letters of `scene`, and its outputs with those of the letters: if it names no letters, those that its taxels have and whose
-/// outputs are asked for, which all are by default.
+/// The letters of `scene`, and its outputs with those of the letters. If it names no letters, they are those that its taxels have and
+/// whose outputs are asked for, which all are by default; and that of pressure, in which touches are found, also where no field of the
+/// scene has such taxels. If `is_drifting`, pressures are followed, whatever is asked for.
 ///
 /// # Errors
 /// A usage error: a letter has no taxels, or what is asked for no letter.
@@ -93,53 +94,51 @@ pub(super) fn letters_and_outputs(
     chosen: &[usize],
     scene: &Scene,
     outputs: Outputs,
+    is_drifting: bool,
 ) -> Result<(Vec<Letter>, Outputs)> {
     let members = || chosen.iter().flat_map(|&field| &fields.fields[field].members);
     let has = |receptor: Receptor| members().any(|member| receptor.reads(body.taxels[member.taxel].modality));
-    let asked = outputs & Outputs::OF_OTHER_LETTERS;
     let is_usual = outputs.contains(Outputs::USUAL);
     let others = Receptor::OF_HOST;
+    let finds_touches = scene.asked_touches().is_some() && body.taxels.iter().any(|taxel| taxel.modality.is_pressed());
     let letters = if scene.letters.is_empty() {
+        let asked = outputs & Outputs::OF_OTHER_LETTERS;
+        let is_pressed = has(Receptor::Sustained);
         let wanted = others.into_iter().filter(|&receptor| {
-            let own = outputs_of(receptor);
-            has(receptor) && (outputs.intersects(own) || (asked.is_empty() && is_usual))
+            let is_all = asked.is_empty() && is_usual;
+            // Where touches alone are asked for, a field without pressures says whether it reads anything.
+            let is_bare = outputs.is_empty() && !is_pressed;
+            has(receptor) && (outputs.intersects(outputs_of(receptor)) || is_all || is_bare)
         });
-        let pressure = Some(Receptor::Sustained).filter(|&receptor| has(receptor));
+        let is_of_others_alone = outputs == asked && !asked.is_empty();
+        let reads_pressure = finds_touches || (is_pressed && (is_drifting || !is_of_others_alone));
+        let pressure = reads_pressure.then_some(Receptor::Sustained);
         let letters = pressure.into_iter().chain(wanted);
         letters.map(|receptor| Letter { receptor, ..Letter::default() }).collect()
     } else {
         scene.letters.clone()
     };
-    let is_read = |receptor: Receptor| letters.iter().any(|letter| letter.receptor == receptor);
-    let there: Vec<Receptor> = others.into_iter().filter(|&other| has(other)).collect();
-    // Where nothing else is there either, no letter reads what is.
-    let is_empty = |receptor: &Receptor| !has(*receptor) && (!receptor.is_of_pressure() || !there.is_empty());
-    if let Some(empty) = letters.iter().map(|letter| letter.receptor).find(is_empty) {
-        let what = match empty {
-            Receptor::Shear => {
-                "letter `shear` has no taxels: no field has one of three axes (modality force3)".to_owned()
-            }
-            Receptor::Temperature | Receptor::Proximity => {
-                format!("letter `{empty}` has no taxels: no field has one of that modality")
-            }
-            Receptor::Sustained | Receptor::Change => format!(
-                "no field has a taxel that measures pressure, of which letter `{empty}` is made; leave out what asks for \
-                 it: the taxels have {}",
-                listed(&there)
-            ),
-        };
-        return Err(Error::usage(what).at(&body.name));
+    if let Some(why) = lacks_pressure(scene, outputs, has(Receptor::Sustained), finds_touches) {
+        return Err(Error::usage(why).at(&body.name));
     }
-    if letters.is_empty() && !there.is_empty() {
-        return Err(Error::usage(without_pressure(scene, outputs)).at(&body.name));
+    let there: Vec<Receptor> = others.into_iter().filter(|&other| has(other)).collect();
+    let is_any_read = letters.iter().any(|letter| has(letter.receptor));
+    let is_empty = |receptor: &Receptor| match receptor {
+        // Touches are found in it.
+        Receptor::Sustained if finds_touches && is_any_read => false,
+        // Where nothing else is there either, no letter reads what is.
+        receptor => !has(*receptor) && (!receptor.is_of_pressure() || !there.is_empty()),
+    };
+    if let Some(empty) = letters.iter().map(|letter| letter.receptor).find(is_empty) {
+        return Err(Error::usage(without_taxels(empty, &there)).at(&body.name));
     }
     let mut given = outputs - Outputs::OF_OTHER_LETTERS;
     for receptor in others {
         let own = outputs_of(receptor);
         let of_letter = outputs & own;
-        if is_read(receptor) {
+        if letters.iter().any(|letter| letter.receptor == receptor) {
             let usual = own - Outputs::FRICTION_SIGMA;
-            given |= if of_letter.is_empty() { usual } else { of_letter };
+            given |= if of_letter.is_empty() && is_usual { usual } else { of_letter };
         } else if !of_letter.is_empty() && !outputs.contains(Outputs::USUAL | own) {
             // Whoever asks for everything gets what there is.
             let names: Vec<String> = of_letter.names().map(|name| format!("`{name}`")).collect();
@@ -185,18 +184,55 @@ fn why_not(receptor: Receptor, is_there: bool) -> String {
     }
 }
 
-/// That no taxel measures the pressures that `scene` asks for.
-fn without_pressure(scene: &Scene, outputs: Outputs) -> String {
-    let of_fields = outputs - Outputs::OF_OTHER_LETTERS;
-    let mut names: Vec<String> = of_fields.names().map(|name| format!("`{name}`")).collect();
-    if scene.touches.is_some() {
-        names.push("`touches`".to_owned());
+/// That letter `empty` has no taxels: they have `there`.
+fn without_taxels(empty: Receptor, there: &[Receptor]) -> String {
+    match empty {
+        Receptor::Shear => "letter `shear` has no taxels: no field has one of three axes (modality force3)".to_owned(),
+        Receptor::Temperature | Receptor::Proximity => {
+            format!("letter `{empty}` has no taxels: no field has one of that modality")
+        }
+        Receptor::Sustained | Receptor::Change => format!(
+            "no field has a taxel that measures pressure, of which letter `{empty}` is made; leave out what asks for it: \
+             the taxels have {}",
+            listed(there)
+        ),
     }
-    let what = if names.is_empty() { "what is asked for".to_owned() } else { listed(&names) };
-    format!(
-        "no field has a taxel that measures pressure, of which {what} {} made; leave that out of `outputs`",
-        is_or_are(&names)
-    )
+}
+
+/// Why pressures that `scene` asks for by name, in `outputs` or of touches, are not read, if so: its letters leave them out, or no field
+/// `is_pressed`, or nothing of the body is, in which it `finds_touches`.
+fn lacks_pressure(scene: &Scene, outputs: Outputs, is_pressed: bool, finds_touches: bool) -> Option<String> {
+    if outputs.contains(Outputs::USUAL) {
+        // Whoever asks for everything gets what there is.
+        return None;
+    }
+    let of_fields = outputs - Outputs::OF_OTHER_LETTERS - Outputs::SELF_CONTACTS;
+    let mut names: Vec<String> = of_fields.names().map(|name| format!("`{name}`")).collect();
+    if !scene.letters.is_empty() {
+        let is_read = scene.letters.iter().any(|letter| letter.receptor.is_of_pressure());
+        return (!is_read && !names.is_empty()).then(|| {
+            format!(
+                "{} {} of letters `sustained` and `change`, which `letters` leaves out; add `sustained` to `letters`",
+                listed(&names),
+                is_or_are(&names)
+            )
+        });
+    }
+    if is_pressed {
+        return None;
+    }
+    let of_touches =
+        [(scene.touches.is_some(), "`touches`"), (outputs.contains(Outputs::SELF_CONTACTS), "`self_contacts`")];
+    names.extend(
+        of_touches.iter().filter(|(is_asked, _)| *is_asked && !finds_touches).map(|(_, name)| (*name).to_owned()),
+    );
+    (!names.is_empty()).then(|| {
+        format!(
+            "no field has a taxel that measures pressure, of which {} {} made; leave that out of `outputs`",
+            listed(&names),
+            is_or_are(&names)
+        )
+    })
 }
 
 impl Senses {

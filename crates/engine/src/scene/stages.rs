@@ -23,7 +23,8 @@ pub(crate) struct Stages {
 }
 
 impl Stages {
-    /// The stages that `outputs` need. Whether there is hysteresis is the calibration's to say.
+    /// The stages that `outputs` need. Whether there is hysteresis is the calibration's to say, and what other letters there are the
+    /// taxels'.
     pub(super) fn for_outputs(outputs: Outputs) -> Self {
         let wants = |stage| outputs.intersects(Outputs::of_stage(stage));
         let world_motion = wants("world_motion");
@@ -45,7 +46,7 @@ impl Stages {
             pressures: force,
             filter,
             sigma,
-            senses: outputs.intersects(Outputs::OF_OTHER_LETTERS),
+            senses: false,
         }
     }
 }

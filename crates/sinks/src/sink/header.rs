@@ -6,7 +6,8 @@ use serde_json::{Map, Value, json};
 
 use crate::body::Body;
 use crate::percept::{Column, TouchOutputs, Unit};
-use crate::scene::{Plan, PlannedField};
+use crate::scene::{Plan, PlannedField, receptor_of};
+use crate::signal::Receptor;
 
 /// Version of the percepts' schema, with the header as its first line.
 const VERSION: u32 = 2;
@@ -24,7 +25,24 @@ pub(super) fn units_of_touches(plan: &Plan) -> Vec<(&'static str, Value)> {
 }
 
 fn unit(plan: &Plan, column: &Column) -> Value {
-    in_unit(plan, column.unit)
+    match in_unit(plan, column.unit) {
+        Value::String(unit) => per_second(plan, column, unit).into(),
+        Value::Object(by_field) => {
+            let of_field = |(field, unit): (String, Value)| {
+                let unit = unit.as_str().unwrap_or_default().to_owned();
+                (field, per_second(plan, column, unit).into())
+            };
+            Value::Object(by_field.into_iter().map(of_field).collect())
+        }
+        unit => unit,
+    }
+}
+
+/// `unit`, in which `column` is of pressures; a second of it where fields have the change of P in the place of P, and no pressures.
+pub(super) fn per_second(plan: &Plan, column: &Column, unit: String) -> String {
+    let has = |receptor: Receptor| plan.letters().iter().any(|letter| letter.receptor == receptor);
+    let is_of_change = has(Receptor::Change) && !has(Receptor::Sustained) && receptor_of(column).is_of_pressure();
+    if is_of_change && column.unit == Unit::P { format!("{unit}/s") } else { unit }
 }
 
 fn in_unit(plan: &Plan, unit: Unit) -> Value {

@@ -361,6 +361,8 @@ impl SinkTarget {
         let (names, all_fields) = (&session.names, session.all_fields);
         let skin = session.skin();
         let header = session.plan.filter(|_| session.header).map(|plan| header::line(plan, session.body));
+        // Where no touches are looked for, there is no table of them.
+        let of_touches = |touches: Option<OutputPath>| touches.filter(|_| skin.is_some());
         match self {
             Self::Ndjson(output) => Ok(Box::new(
                 NdjsonSink::to_file(output, names, all_fields)?
@@ -372,12 +374,15 @@ impl SinkTarget {
                     .with_skin(skin.as_ref());
                 Ok(Box::new(sink.with_header(header.as_deref())?))
             }
+            Self::Csv { percepts: None, touches: Some(_), .. } if skin.is_none() => Err(Error::usage(
+                "there is no table of touches: they are found in pressures, which no taxel of the body measures; choose the table of fields",
+            )),
             Self::Csv { percepts, touches, self_contacts, wide } => {
-                Ok(Box::new(CsvSink::create(percepts, touches, self_contacts, wide, session)?))
+                Ok(Box::new(CsvSink::create(percepts, of_touches(touches), self_contacts, wide, session)?))
             }
             #[cfg(feature = "parquet")]
             Self::Parquet { percepts, touches, self_contacts } => {
-                Ok(Box::new(super::ParquetSink::create(percepts, touches, self_contacts, session)?))
+                Ok(Box::new(super::ParquetSink::create(percepts, of_touches(touches), self_contacts, session)?))
             }
             #[cfg(not(feature = "parquet"))]
             Self::Parquet { percepts, .. } => {

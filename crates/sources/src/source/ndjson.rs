@@ -193,6 +193,14 @@ fn explained(error: &serde_json::Error, line: u64) -> Error {
     Error::failed(what).at(format!("line {line}, column {}", error.column()))
 }
 
+/// The time that `value` is, s; else what to write.
+fn time_of(value: &serde_json::Value) -> Result<f64, String> {
+    value.as_f64().ok_or_else(|| {
+        let given: String = value.to_string().chars().take(40).collect();
+        format!("`t` is {given}; give the time in seconds, a number without quotes")
+    })
+}
+
 /// Passes whatever is there to a visitor.
 struct Parse<V>(V);
 
@@ -223,7 +231,7 @@ impl<'de> Visitor<'de> for FrameVisitor<'_> {
         while let Some(key) = map.next_key_seed(Parse(KeyVisitor))? {
             let seen = match key {
                 Key::Time => {
-                    self.frame.t_s = map.next_value()?;
+                    self.frame.t_s = time_of(&map.next_value()?).map_err(A::Error::custom)?;
                     &mut has_time
                 }
                 Key::Values => {
@@ -431,6 +439,19 @@ mod tests {
 
     fn why(text: &str) -> String {
         read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_time_that_is_no_number_is_told_in_plain_words() {
+        let of = |t: &str| why(&format!("{{\"t\":{t},\"values\":{{}}}}\n"));
+        assert!(
+            of("\"0\"").ends_with("`t` is \"0\"; give the time in seconds, a number without quotes"),
+            "{}",
+            of("\"0\"")
+        );
+        assert!(of("null").contains("`t` is null; give the time in seconds"));
+        let long = of(&format!("[{}1]", "1,".repeat(1000)));
+        assert!(long.contains("; give the time in seconds") && long.len() < 160, "{long}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use toml::value::{Datetime, Offset};
 
 use crate::error::{Error, Result, failed};
+use crate::plain;
 
 /// How times are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,7 +176,8 @@ impl TimeColumn {
     pub(super) fn doubt(&mut self) -> Option<String> {
         let step = self.long_step.take()?;
         Some(format!(
-            "the time rises by {step} s a frame; if it is in milliseconds, head its column `t [ms]`, else `t [s]`"
+            "the time rises by {} s a frame; if it is in milliseconds, head its column `t [ms]`, else `t [s]`",
+            plain::seconds(step)
         ))
     }
 
@@ -246,6 +248,15 @@ fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_that_is_hardly_one_is_told_shortly() {
+        let mut column = TimeColumn::new(None);
+        for t in [0.0, 1e300] {
+            column.read("", Some(t)).unwrap();
+        }
+        assert!(column.doubt().unwrap().starts_with("the time rises by 1e300 s a frame; "));
+    }
 
     #[test]
     fn a_head_says_that_a_column_is_time_and_its_unit() {

@@ -73,6 +73,11 @@ impl Plan {
         if self.stages().pressures { self.slots() } else { 0 }
     }
 
+    /// Whether any of its fields is read as pressures.
+    pub(in super::super) fn presses(&self) -> bool {
+        self.fields.iter().any(|field| field.sensed.is_empty())
+    }
+
     /// What is given of touches of the whole body; `None` where none are looked for.
     #[must_use]
     pub fn touch_outputs(&self) -> Option<TouchOutputs> {

@@ -17,7 +17,7 @@ use crate::body::{Body, KeptOfShape, Modality, Nearest};
 use crate::error::{Error, Result, nearest};
 use crate::field::{Field, FieldSet, WORLD};
 use crate::percept::{Outputs, TouchOutputs};
-use crate::signal::{Calibration, Letter, Receptor, Response, TaxelCalibration};
+use crate::signal::{Calibration, DriftKeys, Letter, Receptor, Response, TaxelCalibration};
 use crate::stage::hysteresis::Thresholds;
 use crate::stage::layout;
 
@@ -33,7 +33,8 @@ impl Plan {
         let calibration = &*calibration.of_corrected(body);
         let chosen = choose_fields(fields, &scene.fields).map_err(|e| e.at(&body.name))?;
         let outputs = scene.knobs.orientation_by.applied(scene.outputs);
-        let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, outputs)?;
+        let is_drifting = calibration.drift != DriftKeys::default();
+        let (letters, outputs) = letters_and_outputs(body, fields, &chosen, scene, outputs, is_drifting)?;
         let left_out = LeftOut::from_fields(body, &chosen, fields, &letters);
         let chosen = left_out.feeling(body, chosen, fields)?;
         // Nobody named letters, and there are no pressures to find touches in.
@@ -43,6 +44,7 @@ impl Plan {
         let mut plan = Self::without_fields(body, scene, calibration, read, outputs)?;
         let for_touches = ForTouches::new(body, scene, &letters, touches.is_some());
         plan.senses = Senses::new(body, fields, &chosen, &letters, calibration, for_touches);
+        plan.stages.senses = letters.iter().any(|letter| !letter.receptor.is_of_pressure());
         plan.letters = letters;
         let tells_shear = plan.letters.iter().any(|letter| letter.receptor == Receptor::Shear);
         plan.senses.check_shear(body, (&plan.body_taxels, &plan.calibrations), tells_shear)?;
@@ -129,6 +131,13 @@ impl Plan {
         self.stages.hysteresis = fields.iter().any(|field| field.thresholds != Thresholds::default());
         self.fields = fields.into();
         self.members = members.into();
+        if !self.presses() {
+            // What is asked of pressures is asked of no field.
+            let Stages { pressures, senses, .. } = self.stages;
+            let pressures = pressures && self.touched_from.is_some();
+            let others = Stages::for_outputs(self.outputs & (Outputs::OF_OTHER_LETTERS | Outputs::SELF_CONTACTS));
+            self.stages = Stages { pressures, senses, ..others };
+        }
     }
 
     /// Adds to the columns what stages work on.

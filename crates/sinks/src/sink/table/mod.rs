@@ -22,7 +22,7 @@ pub(super) use path_beside::path_beside;
 pub use row::{TableColumn, TableType};
 
 use self::frame_columns::frame_columns;
-use self::names::{X_Y_AND_Z, suffixes, unit_of};
+use self::names::{X_Y_AND_Z, suffixes, unit_of, unit_of_fields};
 use self::row::{Row, ValueOf};
 use super::{FieldNames, Session};
 use crate::percept::{Column, Outputs, Percepts, Unit};
@@ -81,7 +81,7 @@ fn columns_of(
 ) -> Vec<TableColumn> {
     let table_columns = |column: &'static Column| {
         let (kind, value) = (kind_of(column, session), &value);
-        let unit = unit_of(column.unit, session);
+        let unit = unit_of_fields(column, session);
         suffixes(column.components).iter().enumerate().map(move |(component, suffix)| {
             let name = if suffix.is_empty() { column.name.to_owned() } else { format!("{}_{suffix}", column.name) };
             TableColumn::new(&name, &unit, kind, column.help, value(column, component)).or_absent()

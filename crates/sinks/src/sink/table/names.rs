@@ -1,7 +1,7 @@
 //! What columns are called, and their units.
 
-use crate::percept::Unit;
-use crate::sink::Session;
+use crate::percept::{Column, Unit};
+use crate::sink::{Session, header};
 
 pub(super) const U_AND_V: [&str; 2] = ["u", "v"];
 pub(super) const X_Y_AND_Z: [&str; 3] = ["x", "y", "z"];
@@ -12,6 +12,15 @@ pub(super) fn suffixes(components: usize) -> &'static [&'static str] {
         1 => &[""],
         2 => &U_AND_V,
         _ => &X_Y_AND_Z,
+    }
+}
+
+/// The unit of a column of fields, as the session has it.
+pub(super) fn unit_of_fields(column: &Column, session: &Session<'_>) -> String {
+    let unit = unit_of(column.unit, session);
+    match session.plan {
+        Some(plan) => header::per_second(plan, column, unit),
+        None => unit,
     }
 }
 

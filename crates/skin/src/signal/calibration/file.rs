@@ -77,7 +77,7 @@ impl Calibration {
 
     /// `kind_of` a place among `ids` is what that taxel measures, where it is known.
     fn of_kinds(text: Text<'_>, ids: &[u32], kind_of: impl Fn(usize) -> Option<Modality>) -> Result<Self> {
-        let file: File = text.parse()?;
+        let file: File = text.parse().map_err(|e| without_scale(e, text.0))?;
         let mut named: Vec<_> = file.curve.into_iter().collect();
         named.sort_by_key(|(name, _)| name.span().start);
         let names: Vec<&str> = named.iter().map(|(name, _)| name.get_ref().as_str()).collect();
@@ -177,6 +177,20 @@ fn check_checks(checks: &Checks) -> Result<()> {
     Ok(())
 }
 
+/// `error` without `scale` among the keys that a table has, if it is of one [taxel.N]: that is a key of [all] alone.
+fn without_scale(error: Error, text: &str) -> Error {
+    let Some(place) = error.place().map(str::to_owned) else { return error };
+    let line = place.strip_prefix("line ").and_then(|rest| rest.split(',').next()?.parse().ok()).unwrap_or(0);
+    let head = text.lines().take(line).map(str::trim_start).filter(|line| line.starts_with('[')).last();
+    let told = error.to_string();
+    match told.strip_prefix(&format!("{place}: ")) {
+        Some(what) if what.starts_with("there is no key") && head.is_some_and(|head| head.starts_with("[taxel.")) => {
+            Error::failed(what.replace(" scale,", "")).at(place)
+        }
+        _ => error,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -204,6 +218,10 @@ mod tests {
         assert_eq!(read.taxels.iter().map(|taxel| taxel.gain).collect::<Vec<_>>(), [1500.0, -2000.0, 1500.0]);
         assert!(read.taxels.iter().all(|taxel| (taxel.dead_band, taxel.p_max) == (2000.0, 90_000.0)));
         let why = |text: &str| without_column(&Calibration::parse(text, &[3, 7]).unwrap_err().to_string());
+        let keys_of = |table: &str| why(&format!("[{table}]\nzzz = 1"));
+        assert!(keys_of("all").contains(" raw_range, scale, sensor,"), "{}", keys_of("all"));
+        assert!(keys_of("taxel.7").starts_with("line 2: there is no key `zzz`; it is one of baseline, curve,"));
+        assert!(keys_of("taxel.7").contains(" raw_range, sensor,"), "{}", keys_of("taxel.7"));
         assert_eq!(why("[all]\nscale = 0"), "line 2: `scale` is 0; it must be between 1e-12 and 1e12");
         assert_eq!(
             why("[taxel.7]\nscale = 2"),
