@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use somatic::internal::plot::{Gathered, Gatherer, outputs_for, png, svg, wanted_of};
+use somatic::internal::plot::{Gathered, Gatherer, png, svg, wanted_of};
 use somatic::output::OutputPaths;
 use somatic::percept::Unit;
 use somatic::signal::Quantity;
@@ -33,8 +33,8 @@ struct Plotted {
 impl Plotted {
     fn gather(mut self, wanted: Outputs, fields: &[String], raised: &mut Option<PyErr>) -> Result<Option<Gathered>> {
         let body = &self.body.inner;
-        let wanted = wanted_of(body, fields, wanted)?;
-        let scene = Scene::default().outputs(outputs_for(wanted)).fields(fields.to_vec());
+        let [wanted, computed] = wanted_of(body, fields, wanted)?;
+        let scene = Scene::default().outputs(computed).fields(fields.to_vec());
         let calibration = self.calibration.map(|calibration| calibration.inner);
         let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu).batch(BATCH);
         let mut engine = Engine::new(body, options)?;

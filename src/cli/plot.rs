@@ -154,9 +154,9 @@ fn gather(asked: &Setup, wanted: Outputs, stop: &AtomicBool, to: &Path) -> Resul
     let ids: Vec<u32> = body.taxels.iter().map(|taxel| taxel.id).collect();
     let mut source = input.open(&Channel::all_of(&body), asked)?;
     source.report_stale();
-    let wanted = wanted_of(&body, &asked.fields, wanted)?;
+    let [wanted, computed] = wanted_of(&body, &asked.fields, wanted)?;
     let mut options = asked.options(&body, &ids, RECORDED_BATCH)?;
-    options.scene.outputs = outputs_for(wanted);
+    options.scene.outputs = computed;
     let mut engine = Engine::new(&body, options)?;
     engine.set_channels(source.taxels()).map_err(|e| e.at("header").at(&input.name))?;
     let p_unit = engine.plan().common_quantity().map_or(Unit::P.symbol(), Quantity::symbol);

@@ -23,6 +23,9 @@ pub(super) const MAX_PANELS: usize = 8;
 /// A longer time between two frames adds nothing to integrals over time, s.
 const MAX_STEP_S: f64 = 1.0;
 
+/// What maps and the choice of fields are made of, whatever is plotted over time.
+const OF_MAPS: Outputs = Outputs::TOTAL.union(Outputs::CENTROID);
+
 /// The outputs that an engine must give for a plot of `wanted`, or of load and area where that is empty.
 #[must_use]
 pub fn outputs_for(wanted: Outputs) -> Outputs {
@@ -30,27 +33,32 @@ pub fn outputs_for(wanted: Outputs) -> Outputs {
     let panels = if wanted.is_empty() { usual } else { wanted };
     // Without a friction a ratio to it is absent for another reason.
     let friction = if panels.contains(Outputs::SLIP_RATIO) { Outputs::FRICTION } else { Outputs::empty() };
-    panels | friction | Outputs::TOTAL | Outputs::CENTROID
+    panels | friction | OF_MAPS
 }
 
-/// The quantities that are plotted of the `fields` of `body` that these globs name, of all without any: those that are `wanted`; else none,
-/// which stands for load and area, or if no taxel of theirs is pressed what they measure.
+/// The quantities that are plotted of the `fields` of `body` that these globs name, of all without any, and the outputs that an engine must
+/// give for them. Plotted are those that are `wanted`; else none, which stands for load and area, or if no taxel of theirs is pressed what
+/// they measure.
 ///
 /// # Errors
 /// A field has no taxels, or a glob names no field.
-pub fn wanted_of(body: &Body, fields: &[String], wanted: Outputs) -> Result<Outputs> {
+pub fn wanted_of(body: &Body, fields: &[String], wanted: Outputs) -> Result<[Outputs; 2]> {
     let set = FieldSet::new(body)?;
     let chosen = choose_fields(&set, fields).map_err(|e| e.at(&body.name))?;
     let members = || chosen.iter().flat_map(|&field| &set.fields[field].members);
     let has = |receptor: Receptor| members().any(|member| receptor.reads(body.taxels[member.taxel].modality));
-    if !wanted.is_empty() || has(Receptor::Sustained) {
-        return Ok(wanted);
+    if has(Receptor::Sustained) {
+        return Ok([wanted, outputs_for(wanted)]);
     }
     let usual = [
         (Receptor::Temperature, Outputs::TEMPERATURE | Outputs::WARMEST | Outputs::COLDEST),
         (Receptor::Proximity, Outputs::NEAREST | Outputs::APPROACH_SPEED),
     ];
-    Ok(usual.into_iter().filter(|(receptor, _)| has(*receptor)).fold(Outputs::empty(), |all, (_, own)| all | own))
+    let measured =
+        usual.into_iter().filter(|(receptor, _)| has(*receptor)).fold(Outputs::empty(), |all, (_, own)| all | own);
+    let plotted = if wanted.is_empty() { measured } else { wanted };
+    // Whoever wants pressures is told that there are none.
+    Ok([plotted, (outputs_for(plotted) - OF_MAPS) | wanted])
 }
 
 /// What is plotted of one recording.

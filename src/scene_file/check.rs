@@ -67,6 +67,10 @@ impl SceneFile {
             of if of.is_of_pressure() => receptor.is_of_pressure(),
             of => of == receptor,
         };
+        // An output of a letter that is not named is refused with its name.
+        if !outputs.columns().all(|column| self.letters.iter().any(|&receptor| gives(receptor, column))) {
+            return Ok(());
+        }
         let is_idle = |receptor: &&Receptor| !outputs.columns().any(|column| gives(**receptor, column));
         let Some(&idle) = self.letters.iter().find(is_idle) else { return Ok(()) };
         let such_as = COLUMNS.iter().find(|column| gives(idle, column)).map_or("", |column| column.name);

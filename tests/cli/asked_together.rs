@@ -100,19 +100,23 @@ fn outputs_and_letters_that_do_not_go_together_are_refused() {
     let (_folder, body) = body_of(&["pressure", "temperature"]);
     let (read, _of_touch) = reading(&body, IDS);
     for (letters, outputs, what) in [
-        ("temperature", "total", "--outputs has none of letter `temperature`; add one, such as `temperature`, or"),
+        ("temperature", "total", "`total` is of letters `sustained` and `change`, which --letters leaves out; add"),
         (
             "temperature",
             "temperature,total",
             "`total` is of letters `sustained` and `change`, which --letters leaves out",
         ),
-        ("sustained,temperature", "total", "--outputs has none of letter `temperature`"),
+        (
+            "sustained,temperature",
+            "total",
+            "--outputs has none of letter `temperature`; add one, such as `temperature`, or leave",
+        ),
         (
             "sustained,temperature",
             "warmest",
             "--outputs has none of letter `sustained`; add one, such as `total`, or leave",
         ),
-        ("sustained", "warmest", "--outputs has none of letter `sustained`"),
+        ("sustained", "warmest", "`warmest` is of letter `temperature`, which --letters leaves out"),
     ] {
         let why = fails(2, &run(&read, &["--letters", letters, "--outputs", outputs]));
         assert!(why.contains(what) && why.lines().count() == 1, "{letters} {outputs}: {why}");

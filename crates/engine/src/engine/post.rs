@@ -301,24 +301,23 @@ impl Post<'_> {
 
     /// Adds up a cell's force. Where no member has a value there is none: nobody knows that nothing presses.
     fn force(&self, field: &PlanField, (raw, offset): (&RawBatch<'_>, usize), cell: usize, percepts: &mut Percepts) {
-        let frame = raw.first + offset;
+        // Of a change there is none.
+        let is_change = self.plan.letters()[field.letter].receptor == Receptor::Change;
+        let quantity = if is_change { Quantity::Count } else { field.quantity };
         let has_value = |member: &Member| {
-            let (channel, slot) = (self.plan.channel_of(member.slot as usize), member.slot as usize);
-            let value = raw.rows.value(offset, channel);
-            calibrate::pressure(value, &self.plan.calibrations[channel], self.plan.curve_of(slot)).is_some()
+            let (slot, channel) = (member.slot as usize, self.plan.channel_of(member.slot as usize));
+            let (value, calibration) = (raw.rows.value(offset, channel), &self.plan.calibrations[channel]);
+            calibrate::pressure(value, calibration, self.plan.curve_of(slot)).is_some()
         };
-        let is_in_doubt = percepts.flags[cell].intersects(Flags::INCOMPLETE | Flags::FAULTY_INPUT);
-        if is_in_doubt && !self.plan.members_of(field).iter().any(has_value) {
+        let may_lack = percepts.flags[cell].intersects(Flags::INCOMPLETE | Flags::FAULTY_INPUT);
+        if quantity != Quantity::Count && may_lack && !self.plan.members_of(field).iter().any(has_value) {
             return;
         }
-        let pressures = &percepts.pressures[frame * self.plan.slots()..][..self.plan.slots()];
+        let pressures = &percepts.pressures[(raw.first + offset) * self.plan.slots()..][..self.plan.slots()];
         let pressure_and_area = |member: &Member| {
             let slot = member.slot as usize;
             (pressures[slot], self.plan.areas[self.plan.channel_of(slot)])
         };
-        // Of a change there is none.
-        let is_change = self.plan.letters()[field.letter].receptor == Receptor::Change;
-        let quantity = if is_change { Quantity::Count } else { field.quantity };
         match force::reference(quantity, self.plan.members_of(field).iter().map(pressure_and_area)) {
             Some(newtons) => {
                 percepts.add_present(cell, Outputs::FORCE);
