@@ -82,7 +82,10 @@ test("tangential forces have the scale of pressures where that is known by more"
   };
   const ends = (from) => ({ least: 0, most: 0.3, from });
   for (const from of ["recording", "grown"])
-    assert.deepEqual([most(ends("grown"), from), most(ends("recording"), from), most(null, from)], [0.3, 0.3, null]);
+    assert.deepEqual(
+      [most(ends("grown"), from), most(ends("recording"), from), most(null, from)],
+      [0.3, 0.3, null],
+    );
   for (const from of ["calibration", "raw range"])
     assert.deepEqual([most(ends("recording"), from), most(ends("raw range"), from)], [null, 0.3]);
 });
