@@ -308,24 +308,10 @@ pub(crate) fn calibrate(
         Ok((findings, text))
     };
     let (findings, text) = found().or_raise(py)?;
-    let sensors = findings.sensors.iter().map(|found| {
-        let mut sensor = json!({
-            "taxel": found.id, "baseline": found.baseline, "strays": found.noise, "noise": found.sigma,
-            "dead_band": found.dead_band, "travel": found.travel, "full": found.full, "gain": found.gain,
-        });
-        if !findings.with_axes.is_empty() {
-            sensor["shear_baseline"] = json!(findings.tangential_baselines(found.id));
-            sensor["shear_noise"] = json!(findings.shear_noise(found.id));
-        }
-        sensor
-    });
-    let about = json!({
-        "invert": findings.invert, "raw_range": findings.raw_range, "remarks": findings.remarks(), "losses": losses,
-        "crosstalk": findings.crosstalk.map(|found| json!({
-            "share": found.share, "frames": found.frames, "frames_with_touches_by_it": found.split, "dead_band": found.dead_band,
-        })),
-        "rows": sensors.collect::<Vec<_>>(),
-    });
+    let mut about = findings.json();
+    let rows = about.as_object_mut().and_then(|about| about.remove("sensors"));
+    about["rows"] = json!(rows);
+    about["losses"] = json!(losses);
     Ok((about.to_string(), text))
 }
 

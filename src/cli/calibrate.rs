@@ -9,7 +9,6 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use clap::Args;
-use serde_json::json;
 use somatic::internal::scene_file::{hertz, length, seconds};
 use somatic::internal::setup::FilesRead;
 use somatic::internal::setup::bodies::in_body;
@@ -224,7 +223,7 @@ pub(super) fn calibrate(arguments: &Arguments) -> Result<u8> {
     if let Some(plot) = plot {
         plot.draw(|| findings.svg(), || findings.png())?;
     }
-    print(&if arguments.json { json_of(&findings) } else { table_of(&findings) })?;
+    print(&if arguments.json { format!("{:#}\n", findings.json()) } else { table_of(&findings) })?;
     let code = tell_losses(&lost);
     say(&format!("wrote {}", output.display()));
     Ok(code)
@@ -392,26 +391,4 @@ fn table_of(findings: &Findings) -> String {
     text += &more(findings.sensors.len(), LISTED);
     findings.remarks().iter().for_each(|remark| text += &format!("{}\n", bullet(remark)));
     text
-}
-
-fn json_of(findings: &Findings) -> String {
-    let sensors = findings.sensors.iter().map(|found| {
-        let mut sensor = json!({
-            "taxel": found.id, "baseline": found.baseline, "strays": found.noise, "noise": found.sigma,
-            "dead_band": found.dead_band, "travel": found.travel, "full": found.full, "gain": found.gain,
-        });
-        if !findings.with_axes.is_empty() {
-            sensor["shear_baseline"] = json!(findings.tangential_baselines(found.id));
-            sensor["shear_noise"] = json!(findings.shear_noise(found.id));
-        }
-        sensor
-    });
-    let json = json!({
-        "invert": findings.invert, "raw_range": findings.raw_range, "sensors": sensors.collect::<Vec<_>>(),
-        "crosstalk": findings.crosstalk.map(|found| json!({
-            "share": found.share, "frames": found.frames, "frames_with_touches_by_it": found.split, "dead_band": found.dead_band,
-        })),
-        "remarks": findings.remarks(),
-    });
-    format!("{json:#}\n")
 }

@@ -14,6 +14,7 @@ pub mod crosstalk;
 mod figure;
 mod file;
 pub mod gains;
+mod json;
 pub mod known;
 mod known_curve;
 pub mod press_order;
