@@ -306,7 +306,7 @@ impl Cell<'_> {
 
     fn shear(&self, by: &ShearCalibration, pulls: &mut Pulls, now: &mut Now, made: &mut Made<'_>) {
         pulls.look(by, &self.frames, self.sensed.row(self.frame));
-        if !pulls.has_news(self.number) {
+        if !pulls.is_pressed_or_flagged(self.number) {
             return;
         }
         made.flags |= pulls.flags_of(self.field.sensed.iter().filter_map(|member| member.channel));

@@ -11,7 +11,7 @@ use super::self_contacts::SelfContacts;
 use super::skin_fits::{FitTrails, Moment, SkinFits};
 use super::skin_sigmas::SkinSigmas;
 use super::touch_check::TouchCheck;
-use super::touch_senses::{On, Sensed, TouchSenses};
+use super::touch_senses::{PlanAndSkin, Sensed, TouchSenses};
 use super::touch_warmth::Trends;
 use crate::backend::RawBatch;
 use crate::body::Body;
@@ -151,7 +151,12 @@ impl OnSkin {
     pub(super) fn on_links(&self, plan: &Plan, out: &mut Vec<LinkShare>) {
         self.touches.on_links(out);
         if let Some(senses) = &self.senses {
-            senses.add_to_links(On { plan, skin: self.touches.skin() }, &self.row, self.touches.pressed(), out);
+            senses.add_to_links(
+                PlanAndSkin { plan, skin: self.touches.skin() },
+                &self.row,
+                self.touches.pressed(),
+                out,
+            );
         }
     }
 
@@ -203,7 +208,7 @@ impl OnSkin {
             if let Some(senses) = &mut self.senses {
                 let (row, poses) = (sensed.row(index), self.poses.as_slice());
                 let sensed = Sensed { t_s: frame.t_s, raw, offset, row, pressures, poses };
-                senses.add(On { plan, skin: self.touches.skin() }, &sensed, &mut found);
+                senses.add(PlanAndSkin { plan, skin: self.touches.skin() }, &sensed, &mut found);
             }
             put_in_world(self.poses.as_slice(), &mut found);
             if let Some(self_contacts) = &mut self.self_contacts {

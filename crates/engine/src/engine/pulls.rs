@@ -46,7 +46,7 @@ pub(super) struct Pulls {
     /// Whether the rest is of this frame.
     is_known: bool,
     /// By the plan's fields, whether a taxel of it is pressed or flagged.
-    has_news: Vec<bool>,
+    is_pressed_or_flagged: Vec<bool>,
     /// By the plan's channels, if there are `taxels`.
     felt: Vec<Pull>,
 }
@@ -57,7 +57,7 @@ impl Pulls {
         pulls.calibrate(plan);
         if !pulls.taxels.is_empty() {
             pulls.felt = vec![Pull::default(); plan.channels()];
-            pulls.has_news = vec![false; plan.fields.len()];
+            pulls.is_pressed_or_flagged = vec![false; plan.fields.len()];
         }
         pulls
     }
@@ -100,7 +100,7 @@ impl Pulls {
         if self.calibration_changes != plan.calibration_changes {
             self.calibrate(plan);
         }
-        self.has_news.fill(false);
+        self.is_pressed_or_flagged.fill(false);
         for own in &self.taxels {
             let raw = frames.raw.rows.value(frames.offset, own.channel);
             let calibration = &plan.calibrations[own.channel];
@@ -113,15 +113,15 @@ impl Pulls {
                 }
             }
             if pressure > 0.0 || !flags.is_empty() {
-                own.fields.iter().for_each(|&field| self.has_news[field] = true);
+                own.fields.iter().for_each(|&field| self.is_pressed_or_flagged[field] = true);
             }
             self.felt[own.channel] = Pull { pressure, felt, newtons_per_p: own.newtons_per_p, flags };
         }
     }
 
     /// Whether any of them in the plan's field `field` is pressed or flagged.
-    pub(super) fn has_news(&self, field: usize) -> bool {
-        self.has_news.get(field).is_some_and(|has_news| *has_news)
+    pub(super) fn is_pressed_or_flagged(&self, field: usize) -> bool {
+        self.is_pressed_or_flagged.get(field).is_some_and(|is_pressed_or_flagged| *is_pressed_or_flagged)
     }
 
     /// What the taxel of `channel` feels, if it is pressed.

@@ -67,9 +67,9 @@ impl NodePull {
     }
 }
 
-/// Where touches are found.
+/// What touches are found by: a plan, and the skin of its body.
 #[derive(Clone, Copy)]
-pub(super) struct On<'a> {
+pub(super) struct PlanAndSkin<'a> {
     pub(super) plan: &'a Plan,
     pub(super) skin: &'a Skin,
 }
@@ -156,7 +156,7 @@ impl TouchSenses {
     }
 
     /// Puts them into the touches `found` of a frame, directions in the frames of their links, and what pulls into their wrenches.
-    pub(super) fn add(&mut self, of: On<'_>, sensed: &Sensed<'_>, found: &mut TouchFrame) {
+    pub(super) fn add(&mut self, of: PlanAndSkin<'_>, sensed: &Sensed<'_>, found: &mut TouchFrame) {
         if self.calibration_changes != of.plan.calibration_changes {
             self.calibrate(of.plan);
         }
@@ -178,7 +178,7 @@ impl TouchSenses {
     }
 
     /// Notes what the taxels at `nodes` feel; whether any has three axes. Flags of `touch` say why it is not known how one pulls.
-    fn look(&mut self, of: On<'_>, sensed: &Sensed<'_>, nodes: &[u32], touch: &mut Touch) -> bool {
+    fn look(&mut self, of: PlanAndSkin<'_>, sensed: &Sensed<'_>, nodes: &[u32], touch: &mut Touch) -> bool {
         let chart = TouchChart::new(of.skin, touch);
         let mut any = false;
         self.pulls.clear();
@@ -203,7 +203,7 @@ impl TouchSenses {
     }
 
     /// Gives `touch` what is wanted of what its taxels feel; its wrenches are in `links`.
-    fn pull(&self, of: On<'_>, sensed: &Sensed<'_>, touch: &mut Touch, links: &mut [LinkShare]) {
+    fn pull(&self, of: PlanAndSkin<'_>, sensed: &Sensed<'_>, touch: &mut Touch, links: &mut [LinkShare]) {
         let found = self.sums(of);
         if self.wanted.contains(TouchOutputs::SHEAR) {
             let turn = self.link_from_body[touch.link as usize];
@@ -237,7 +237,7 @@ impl TouchSenses {
     /// of which a part is not known is absent, as nothing would say so.
     pub(super) fn add_to_links(
         &self,
-        of: On<'_>,
+        of: PlanAndSkin<'_>,
         row: &[RawValue],
         pressed: impl Iterator<Item = (u32, f64)>,
         links: &mut [LinkShare],
@@ -280,7 +280,7 @@ impl TouchSenses {
     }
 
     /// The sums over the taxels of a touch, in its chart.
-    fn sums(&self, of: On<'_>) -> Sums {
+    fn sums(&self, of: PlanAndSkin<'_>) -> Sums {
         let mut sums = Sums::default();
         for pull in &self.pulls {
             let own = &of.skin.taxels()[pull.node as usize];
@@ -318,7 +318,7 @@ impl TouchSenses {
     }
 
     /// The taxels of a touch of which it is known how they pull, with their noise; `None` where that is not known.
-    fn noisy<'a>(&'a self, of: On<'a>, sensed: &'a Sensed<'_>) -> impl Iterator<Item = Option<Noisy<'a>>> {
+    fn noisy<'a>(&'a self, of: PlanAndSkin<'a>, sensed: &'a Sensed<'_>) -> impl Iterator<Item = Option<Noisy<'a>>> {
         let first_slot = of.plan.touched_from.unwrap_or(0);
         let noise = move |node: usize| {
             let calibration = (&of.plan.calibrations[node], of.plan.curve_of(first_slot + node));
@@ -378,7 +378,7 @@ fn newtons_per_p(plan: &Plan, node: u32) -> Option<f64> {
 }
 
 /// Adds the tangential force s of `node`, on the body at rest, to the wrench of its link among `links`, if that is known.
-fn add_to_wrench(On { plan, skin }: On<'_>, (node, shear): (u32, DVec3), links: &mut [LinkShare]) {
+fn add_to_wrench(PlanAndSkin { plan, skin }: PlanAndSkin<'_>, (node, shear): (u32, DVec3), links: &mut [LinkShare]) {
     let taxel = &skin.taxels()[node as usize];
     let share = links.iter_mut().find(|share| share.link == taxel.link);
     let Some((wrench, newtons)) = share.and_then(|share| share.wrench.as_mut()).zip(newtons_per_p(plan, node)) else {
