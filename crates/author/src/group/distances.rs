@@ -9,7 +9,7 @@ use std::rc::Rc;
 use glam::{DVec2, DVec3};
 
 use super::net::Net;
-use crate::body::point_tree;
+use crate::body::{PointTree, point_tree};
 use crate::field::LinkSurface;
 use crate::field::geodesic::{FIRST_LIMIT, LogMap, MAX_WINDOWS, SurfacePlace};
 
@@ -230,12 +230,11 @@ impl LinkDistances {
             }
         }
         for same in on.values() {
+            let tree = point_tree(same.iter().map(|&i| at[i]));
             for &i in same {
-                let mut others: Vec<usize> = same.iter().copied().filter(|&j| j != i).collect();
-                others.sort_by(|&a, &b| at[a].distance(at[i]).total_cmp(&at[b].distance(at[i])));
-                others.iter().take(MAX_JOINED_ON_TRIANGLE).for_each(|&j| {
-                    join(vertices.len() + i, vertices.len() + j, at[i].distance(at[j]));
-                });
+                for (j, length_m) in nearest_on_triangle(&tree, same, &at, i) {
+                    join(vertices.len() + i, vertices.len() + j, length_m);
+                }
             }
         }
         Net::new(vertices.len() + self.len(), self.len(), &ways)
@@ -256,4 +255,22 @@ impl LinkDistances {
         }
         net
     }
+}
+
+/// Up to [`MAX_JOINED_ON_TRIANGLE`] taxels of `same`, which `tree` has, that are nearest to taxel `of`, and how far they are from it, m; of
+/// equally far ones the first. Taxel `i` is at `at[i]`.
+fn nearest_on_triangle(tree: &PointTree, same: &[usize], at: &[DVec3], of: usize) -> Vec<(usize, f64)> {
+    let mut nearest: Vec<(usize, f64)> = Vec::new();
+    for spot in tree.nearest_neighbor_iter(at[of].to_array()).filter(|spot| same[spot.data] != of) {
+        let other = same[spot.data];
+        let length_m = at[other].distance(at[of]);
+        // Those as far as the last one may come after it, and by rounding also some that are nearer.
+        if nearest.get(MAX_JOINED_ON_TRIANGLE - 1).is_some_and(|(_, last_m)| length_m > last_m * (1.0 + 1e-12)) {
+            break;
+        }
+        nearest.push((other, length_m));
+    }
+    nearest.sort_by(|(a, a_m), (b, b_m)| a_m.total_cmp(b_m).then(a.cmp(b)));
+    nearest.truncate(MAX_JOINED_ON_TRIANGLE);
+    nearest
 }

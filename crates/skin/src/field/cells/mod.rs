@@ -5,6 +5,7 @@
 
 mod coarsen;
 mod divided;
+mod locate;
 mod marched;
 mod middles;
 mod parts;
@@ -17,6 +18,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 pub use self::divided::{CellPoint, Divided};
+use self::locate::Located;
 use self::marched::{Ground, Marched};
 pub use self::middles::Relaxation;
 use self::parts::{Parts, corner_at};
@@ -170,15 +172,15 @@ impl Cells {
                 for (part, &given) in (0..).zip(&cut.given) {
                     parts[refined.parent[given as usize] as usize].push(part);
                 }
-                let within = |start: usize| {
-                    let (place, at) = (places[start], positions[start]);
-                    let depth = |&&part: &&u32| depth(cut.corners(part), at);
-                    let parts = parts[place.triangle as usize].iter();
-                    let part = parts.max_by(|a, b| depth(a).total_cmp(&depth(b)));
-                    part.map(|&part| (start, SurfacePlace::in_triangle(&cut, part, at)))
-                };
                 let parent = |part: u32| refined.parent[cut.given[part as usize] as usize];
-                let starts = starts.iter().filter_map(|&start| within(start)).collect();
+                let mut located: BTreeMap<u32, Located<'_>> = BTreeMap::new();
+                let within = starts.iter().filter_map(|&start| {
+                    let (triangle, at) = (places[start].triangle, positions[start]);
+                    let of_triangle =
+                        located.entry(triangle).or_insert_with(|| Located::new(&cut, &parts[triangle as usize]));
+                    of_triangle.part_at(at).map(|part| (start, SurfacePlace::in_triangle(&cut, part, at)))
+                });
+                let starts = within.collect();
                 let of_part = (|part| is_fine(parent(part)), |part| is_skin(parent(part)));
                 cells.divide(&cut, (starts, reach_m), of_part, most_windows(&cut), parts_of_cells.as_mut());
                 cells.surface = parts_of_cells.map_or(Vec::new(), |parts| parts.triangles(&cut, parent, topology));
@@ -415,13 +417,6 @@ fn first_of_place(topology: &Topology, places: &[SurfacePlace], positions: &[DVe
         first.push(other.map_or(index as u32, |other| first[other]));
     }
     first
-}
-
-/// How deep `p`, in the plane of the triangle, is within it: the least of its barycentric coordinates.
-fn depth([a, b, c]: [DVec3; 3], p: DVec3) -> f64 {
-    let normal = (b - a).cross(c - a);
-    let part = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from));
-    part(b, c).min(part(c, a)).min(part(a, b)) / normal.length_squared()
 }
 
 #[cfg(test)]
