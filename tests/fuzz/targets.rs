@@ -353,7 +353,7 @@ fn mesh(name: &'static str, file: &'static str, seeds: Vec<Vec<u8>>) -> Target {
 
 pub(super) fn urdf() -> Target {
     target("urdf", "a.urdf", [seeds::URDF], |case| {
-        if is_large(&case.text(), &["rows=\"", "cols=\""]) {
+        if is_large(&case.text(), &["rows=\"", "cols=\""], 20_000) {
             return Ok(false);
         }
         let opened = somatic::author::mesh::open(case.path, &MeshOptions::default());
@@ -380,7 +380,14 @@ pub(super) fn urdf_joints() -> Target {
 }
 
 pub(super) fn mjcf() -> Target {
-    target("mjcf", "a.xml", [seeds::MJCF], |case| verdict(author_mjcf_skin(case.path, &MeshOptions::default())))
+    target("mjcf", "a.xml", [seeds::MJCF], |case| {
+        // They get fields, charts and edges too.
+        let counts = ["params=\"", "key=\"size\" value=\""];
+        if counts.iter().any(|mark| is_large(&case.text(), &[mark], 2_000)) {
+            return Ok(false);
+        }
+        verdict(author_mjcf_skin(case.path, &MeshOptions::default()))
+    })
 }
 
 pub(super) fn collada() -> Target {
@@ -577,20 +584,24 @@ fn sheet(text: &str, arguments: impl Fn(&str) -> Vec<String>) -> Verdict {
     program::verdict(&[&["author"][..], &arguments].concat())
 }
 
-/// Whether `text` asks for more taxels than are made in a moment without optimisation, and not for more than are allowed: that takes
-/// its time, in proportion. The taxels are the product of the numbers after each of `marks`, or of all numbers.
-fn is_large(text: &str, marks: &[&str]) -> bool {
-    let number = |text: &str| text.split(|c: char| !c.is_ascii_digit()).next().and_then(|digits| digits.parse().ok());
-    let numbers: Vec<u64> = match marks {
-        [] => text.split(|c: char| !c.is_ascii_digit()).filter_map(|digits| digits.parse().ok()).collect(),
-        marks => marks.iter().filter_map(|mark| number(text.split_once(mark)?.1)).collect(),
+/// Whether `text` asks for more taxels than are made in a moment without optimisation, which are `from` and more, and not for more than
+/// are allowed: that takes its time, in proportion. The taxels are the product of the numbers after each of `marks`, up to the quote
+/// that ends them, or of all numbers.
+fn is_large(text: &str, marks: &[&str], from: u64) -> bool {
+    let numbers = |text: &str| -> Vec<u64> {
+        text.split(|c: char| !c.is_ascii_digit()).filter_map(|digits| digits.parse().ok()).collect()
     };
-    (20_000..=1_000_000).contains(&numbers.into_iter().fold(1, u64::saturating_mul))
+    let after = |mark: &&str| text.split_once(*mark).and_then(|(_, rest)| rest.split('"').next());
+    let numbers: Vec<u64> = match marks {
+        [] => numbers(text),
+        marks => marks.iter().filter_map(after).flat_map(numbers).collect::<Vec<u64>>(),
+    };
+    (from..=1_000_000).contains(&numbers.into_iter().fold(1, u64::saturating_mul))
 }
 
 pub(super) fn grid() -> Target {
     names("grid", &["31x11", "2x3", "8 X 8"], |text| {
-        if is_large(text, &[]) {
+        if is_large(text, &[], 20_000) {
             return Ok(false);
         }
         sheet(text, |grid| [&format!("--grid={grid}"), "--pitch", "8.6mm,5mm"].map(str::to_owned).to_vec())

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use somatic::author::{Recipe, author, mesh};
 use somatic::source::{SimulatedSource, Source as _};
 use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Scene, TouchFlags, bundled, touch};
 
@@ -144,6 +145,56 @@ fn touches_of_a_simulation_have_its_force() {
     // The paper's signals are no newtons.
     let rod = SimulatedSource::open(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/simulations/rod.toml")).unwrap();
     assert!(rod.calibration().contains("sensors = \"equal\"") && !rod.calibration().contains("unit"));
+}
+
+/// A finger with a tip that is fixed to it and a thumb that turns, boxes of 60 mm with gaps of 1 mm between them.
+fn fingers() -> Body {
+    let cuboid = "<visual><geometry><box size=\"0.06 0.02 0.02\"/></geometry></visual>";
+    let link = |name: &str| format!("<link name=\"{name}\">{cuboid}</link>\n");
+    let joint = |kind: &str, child: &str, x: f64| {
+        format!(
+            "<joint name=\"{child}\" type=\"{kind}\"><parent link=\"finger\"/><child link=\"{child}\"/>\
+             <origin xyz=\"{x} 0 0\"/><axis xyz=\"0 1 0\"/></joint>\n"
+        )
+    };
+    let links: String = ["finger", "tip", "thumb"].map(link).concat();
+    let text = format!(
+        "<robot name=\"r\">{links}{}{}</robot>",
+        joint("fixed", "tip", 0.061),
+        joint("continuous", "thumb", -0.061)
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r.urdf");
+    std::fs::write(&path, text).unwrap();
+    let file = mesh::open(&path, &mesh::MeshOptions::default()).unwrap();
+    let recipe = Recipe::parse("recipe.toml", "[[place]]\ntaxels = 600\n", Path::new("")).unwrap();
+    author(file, &recipe, |_| {}).unwrap().body
+}
+
+#[test]
+fn a_press_over_a_fixed_joint_is_one_touch() {
+    let body = fingers();
+    let touches = |x: f64| {
+        let text = format!(
+            "rate_hz = 10\nduration_s = 1\n[layer]\nthickness_m = 0.005\n[[touch]]\non = \"body\"\nindenter = \"ball\"\n\
+             radius_m = 0.02\npath = [{{ link = \"finger\", at = [{x}, 0, 0.01] }}]\nhold = {{ newton = 5 }}\n"
+        );
+        let mut simulation = SimulatedSource::on_body("fingers", &text, body.clone()).unwrap();
+        let calibration = Calibration::parse(&simulation.calibration(), simulation.taxels()).unwrap();
+        let scene = Scene::default().outputs(Outputs::TOTAL).touches(touch::Options::default());
+        let options = Options::default().scene(scene).calibration(calibration).backend(BackendKind::Cpu);
+        let mut engine = Engine::new(simulation.body(), options).unwrap();
+        engine.set_channels(simulation.taxels()).unwrap();
+        let frame = read(&mut simulation, 2);
+        let touches = &engine.process_one(&frame).unwrap().touches(0).unwrap().touches;
+        touches.iter().map(|touch| (touch.force_newton.unwrap(), touch.flags)).collect::<Vec<_>>()
+    };
+    let [(force_newton, flags)] = touches(0.0295)[..] else { panic!("{:?}", touches(0.0295)) };
+    assert!((force_newton / 5.0 - 1.0).abs() < 0.02, "{force_newton} N");
+    assert!(flags.contains(TouchFlags::SEVERAL_LINKS), "{flags:?}");
+    // Over a joint that moves it is two, which share the force.
+    let [(one, _), (two, _)] = touches(-0.0295)[..] else { panic!("{:?}", touches(-0.0295)) };
+    assert!(((one + two) / 5.0 - 1.0).abs() < 0.02 && one.min(two) > 1.0, "{one} N and {two} N");
 }
 
 #[test]

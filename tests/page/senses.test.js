@@ -4,8 +4,9 @@ import { execFileSync } from "node:child_process";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { before, test } from "node:test";
+import { withUnit } from "../../crates/page/src/web/format.js";
 import { ticksBetween } from "../../crates/page/src/web/legend.js";
-import { letterName, Senses } from "../../crates/page/src/web/senses.js";
+import { letterName, Senses, unitOf } from "../../crates/page/src/web/senses.js";
 import { coloursAt, folder, open, pause, picture, seek, settled, SOMATIC, view } from "./program.js";
 
 const about = {
@@ -97,6 +98,17 @@ test("the letter of pressure is called so where it is the only one", () => {
   assert.equal(letterName("shear", fields("sustained", "shear")), "shear");
   assert.equal(letterName("sustained", fields("sustained", "change")), "sustained");
   assert.equal(letterName(null, fields(null)), "pressure");
+});
+
+test("changes of pressures are per second", () => {
+  const units = (unit, quantity, name = "total") =>
+    ["sustained", "change"].map((letter) => unitOf({ name, unit }, letter, quantity));
+  assert.deepEqual(units("N", "N"), ["N", "N/s"]);
+  assert.deepEqual(units("P", "count"), ["P", "count/s"]);
+  assert.deepEqual(units("N", "N", "force"), ["N", "N"]);
+  assert.deepEqual(units("m", "Pa", "centroid"), ["m", "m"]);
+  assert.equal(unitOf(undefined, "change", "N"), "1");
+  assert.equal(withUnit(1500, "count/s", "count"), "1500 counts/s");
 });
 
 test("a scale has both of its ends, and round ticks between", () => {

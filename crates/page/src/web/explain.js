@@ -3,6 +3,7 @@
 import { byId, make, setText } from "./dom.js";
 import { ABSENT, scaleFor, seconds, short, vectorWithUnit, withUnit } from "./format.js";
 import { readingRows } from "./inspect.js";
+import { unitOf } from "./senses.js";
 import { say } from "./wire.js";
 
 export class PerceptPanel {
@@ -87,7 +88,7 @@ export class PerceptPanel {
       row.row.hidden = isTold || column.sense !== about.sense;
       const value = model.forPeople(field, column.name);
       const text = value
-        ? vectorWithUnit(value, column.unit, model.quantity)
+        ? vectorWithUnit(value, unitOf(column, about.letter, model.quantity), model.quantity)
         : `${ABSENT} ${touched ? model.reason(field, column.name).replaceAll("_", " ") : ""}`;
       setText(row.value, text);
       row.value.classList.toggle("absent", !value);
@@ -115,6 +116,7 @@ export class PerceptPanel {
       return;
     }
     const { quantity } = welcome;
+    const { sense = "pressure", letter = null } = welcome.fields[explanation.field] ?? {};
     const head = make(
       "p",
       "note",
@@ -123,7 +125,8 @@ export class PerceptPanel {
     const values = make("table", "explain-values");
     values.append(line("th", ["percept", `${explanation.backend}, reference`, "difference, bound", ""]));
     for (const column of explanation.columns) {
-      const unit = welcome.columns.find((c) => c.name === column.name)?.unit ?? "1";
+      const about = welcome.columns.find((c) => c.name === column.name);
+      const unit = unitOf(about, letter, quantity);
       const { value, reference } = column;
       if (!value && !reference && !column.recorded) continue;
       const apart = value && reference ? Math.hypot(...value.map((x, i) => x - (reference[i] ?? NaN))) : null;
@@ -142,7 +145,6 @@ export class PerceptPanel {
       }
       values.append(row);
     }
-    const { sense = "pressure" } = welcome.fields[explanation.field] ?? {};
     const isPressure = sense === "pressure";
     const members = make("table", "explain-members");
     const what = sense === "proximity" ? "distance" : sense;

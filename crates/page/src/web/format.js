@@ -45,6 +45,8 @@ export function scaleFor(unit, size, quantity) {
       return { factor: 1e3, unit: "mN m" };
     case "count":
       return { factor: 1, unit: "counts" };
+    case "count/s":
+      return { factor: 1, unit: "counts/s" };
     case "1":
     case "":
       return { factor: 1, unit: "" };

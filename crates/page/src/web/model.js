@@ -30,8 +30,6 @@ export class Model extends Reported {
     this.health = new Uint8Array(0);
     /** Where there are taxels that read something else. @type {Senses | null} */
     this.senses = null;
-    /** The letter that is shown. @type {string | null} */
-    this.letter = null;
     /** Colours of pressures. @type {number[][]} */
     this.pressureColours = [];
     /** Touches of the whole body, the oldest first. @type {import("./wire.js").Touch[]} */

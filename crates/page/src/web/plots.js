@@ -3,6 +3,7 @@
 import { byId, make, paletteColour, setText } from "./dom.js";
 import { clock, seconds } from "./format.js";
 import { DASHES, drawPlot } from "./plot.js";
+import { unitOf } from "./senses.js";
 import { swatchOf, TouchPlot } from "./touch_plot.js";
 import { say } from "./wire.js";
 
@@ -304,7 +305,9 @@ export class Plots {
 
   /** @param {Series} s */
   unitOf(s) {
-    return this.model.welcome?.columns.find((c) => c.name === s.column)?.unit ?? "1";
+    const { welcome, quantity } = this.model;
+    const column = welcome?.columns.find((c) => c.name === s.column);
+    return unitOf(column, welcome?.fields[s.field]?.letter, quantity);
   }
 
   /**

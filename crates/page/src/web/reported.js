@@ -20,6 +20,8 @@ export class Reported extends Observed {
     this.hasAreas = true;
     /** What is shown of taxels and fields. @type {import("./senses.js").Sense} */
     this.sense = "pressure";
+    /** The letter that is shown. @type {string | null} */
+    this.letter = null;
   }
 
   /**
@@ -80,7 +82,7 @@ export class Reported extends Observed {
 
   /**
    * The column that says how hard a field is pressed: its force where that is computed and can be known, else the sum of its pressures, else the
-   * highest of them; null where the run computes none of these. Of another sense what it reads first: the tangential force, the mean
+   * highest of them; null where the run computes none of these. Changes make no force. Of another sense what it reads first: the tangential force, the mean
    * temperature, the least distance.
    */
   get loadColumn() {
@@ -90,7 +92,7 @@ export class Reported extends Observed {
     }
     // Counts have no unit, and pressures without areas make no force.
     const isKnown = this.quantity === "Pa" ? this.hasAreas : this.quantity !== "count";
-    if (this.columnIndex.has("force") && isKnown) return "force";
+    if (this.columnIndex.has("force") && isKnown && this.letter !== "change") return "force";
     return ["total", "peak", "force"].find((name) => this.columnIndex.has(name)) ?? null;
   }
 
@@ -98,6 +100,7 @@ export class Reported extends Observed {
   get loadUnit() {
     if (this.sense === "temperature") return "°C";
     if (this.sense === "proximity") return "m";
+    if (this.letter === "change") return `${this.quantity}/s`;
     return this.loadColumn === "force" ? "N" : "P";
   }
 

@@ -130,3 +130,15 @@ export function letterName(letter, fields) {
   const ofPressure = new Set(fields.filter(({ sense }) => sense === "pressure").map((field) => field.letter));
   return letter === null || (ofPressure.has(letter) && ofPressure.size === 1) ? "pressure" : letter;
 }
+
+/**
+ * The unit of a column for fields in a letter, where P is a `quantity`: those of change have the change of P in its place.
+ * @param {{name: string, unit: string} | undefined} column
+ * @param {string | null | undefined} letter
+ * @param {string} quantity
+ */
+export function unitOf(column, letter, quantity) {
+  const unit = column?.unit ?? "1";
+  const isOfPressures = unit === "P" || (unit === quantity && column?.name !== "force");
+  return letter === "change" && isOfPressures ? `${quantity}/s` : unit;
+}

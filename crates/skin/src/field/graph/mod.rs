@@ -1,8 +1,9 @@
 //! The graph of taxels: which of them are neighbours on the skin.
 //!
 //! Its nodes are a body's pressure taxels. Two have an edge if their cells on the surface at rest share a border and the way
-//! along the surface is at most 2 √(the larger cell). Parts of one link's surface that no mesh connects, and taxels without a
-//! surface, get edges by their places: see `points.rs`. Links that no surface connects have no edges between them.
+//! along the surface is at most 2 √(the larger cell). Parts of one link's surface that no mesh connects, links that a URDF fixes to
+//! each other, and taxels without a surface get edges by their places: see `points.rs`. Links that may move against each other have
+//! edges between them only where one surface connects them.
 
 mod nodes;
 mod points;

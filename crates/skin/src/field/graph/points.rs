@@ -1,4 +1,4 @@
-//! Edges by places alone, between taxels of one link that no surface connects.
+//! Edges by places alone, between taxels that no surface connects, of one link or of links fixed to each other.
 //!
 //! Two taxels have an edge if no other is strictly inside the ball that has the line between them as its diameter (Gabriel and
 //! Sokal 1969), if they are at most 2 √(the larger cell) apart, and if their normals are within 90°: those of two faces at a box's
@@ -17,7 +17,7 @@ pub(super) const LENGTH_PER_ROOT: f64 = 2.0;
 /// cos 90°, with a tolerance for normals that a file has in single precision.
 const MIN_NORMAL_COSINE: f64 = -1e-6;
 
-/// A taxel of a link.
+/// A taxel, in the frame of one link for all of them.
 pub(super) struct LinkPoint {
     /// Its index in the body.
     pub(super) taxel: u32,
@@ -29,7 +29,7 @@ pub(super) struct LinkPoint {
     pub(super) part: Option<(u32, u32)>,
 }
 
-/// The edges between `points`, all of one link and none of them at one place.
+/// The edges between `points`, none of them at the place of another.
 pub(super) fn edges(points: &[LinkPoint]) -> Vec<(u32, u32)> {
     let are_apart = |a: &LinkPoint, b: &LinkPoint| a.part.is_none() || a.part != b.part;
     if points.windows(2).all(|pair| !are_apart(&pair[0], &pair[1])) {

@@ -79,9 +79,10 @@ impl Edges {
     /// All, with those between parts of surfaces.
     fn finish(self, body: &Body) -> Vec<(u32, u32)> {
         let Self { mut found, cells, mut leader } = self;
-        let mut by_link: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        nodes(body).for_each(|taxel| by_link.entry(body.taxels[taxel].link).or_default().push(taxel));
-        for taxels in by_link.values() {
+        let rigid = body.rigid_roots();
+        let mut by_root: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        nodes(body).for_each(|taxel| by_root.entry(rigid[body.taxels[taxel].link]).or_default().push(taxel));
+        for taxels in by_root.values() {
             found.extend(between_parts(body, taxels, &cells, &mut leader));
         }
         let shared = leader.iter().filter(|(taxel, leader)| taxel != leader);
@@ -115,8 +116,8 @@ impl Ways<'_> {
     }
 }
 
-/// The edges between `taxels` of one link that are on different parts of its surface, or on none. Those at the place of another
-/// get that one as their leader.
+/// The edges between `taxels`, of one link or of links fixed to each other, that are on different parts of their surface, or on none.
+/// Those at the place of another get that one as their leader.
 fn between_parts(
     body: &Body,
     taxels: &[usize],
@@ -124,8 +125,11 @@ fn between_parts(
     leader: &mut BTreeMap<usize, usize>,
 ) -> Vec<(u32, u32)> {
     let loose: Vec<usize> = taxels.iter().copied().filter(|taxel| !cells.contains_key(taxel)).collect();
-    let position = |taxel: usize| body.taxels[taxel].position_in_link;
-    let normal = |taxel: usize| body.taxels[taxel].normal_in_link;
+    // All in the frame of the first one's link.
+    let frame = taxels.first().map_or(0, |&taxel| body.taxels[taxel].link);
+    let way = |taxel: usize| body.rest_transform(frame, body.taxels[taxel].link);
+    let position = |taxel: usize| way(taxel).transform_point3(body.taxels[taxel].position_in_link);
+    let normal = |taxel: usize| way(taxel).transform_vector3(body.taxels[taxel].normal_in_link);
     let tree = point_tree(loose.iter().map(|&taxel| position(taxel)));
     for &taxel in &loose {
         let here = tree.locate_within_distance(position(taxel).to_array(), COINCIDENT_M * COINCIDENT_M);

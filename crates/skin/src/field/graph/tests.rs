@@ -1,9 +1,9 @@
 use std::f64::consts::TAU;
 
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use super::*;
-use crate::body::{Glb, MeshData, Modality, Taxel};
+use crate::body::{Glb, LinkJoint, LinkMotion, MeshData, Modality, Taxel, Up};
 
 const PITCH: f64 = 0.01;
 
@@ -103,10 +103,47 @@ fn shells_of_one_link_are_stitched_and_links_are_not() {
     assert!(pairs(&apart).iter().all(|&(a, b)| a / 25 == b / 25));
 }
 
+#[test]
+fn links_that_a_urdf_fixes_to_each_other_are_stitched() {
+    // A finger, its tip fixed to it by way of a link without taxels, and a part beyond, each 5 × 5 taxels, one pitch from the next.
+    let pairs_of_links = |joint: Option<LinkJoint>, is_of_urdf: bool| {
+        let mut glb = Glb::new();
+        let finger = glb.node("finger", None, DVec3::new(0.3, 0.0, 0.0));
+        if is_of_urdf {
+            glb.urdf_root(finger, Up::Z);
+        }
+        let turned = DAffine3::from_rotation_translation(DQuat::from_rotation_z(TAU / 4.0), DVec3::X * 5.0 * PITCH);
+        let flange = glb.placed_node("flange", Some(finger), turned);
+        let tip = glb.placed_node("tip", Some(flange), DAffine3::from_quat(DQuat::from_rotation_z(-TAU / 4.0)));
+        let beyond = glb.node("beyond", Some(tip), DVec3::X * 5.0 * PITCH);
+        if let Some(joint) = &joint {
+            glb.joint(beyond, joint);
+        }
+        for (number, (link, name)) in (0..).zip([(finger, "finger skin"), (tip, "tip skin"), (beyond, "skin beyond")]) {
+            glb.taxels(name, Some(link), &grid(25 * number, 5, 5, DVec3::ZERO), None);
+        }
+        let body = Body::from_bytes("body", &glb.to_bytes().unwrap()).unwrap();
+        let graph = TaxelGraph::made(&body);
+        // What is stored is current.
+        let stored = Body { edges: Some(graph.to_stored(&body)), ..body.clone() };
+        assert_eq!(TaxelGraph::from_body(&stored), (graph.clone(), None));
+        let across = pairs(&graph).into_iter().filter(|&(a, b)| a / 25 != b / 25);
+        let rows: BTreeSet<(u32, u32)> = across.map(|(a, b)| (a / 25, b / 25)).collect();
+        let is_beside = (0..5).all(|row| graph.neighbours(5 * row + 4).contains(&(25 + 5 * row as u32)));
+        assert_eq!(is_beside, is_of_urdf);
+        rows.into_iter().collect::<Vec<_>>()
+    };
+    let moves = LinkJoint { name: "j".into(), motion: LinkMotion::Continuous(DVec3::Y), limits: None, mimic: None };
+    assert_eq!(pairs_of_links(Some(moves), true), [(0, 1)]);
+    assert_eq!(pairs_of_links(None, true), [(0, 1), (1, 2)]);
+    // Any node of another file may move.
+    assert_eq!(pairs_of_links(None, false), []);
+}
+
 /// Two faces whose taxels meet at an edge along y; their normals are `between` apart, and all of it is turned by `turn`.
-fn edge_of_two_faces(between: f64, turn: glam::DQuat) -> TaxelGraph {
+fn edge_of_two_faces(between: f64, turn: DQuat) -> TaxelGraph {
     let top: Vec<Taxel> = grid(0, 3, 3, DVec3::new(0.005, 0.005, 0.0));
-    let tilt = glam::DQuat::from_rotation_y(-between);
+    let tilt = DQuat::from_rotation_y(-between);
     let side = top.iter().map(|one| {
         let DVec3 { x, y, .. } = one.position_in_link;
         let position_in_link = tilt * DVec3::new(-x, y, 0.0);
@@ -126,7 +163,7 @@ fn faces_at_an_edge_are_stitched_and_the_sides_of_a_plate_are_not() {
     // The meshes of robots are often faces that share no vertices.
     for (degrees, is_edge) in [(0.0_f64, true), (60.0, true), (90.0, true), (95.0, false), (170.0, false)] {
         for step in 0..8 {
-            let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3 * f64::from(step), 0.7 * f64::from(step), 0.2);
+            let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3 * f64::from(step), 0.7 * f64::from(step), 0.2);
             let graph = edge_of_two_faces(degrees.to_radians(), turn);
             for row in 0..3 {
                 let is_stitched = graph.neighbours(3 * row).contains(&(9 + 3 * row as u32));
