@@ -12,6 +12,9 @@ use crate::signal::Frame;
 use crate::source::Lines;
 use crate::source::Source;
 
+/// The longest that frames are gathered: who reads a slow source, as a simulation, sees how far it is.
+const GATHERING: Duration = Duration::from_millis(100);
+
 /// What a source delivers.
 pub enum Arrival {
     /// The next frames, and information on them.
@@ -59,7 +62,7 @@ pub struct FrameInfo {
 pub struct ReadMode {
     /// Maximum number of frames per arrival.
     pub most: usize,
-    /// Wait for `most` frames; else pass on those that are there.
+    /// Wait for `most` frames, but not for long; else pass on those that are there.
     pub gather: bool,
     /// Playback at this many times the recorded speed; `None` is as fast as possible.
     pub speed: Option<f64>,
@@ -179,7 +182,8 @@ fn read(
         let mut frames = Vec::with_capacity(together);
         let mut info = FrameInfo::default();
         let mut end = None;
-        while frames.len() < together && end.is_none() {
+        let begin = Instant::now();
+        while frames.len() < together && end.is_none() && begin.elapsed() < GATHERING {
             let mut frame = pool.pop().unwrap_or_else(|| Frame::missing(0.0, width));
             match source.next_frame(&mut frame) {
                 Ok(true) => {
@@ -270,6 +274,34 @@ mod tests {
             assert_eq!(times, [0.0, 1.0, 2.0, 3.0]);
             assert!(error.to_string().contains("oops"), "{error}");
         }
+    }
+
+    /// A source of ten frames, each of which takes its time.
+    struct Slow(u32);
+
+    impl Source for Slow {
+        fn taxels(&self) -> &[u32] {
+            &[4]
+        }
+
+        fn next_frame(&mut self, frame: &mut Frame) -> crate::error::Result<bool> {
+            thread::sleep(GATHERING / 4);
+            self.0 += 1;
+            *frame = Frame::missing(f64::from(self.0), 1);
+            Ok(self.0 <= 10)
+        }
+    }
+
+    #[test]
+    fn frames_of_a_slow_source_are_not_gathered_for_long() {
+        let mut feed = Feed::start(Box::new(Slow(0)), ReadMode { most: 99, gather: true, speed: None });
+        let (mut arrivals, mut times) = (0, Vec::new());
+        while let Some(Arrival::Frames(frames, _)) = feed.next(Duration::from_secs(20)) {
+            arrivals += 1;
+            times.extend(frames.iter().map(|frame| frame.t_s));
+        }
+        assert!(arrivals >= 3, "{arrivals} arrivals");
+        assert_eq!(times, Vec::from_iter((1..=10).map(f64::from)));
     }
 
     /// A source of which nothing comes until it is stopped.

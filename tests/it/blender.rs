@@ -363,7 +363,7 @@ fn a_field_added_and_a_density_painted_in_blender_come_back() {
 #[test]
 fn edges_come_back_also_at_four_megabytes() {
     let row = |id: u32| (id, EdgeRow { lengths_m: f64::from(id) * 1e-6, to: vec![id + 1, id + 2, id + 400] });
-    let edges = StoredEdges { rows: (1_000_000..1_085_000).map(row).collect() };
+    let edges = StoredEdges { rows: (1_000_000..1_085_000).map(row).collect(), ..StoredEdges::default() };
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("large.glb");
     let mut glb = Glb::new();

@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use somatic::author::{Recipe, author, mesh};
+use somatic::author::{Authored, Recipe, author, mesh};
 use somatic::source::{SimulatedSource, Source as _};
-use somatic::{BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Scene, TouchFlags, bundled, touch};
+use somatic::{
+    BackendKind, Body, Calibration, Engine, Frame, Options, Outputs, Result, Scene, TouchFlags, bundled, touch,
+};
 
 /// A rod over an elbow, a strap and a pair.
 fn elbow() -> SimulatedSource {
@@ -147,8 +149,8 @@ fn touches_of_a_simulation_have_its_force() {
     assert!(rod.calibration().contains("sensors = \"equal\"") && !rod.calibration().contains("unit"));
 }
 
-/// A finger with a tip that is fixed to it and a thumb that turns, boxes of 60 mm with gaps of 1 mm between them.
-fn fingers() -> Body {
+/// A finger with a tip that is fixed to it and a thumb that turns, boxes of 60 mm with gaps of 1 mm between them, and taxels by a recipe.
+fn fingers(recipe: &str) -> Result<Authored> {
     let cuboid = "<visual><geometry><box size=\"0.06 0.02 0.02\"/></geometry></visual>";
     let link = |name: &str| format!("<link name=\"{name}\">{cuboid}</link>\n");
     let joint = |kind: &str, child: &str, x: f64| {
@@ -167,14 +169,14 @@ fn fingers() -> Body {
     let path = folder.path().join("r.urdf");
     std::fs::write(&path, text).unwrap();
     let file = mesh::open(&path, &mesh::MeshOptions::default()).unwrap();
-    let recipe = Recipe::parse("recipe.toml", "[[place]]\ntaxels = 600\n", Path::new("")).unwrap();
-    author(file, &recipe, |_| {}).unwrap().body
+    author(file, &Recipe::parse("recipe.toml", recipe, Path::new(""))?, |_| {})
 }
 
+const PLACES: &str = "[[place]]\ntaxels = 600\n";
+
 #[test]
-fn a_press_over_a_fixed_joint_is_one_touch() {
-    let body = fingers();
-    let touches = |x: f64| {
+fn a_press_over_a_joint_is_one_touch_where_that_is_fixed_or_joined() {
+    let touches = |body: &Body, x: f64| {
         let text = format!(
             "rate_hz = 10\nduration_s = 1\n[layer]\nthickness_m = 0.005\n[[touch]]\non = \"body\"\nindenter = \"ball\"\n\
              radius_m = 0.02\npath = [{{ link = \"finger\", at = [{x}, 0, 0.01] }}]\nhold = {{ newton = 5 }}\n"
@@ -189,12 +191,37 @@ fn a_press_over_a_fixed_joint_is_one_touch() {
         let touches = &engine.process_one(&frame).unwrap().touches(0).unwrap().touches;
         touches.iter().map(|touch| (touch.force_newton.unwrap(), touch.flags)).collect::<Vec<_>>()
     };
-    let [(force_newton, flags)] = touches(0.0295)[..] else { panic!("{:?}", touches(0.0295)) };
-    assert!((force_newton / 5.0 - 1.0).abs() < 0.02, "{force_newton} N");
-    assert!(flags.contains(TouchFlags::SEVERAL_LINKS), "{flags:?}");
-    // Over a joint that moves it is two, which share the force.
-    let [(one, _), (two, _)] = touches(-0.0295)[..] else { panic!("{:?}", touches(-0.0295)) };
-    assert!(((one + two) / 5.0 - 1.0).abs() < 0.02 && one.min(two) > 1.0, "{one} N and {two} N");
+    let is_one = |body: &Body, x: f64| match touches(body, x)[..] {
+        [(force_newton, flags)] => {
+            assert!((force_newton / 5.0 - 1.0).abs() < 0.02, "{force_newton} N");
+            assert!(flags.contains(TouchFlags::SEVERAL_LINKS), "{flags:?}");
+            true
+        }
+        [(one, _), (two, _)] => {
+            assert!(((one + two) / 5.0 - 1.0).abs() < 0.02 && one.min(two) > 1.0, "{one} N and {two} N");
+            false
+        }
+        _ => panic!("{:?}", touches(body, x)),
+    };
+    let (tip, thumb) = (0.0295, -0.0295);
+    let Authored { file, body, .. } = fingers(PLACES).unwrap();
+    assert!(is_one(&body, tip) && !is_one(&body, thumb), "the thumb may move");
+    // What a recipe joins stays so, whatever is authored after it.
+    let join = "[[join]]\nlinks = [\"thumb\", \"fing*\"]\n";
+    let joined = author(file, &Recipe::parse("recipe.toml", join, Path::new("")).unwrap(), |_| {}).unwrap();
+    assert!(joined.notes.is_empty(), "{:?}", joined.notes);
+    let again = author(joined.file, &Recipe::none(), |_| {}).unwrap();
+    assert_eq!(again.body.edges, joined.body.edges);
+    let at_once = fingers(&[PLACES, join].concat()).unwrap().body;
+    assert_eq!(at_once.edges, joined.body.edges);
+    assert!(is_one(&again.body, tip) && is_one(&again.body, thumb));
+    for (links, told) in [
+        ("\"toe\"", "recipe.toml: line 4, column 9: the body has no link `toe`; `somatic inspect` lists its links"),
+        ("[\"t*b\"]", "`t*b` is one link, `thumb`; name those that it is joined with, too"),
+    ] {
+        let error = fingers(&format!("{PLACES}[[join]]\nlinks = {links}\n")).unwrap_err().to_string();
+        assert!(error.contains(told), "{error}");
+    }
 }
 
 #[test]

@@ -5,14 +5,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec3;
 
 use super::group::{FilePaint, Grouper, Grouping};
+use super::origin::Origin;
 use super::placed::{Progress, report_progress};
 use super::recipe::Recipe;
+use super::recipe_values::Globs;
 use super::refresh::refresh;
 use super::report::PlaceReport;
 use super::rest_surface::{MeshTaxel, RestSurface};
 use super::seat::{Seated, seat};
-use crate::body::{Body, Details, FieldSpec, Glb, Original, Skinning, Taxel, listed};
-use crate::error::{Error, Result};
+use crate::body::{Body, Details, FieldSpec, Glb, Original, Skinning, StoredEdges, Taxel, listed};
+use crate::error::{Error, Result, failed};
 use crate::field::{Divided, TaxelGraph, unions};
 
 /// Progress before and after placing taxels, and when they are in fields.
@@ -64,6 +66,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     }
     let (mut body, mut details) = file.read()?;
     check(&file, &body, recipe)?;
+    let joined = joined_links(&body, recipe)?;
     report_progress(&mut go_on, PROGRESS_OPENED)?;
     let mut notes = std::mem::take(&mut file.notes);
     if !body.taxels.is_empty() {
@@ -75,6 +78,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     }
     let keeps_fields = asks_nothing && !body.fields.is_empty();
     if keeps_fields {
+        join(&mut body, joined);
         store_edges(&mut file, &mut body, &mut notes, None);
         return Ok(Authored { file, body, places: Vec::new(), notes });
     }
@@ -93,6 +97,7 @@ pub fn author_while(mut file: Original, recipe: &Recipe, mut go_on: impl FnMut(f
     add_fields(&mut file, &body, &details, &fields);
     report_progress(&mut go_on, PROGRESS_GROUPED)?;
     let (mut body, _) = file.read()?;
+    join(&mut body, joined);
     store_edges(&mut file, &mut body, &mut notes, divided.as_ref());
     Ok(Authored { file, body, places: reports, notes })
 }
@@ -114,6 +119,38 @@ fn check(file: &Original, body: &Body, recipe: &Recipe) -> Result<()> {
         return Err(Error::usage(what).at(file.name()));
     }
     Ok(())
+}
+
+/// The names of the links that `recipe` joins, after those that `body` has joined; none if the recipe joins none.
+fn joined_links(body: &Body, recipe: &Recipe) -> Result<Vec<Vec<String>>> {
+    let names = |(globs, at): &(Globs, Origin)| {
+        let names = body.links.iter().map(|link| &link.name).filter(|name| globs.matches(name));
+        let names: Vec<String> = names.cloned().collect();
+        let what = match &names[..] {
+            [] => failed!("the body has no link `{}`; `somatic inspect` lists its links", globs.listed()),
+            [one] => failed!("`{}` is one link, `{one}`; name those that it is joined with, too", globs.listed()),
+            _ => return Ok(names),
+        };
+        Err(at.put(what))
+    };
+    let mut joined = Vec::new();
+    if !recipe.joins.is_empty() {
+        joined.extend(body.edges.iter().flat_map(|edges| edges.joined.iter().cloned()));
+    }
+    for names in recipe.joins.iter().map(names) {
+        let names = names?;
+        if !joined.contains(&names) {
+            joined.push(names);
+        }
+    }
+    Ok(joined)
+}
+
+/// Joins the links of `body` anew, if any are to be `joined`.
+fn join(body: &mut Body, joined: Vec<Vec<String>>) {
+    if !joined.is_empty() {
+        body.edges = Some(StoredEdges { joined, ..StoredEdges::default() });
+    }
 }
 
 /// Writes the edges between the taxels of `body`, which is in `file`, unless the file has current ones. `divided` has all of the

@@ -10,7 +10,7 @@ use super::triangles::Triangles;
 use super::urdf_file::{JointMotion, Robot, RobotJoint, RobotLink, ShapeKind};
 use super::urdf_tree::order;
 use super::{formats, shapes};
-use crate::body::{Glb, LinkJoint, LinkMimic, LinkMotion};
+use crate::body::{Glb, LinkJoint, LinkMimic, LinkMotion, StoredEdges};
 use crate::error::{Error, Result};
 use crate::lint::MAX_LIKELY_LINK_M;
 
@@ -47,6 +47,7 @@ pub(super) fn robot(path: &Path, options: &MeshOptions) -> Result<(Glb, Vec<Stri
 pub(super) fn links(robot: &Robot, options: &MeshOptions) -> Result<Linked> {
     let (up, said) = options.robot_up();
     let order = order(robot)?;
+    let joined = fixed_links(&order);
     let mut glb = Glb::new();
     let material = glb.material("robot", [0.6, 0.62, 0.66], 0.8);
     let mut nodes: BTreeMap<&str, (usize, DAffine3)> = BTreeMap::new();
@@ -79,6 +80,9 @@ pub(super) fn links(robot: &Robot, options: &MeshOptions) -> Result<Linked> {
         whole.check_room_for(&mesh)?;
         whole.extend_placed(&mesh, &body_from_link);
     }
+    if !joined.is_empty() {
+        glb.edges(&StoredEdges { joined, ..StoredEdges::default() });
+    }
     let nodes = nodes.into_iter().map(|(name, (node, _))| (name.to_owned(), node)).collect();
     if doubts.is_empty() {
         doubts.extend(doubt("it", whole.size_m(), MAX_LIKELY_ROBOT_M));
@@ -87,6 +91,28 @@ pub(super) fn links(robot: &Robot, options: &MeshOptions) -> Result<Linked> {
     let doubts = doubts.into_iter().map(|doubt| format!("{doubt}, {what_to_do}"));
     let notes = said.into_iter().chain(doubts).collect();
     Ok(Linked { glb, nodes, notes, has_triangles: !whole.triangles.is_empty() })
+}
+
+/// Sets of links that are fixed to each other, of all links in `order`, each with the joint above it. A robot none of whose joints moves
+/// does not say how its links move.
+fn fixed_links(order: &[(&RobotLink, Option<&RobotJoint>)]) -> Vec<Vec<String>> {
+    let motions = || order.iter().filter_map(|(_, joint)| Some(joint.as_ref()?.motion));
+    if motions().all(|motion| matches!(motion, JointMotion::Fixed | JointMotion::Free)) {
+        return Vec::new();
+    }
+    let mut set_of: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut sets: Vec<Vec<String>> = Vec::new();
+    for (link, joint) in order {
+        let fixed = joint.filter(|joint| joint.motion == JointMotion::Fixed);
+        let set = fixed.and_then(|joint| set_of.get(joint.parent.as_str()).copied()).unwrap_or(sets.len());
+        if set == sets.len() {
+            sets.push(Vec::new());
+        }
+        sets[set].push(link.name.clone());
+        set_of.insert(&link.name, set);
+    }
+    sets.retain(|set| set.len() > 1);
+    sets
 }
 
 /// What a body keeps of `joint`, if that moves by one number.

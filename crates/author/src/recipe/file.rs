@@ -43,6 +43,14 @@ struct File {
     place: Vec<Spanned<PlaceKeys>>,
     #[serde(default)]
     fields: Vec<Spanned<FieldRule>>,
+    #[serde(default)]
+    join: Vec<JoinKeys>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JoinKeys {
+    links: Spanned<Globs>,
 }
 
 #[derive(Clone, Copy, Default, Deserialize, PartialEq)]
@@ -209,6 +217,14 @@ fn parse(recipe_text: RecipeText<'_>, folder: &Path) -> Result<Recipe> {
         .map(|rule| {
             let at = recipe_text.origin(rule.span());
             (rule.into_inner(), at)
+        })
+        .collect();
+    recipe.joins = file
+        .join
+        .into_iter()
+        .map(|JoinKeys { links }| {
+            let at = recipe_text.origin(links.span());
+            (links.into_inner(), at)
         })
         .collect();
     Ok(recipe)

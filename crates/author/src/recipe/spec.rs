@@ -53,6 +53,8 @@ pub struct Recipe {
     pub(crate) regions: BTreeMap<String, Region>,
     pub(crate) places: Vec<PlaceSpec>,
     pub(crate) fields: Vec<(FieldRule, Origin)>,
+    /// Links that carry one skin.
+    pub(crate) joins: Vec<(Globs, Origin)>,
     pub(super) seed: u64,
     /// Whether points that were sampled stay where they are, instead of moving until their cells are alike.
     pub(crate) is_scattered: bool,
@@ -211,10 +213,10 @@ impl Recipe {
         Ok(Self { unit: Some((unit.to_owned(), unit_metres(unit)?)), ..self })
     }
 
-    /// Whether it asks for nothing: neither taxels nor fields.
+    /// Whether it asks for nothing: neither taxels nor fields nor joined links.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.places.is_empty() && self.fields.is_empty()
+        self.places.is_empty() && self.fields.is_empty() && self.joins.is_empty()
     }
 
     /// Takes its unit out, m: for a file whose numbers are made metres when it is opened.

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use super::json_edit::{JsonEdit, Span};
 use super::layout::{FIELD_KEY, TAXEL_ID};
 use super::original::{Original, set_length};
-use super::stored_edges::EDGES_KEY;
+use super::stored_edges::{EDGES_KEY, StoredEdges};
 use crate::error::{Result, failed};
 
 /// Prefixes of extensions that do not refer to nodes by number.
@@ -30,13 +30,29 @@ struct OldLayout {
 }
 
 impl Original {
-    /// Removes its fields and the edges between its taxels, and unless `keep_taxels` its taxels.
+    /// Removes its fields and the edges between its taxels, and unless `keep_taxels` its taxels. Links stay joined.
     ///
     /// # Errors
     /// They cannot be removed, because an extension may refer to later nodes by number.
     pub fn clear_layout(&mut self, keep_taxels: bool) -> Result<()> {
-        clear_layout(self, keep_taxels).map_err(|e| e.at(&self.name))
+        let joined = joined_links(&JsonEdit::new(&self.text));
+        clear_layout(self, keep_taxels).map_err(|e| e.at(&self.name))?;
+        if !joined.is_empty() {
+            self.set_edges(&StoredEdges { joined, ..StoredEdges::default() });
+        }
+        Ok(())
     }
+}
+
+/// The sets of links that count as one skin.
+fn joined_links(edit: &JsonEdit<'_>) -> Vec<Vec<String>> {
+    let texts = edit.list("nodes").into_iter().filter_map(|node| {
+        let extras = edit.member(&node, "extras")?;
+        serde_json::from_str::<String>(edit.get(&edit.member(&extras, EDGES_KEY)?)).ok()
+    });
+    let texts: Vec<String> = texts.collect();
+    // What is no JSON of edges has been a finding.
+    StoredEdges::of_nodes(texts.iter()).ok().flatten().map_or_else(Vec::new, |edges| edges.joined)
 }
 
 fn clear_layout(original: &mut Original, keep_taxels: bool) -> Result<()> {

@@ -240,22 +240,6 @@ impl Body {
         self.links.iter().position(|link| link.name == name)
     }
 
-    /// Per link the one nearest to the root of those that are fixed to it: in a body from a URDF, links without a joint that moves are
-    /// fixed to their parents; in others nobody knows.
-    #[doc(hidden)]
-    #[must_use]
-    pub fn rigid_roots(&self) -> Vec<usize> {
-        let mut roots: Vec<usize> = Vec::with_capacity(self.links.len());
-        let mut are_of_urdf: Vec<bool> = Vec::with_capacity(self.links.len());
-        for (index, link) in self.links.iter().enumerate() {
-            // A parent comes before its children.
-            let parent = link.parent.filter(|&parent| are_of_urdf[parent]);
-            are_of_urdf.push(parent.is_some() || link.urdf_up.is_some());
-            roots.push(parent.filter(|_| link.joint.is_none()).map_or(index, |parent| roots[parent]));
-        }
-        roots
-    }
-
     /// The lowest common ancestor of `links`, possibly one of them. `None` for links of separate trees, or no links.
     #[must_use]
     pub fn common_ancestor(&self, links: impl IntoIterator<Item = usize>) -> Option<usize> {

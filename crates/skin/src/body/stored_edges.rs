@@ -19,6 +19,8 @@ pub(super) const EDGES_KEY: &str = "somatic_edges";
 pub struct StoredEdges {
     /// Per taxel id its edges to higher ids; each taxel of the graph is there.
     pub rows: BTreeMap<u32, EdgeRow>,
+    /// Sets of links, by name, that count as one skin, so that edges lead from one to the other where they meet at rest.
+    pub joined: Vec<Vec<String>>,
 }
 
 /// The edges of a taxel to those with higher ids.
@@ -35,6 +37,8 @@ pub struct EdgeRow {
 #[serde(deny_unknown_fields)]
 struct EdgesJson {
     version: u32,
+    #[serde(default)]
+    joined: Vec<Vec<String>>,
     /// Taxel id → `[sum of lengths, higher ids…]`.
     edges: BTreeMap<String, Vec<f64>>,
 }
@@ -65,13 +69,17 @@ impl StoredEdges {
                 return Err(failed!("taxel {id} appears twice"));
             }
         }
-        Ok(Self { rows })
+        Ok(Self { rows, joined: json.joined })
     }
 
     /// The JSON string that [`Self::from_json`] reads back.
     #[doc(hidden)]
     pub fn to_json(&self) -> String {
-        let mut text = format!("{{\"version\":{VERSION},\"edges\":{{");
+        let mut text = format!("{{\"version\":{VERSION},");
+        if !self.joined.is_empty() {
+            let _ = write!(text, "\"joined\":{},", serde_json::Value::from_iter(self.joined.iter().cloned()));
+        }
+        text += "\"edges\":{";
         for (number, (id, row)) in self.rows.iter().enumerate() {
             let separator = if number > 0 { "," } else { "" };
             let _ = write!(text, "{separator}\"{id}\":[{}", row.lengths_m);
@@ -105,6 +113,8 @@ mod tests {
         assert_eq!(edges.rows[&7], EdgeRow { lengths_m: 0.034512, to: vec![8, 300] });
         assert_eq!(edges.to_json(), text);
         assert_eq!(StoredEdges::default().to_json(), r#"{"version":1,"edges":{}}"#);
+        let joined = r#"{"version":1,"joined":[["left \"arm\"","hand"],["a","b","c"]],"edges":{"7":[0]}}"#;
+        assert_eq!(StoredEdges::from_json(joined).unwrap().to_json(), joined);
     }
 
     #[test]

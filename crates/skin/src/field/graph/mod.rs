@@ -1,10 +1,11 @@
 //! The graph of taxels: which of them are neighbours on the skin.
 //!
 //! Its nodes are a body's pressure taxels. Two have an edge if their cells on the surface at rest share a border and the way
-//! along the surface is at most 2 √(the larger cell). Parts of one link's surface that no mesh connects, links that a URDF fixes to
-//! each other, and taxels without a surface get edges by their places: see `points.rs`. Links that may move against each other have
-//! edges between them only where one surface connects them.
+//! along the surface is at most 2 √(the larger cell). Parts of one link's surface that no mesh connects, links that the layout
+//! joins, and taxels without a surface get edges by their places: see `points.rs`. Other links have edges
+//! between them only where one surface connects them.
 
+mod joined;
 mod nodes;
 mod points;
 mod surface;
@@ -35,7 +36,8 @@ impl TaxelGraph {
     /// edges are not current.
     #[must_use]
     pub fn from_body(body: &Body) -> (Self, Option<String>) {
-        match body.edges.as_ref().map(|edges| Self::stored(body, edges)) {
+        let stored = body.edges.as_ref().filter(|edges| !edges.rows.is_empty());
+        match stored.map(|edges| Self::stored(body, edges)) {
             Some(Ok(graph)) => (graph, None),
             Some(Err(why)) => {
                 let note = format!("the edges between taxels in the file are out of date, and made anew: {why}");
@@ -104,7 +106,7 @@ impl TaxelGraph {
     pub fn to_stored(&self, body: &Body) -> StoredEdges {
         let mut rows = self.rows(body);
         rows.values_mut().for_each(|row| row.lengths_m = (row.lengths_m * PARTS_PER_M).round() / PARTS_PER_M);
-        StoredEdges { rows }
+        StoredEdges { rows, joined: body.edges.as_ref().map_or_else(Vec::new, |edges| edges.joined.clone()) }
     }
 
     fn rows(&self, body: &Body) -> BTreeMap<u32, EdgeRow> {

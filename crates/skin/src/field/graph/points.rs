@@ -1,4 +1,4 @@
-//! Edges by places alone, between taxels that no surface connects, of one link or of links fixed to each other.
+//! Edges by places alone, between taxels that no surface connects, of one link or of links that carry one skin.
 //!
 //! Two taxels have an edge if no other is strictly inside the ball that has the line between them as its diameter (Gabriel and
 //! Sokal 1969), if they are at most 2 √(the larger cell) apart, and if their normals are within 90°: those of two faces at a box's

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::joined::skin_of_links;
 use super::nodes::nodes;
 use super::points::{self, LENGTH_PER_ROOT, LinkPoint};
 use crate::body::{Body, Topology, point_tree};
@@ -79,10 +80,10 @@ impl Edges {
     /// All, with those between parts of surfaces.
     fn finish(self, body: &Body) -> Vec<(u32, u32)> {
         let Self { mut found, cells, mut leader } = self;
-        let rigid = body.rigid_roots();
-        let mut by_root: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        nodes(body).for_each(|taxel| by_root.entry(rigid[body.taxels[taxel].link]).or_default().push(taxel));
-        for taxels in by_root.values() {
+        let skins = skin_of_links(body);
+        let mut by_skin: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        nodes(body).for_each(|taxel| by_skin.entry(skins[body.taxels[taxel].link]).or_default().push(taxel));
+        for taxels in by_skin.values() {
             found.extend(between_parts(body, taxels, &cells, &mut leader));
         }
         let shared = leader.iter().filter(|(taxel, leader)| taxel != leader);
@@ -116,7 +117,7 @@ impl Ways<'_> {
     }
 }
 
-/// The edges between `taxels`, of one link or of links fixed to each other, that are on different parts of their surface, or on none.
+/// The edges between `taxels`, of one link or of links that carry one skin, that are on different parts of their surface, or on none.
 /// Those at the place of another get that one as their leader.
 fn between_parts(
     body: &Body,

@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use super::*;
-use crate::body::{Glb, LinkJoint, LinkMotion, MeshData, Modality, Taxel, Up};
+use crate::body::{Glb, MeshData, Modality, Taxel};
 
 const PITCH: f64 = 0.01;
 
@@ -104,40 +104,36 @@ fn shells_of_one_link_are_stitched_and_links_are_not() {
 }
 
 #[test]
-fn links_that_a_urdf_fixes_to_each_other_are_stitched() {
-    // A finger, its tip fixed to it by way of a link without taxels, and a part beyond, each 5 × 5 taxels, one pitch from the next.
-    let pairs_of_links = |joint: Option<LinkJoint>, is_of_urdf: bool| {
+fn links_that_the_layout_joins_are_stitched() {
+    // A finger, its tip beyond a link without taxels, and a part beyond, each 5 × 5 taxels, one pitch from the next.
+    let pairs_of_links = |joined: &[&[&str]]| {
         let mut glb = Glb::new();
         let finger = glb.node("finger", None, DVec3::new(0.3, 0.0, 0.0));
-        if is_of_urdf {
-            glb.urdf_root(finger, Up::Z);
-        }
         let turned = DAffine3::from_rotation_translation(DQuat::from_rotation_z(TAU / 4.0), DVec3::X * 5.0 * PITCH);
         let flange = glb.placed_node("flange", Some(finger), turned);
         let tip = glb.placed_node("tip", Some(flange), DAffine3::from_quat(DQuat::from_rotation_z(-TAU / 4.0)));
         let beyond = glb.node("beyond", Some(tip), DVec3::X * 5.0 * PITCH);
-        if let Some(joint) = &joint {
-            glb.joint(beyond, joint);
-        }
         for (number, (link, name)) in (0..).zip([(finger, "finger skin"), (tip, "tip skin"), (beyond, "skin beyond")]) {
             glb.taxels(name, Some(link), &grid(25 * number, 5, 5, DVec3::ZERO), None);
         }
+        let joined = joined.iter().map(|names| names.iter().map(ToString::to_string).collect()).collect();
+        glb.edges(&StoredEdges { joined, ..StoredEdges::default() });
         let body = Body::from_bytes("body", &glb.to_bytes().unwrap()).unwrap();
-        let graph = TaxelGraph::made(&body);
+        let (graph, note) = TaxelGraph::from_body(&body);
+        assert_eq!(note, None);
         // What is stored is current.
         let stored = Body { edges: Some(graph.to_stored(&body)), ..body.clone() };
         assert_eq!(TaxelGraph::from_body(&stored), (graph.clone(), None));
         let across = pairs(&graph).into_iter().filter(|&(a, b)| a / 25 != b / 25);
-        let rows: BTreeSet<(u32, u32)> = across.map(|(a, b)| (a / 25, b / 25)).collect();
+        let pairs_of_links: BTreeSet<(u32, u32)> = across.map(|(a, b)| (a / 25, b / 25)).collect();
         let is_beside = (0..5).all(|row| graph.neighbours(5 * row + 4).contains(&(25 + 5 * row as u32)));
-        assert_eq!(is_beside, is_of_urdf);
-        rows.into_iter().collect::<Vec<_>>()
+        assert_eq!(is_beside, pairs_of_links.contains(&(0, 1)));
+        pairs_of_links.into_iter().collect::<Vec<_>>()
     };
-    let moves = LinkJoint { name: "j".into(), motion: LinkMotion::Continuous(DVec3::Y), limits: None, mimic: None };
-    assert_eq!(pairs_of_links(Some(moves), true), [(0, 1)]);
-    assert_eq!(pairs_of_links(None, true), [(0, 1), (1, 2)]);
-    // Any node of another file may move.
-    assert_eq!(pairs_of_links(None, false), []);
+    assert_eq!(pairs_of_links(&[]), []);
+    assert_eq!(pairs_of_links(&[&["finger", "tip"]]), [(0, 1)]);
+    assert_eq!(pairs_of_links(&[&["beyond", "flange", "tip"], &["gone"], &[]]), [(1, 2)]);
+    assert_eq!(pairs_of_links(&[&["beyond", "tip"], &["tip", "finger"]]), [(0, 1), (1, 2)]);
 }
 
 /// Two faces whose taxels meet at an edge along y; their normals are `between` apart, and all of it is turned by `turn`.
