@@ -82,8 +82,8 @@ export class Reported extends Observed {
 
   /**
    * The column that says how hard a field is pressed: its force where that is computed and can be known, else the sum of its pressures, else the
-   * highest of them; null where the run computes none of these. Changes make no force. Of another sense what it reads first: the tangential force, the mean
-   * temperature, the least distance.
+   * highest of them; null where the run computes none of these. Changes make no force. Of another sense what it reads first: the
+   * tangential force, the mean temperature, the least distance.
    */
   get loadColumn() {
     if (this.sense !== "pressure") {

@@ -12,6 +12,7 @@ pub mod geodesic;
 mod geodesic_surface;
 mod graph;
 mod lattice;
+mod leaders;
 mod link_surface;
 mod mean_normals;
 mod neighbours;

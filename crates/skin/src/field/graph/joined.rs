@@ -1,17 +1,20 @@
 //! Links that carry one skin, as far as edges go.
 
-use crate::body::Body;
+use std::collections::HashMap;
 
-/// Per link of `body` a number that those links have in common which the layout joins.
+use crate::body::Body;
+use crate::field::leaders::Leaders;
+
+/// Per link of `body` the first of those that the layout joins it with, or itself.
 pub(super) fn skin_of_links(body: &Body) -> Vec<usize> {
-    let mut skins: Vec<usize> = (0..body.links.len()).collect();
-    for names in body.edges.iter().flat_map(|edges| &edges.joined) {
-        let mut links = names.iter().filter_map(|name| body.link_index(name));
-        let Some(first) = links.next().map(|link| skins[link]) else { continue };
-        for link in links {
-            let other = skins[link];
-            skins.iter_mut().filter(|skin| **skin == other).for_each(|skin| *skin = first);
+    let mut skins = Leaders::alone(body.links.len());
+    let joined = body.edges.as_ref().map_or(&[][..], |edges| &edges.joined);
+    if !joined.is_empty() {
+        let index: HashMap<&str, usize> = body.links.iter().map(|link| link.name.as_str()).zip(0..).collect();
+        for names in joined {
+            let links: Vec<usize> = names.iter().filter_map(|name| index.get(name.as_str()).copied()).collect();
+            links.windows(2).for_each(|pair| skins.join(pair[0], pair[1]));
         }
     }
-    skins
+    (0..body.links.len()).map(|link| skins.of(link)).collect()
 }
