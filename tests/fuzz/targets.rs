@@ -382,8 +382,8 @@ pub(super) fn urdf_joints() -> Target {
 pub(super) fn mjcf() -> Target {
     target("mjcf", "a.xml", [seeds::MJCF], |case| {
         // They get fields, charts and edges too.
-        let counts = ["params=\"", "key=\"size\" value=\""];
-        if counts.iter().any(|mark| is_large(&case.text(), &[mark], 2_000)) {
+        let (text, counts) = (case.text(), ["params=\"", "key=\"size\" value=\""]);
+        if counts.iter().any(|mark| is_large(&text, &[mark], 2_000)) || text.matches("<tactile").count() > 500 {
             return Ok(false);
         }
         verdict(author_mjcf_skin(case.path, &MeshOptions::default()))
