@@ -12,7 +12,7 @@ use crate::signal::Frame;
 use crate::source::Lines;
 use crate::source::Source;
 
-/// The longest that frames are gathered: who reads a slow source, as a simulation, sees how far it is.
+/// Frames are gathered for this long at most, so that people see how far a slow source is, such as a simulation.
 const GATHERING: Duration = Duration::from_millis(100);
 
 /// What a source delivers.
@@ -276,8 +276,8 @@ mod tests {
         }
     }
 
-    /// A source of ten frames, each of which takes its time.
-    struct Slow(u32);
+    /// A source of two frames: one that takes long, and one that waits until the first has been seen.
+    struct Slow(u32, Receiver<()>);
 
     impl Source for Slow {
         fn taxels(&self) -> &[u32] {
@@ -285,23 +285,28 @@ mod tests {
         }
 
         fn next_frame(&mut self, frame: &mut Frame) -> crate::error::Result<bool> {
-            thread::sleep(GATHERING / 4);
-            self.0 += 1;
+            match self.0 {
+                0 => thread::sleep(GATHERING),
+                1 => self.1.recv().unwrap(),
+                _ => return Ok(false),
+            }
             *frame = Frame::missing(f64::from(self.0), 1);
-            Ok(self.0 <= 10)
+            self.0 += 1;
+            Ok(true)
         }
     }
 
     #[test]
-    fn frames_of_a_slow_source_are_not_gathered_for_long() {
-        let mut feed = Feed::start(Box::new(Slow(0)), ReadMode { most: 99, gather: true, speed: None });
-        let (mut arrivals, mut times) = (0, Vec::new());
-        while let Some(Arrival::Frames(frames, _)) = feed.next(Duration::from_secs(20)) {
-            arrivals += 1;
-            times.extend(frames.iter().map(|frame| frame.t_s));
-        }
-        assert!(arrivals >= 3, "{arrivals} arrivals");
-        assert_eq!(times, Vec::from_iter((1..=10).map(f64::from)));
+    fn what_a_slow_source_has_read_is_passed_on_before_all_is_there() {
+        let (seen, is_seen) = channel();
+        let mut feed = Feed::start(Box::new(Slow(0, is_seen)), ReadMode { most: 99, gather: true, speed: None });
+        let mut times = || match feed.next(Duration::from_secs(20)) {
+            Some(Arrival::Frames(frames, _)) => frames.iter().map(|frame| frame.t_s).collect::<Vec<_>>(),
+            _ => panic!("no frames"),
+        };
+        assert_eq!(times(), [0.0]);
+        seen.send(()).unwrap();
+        assert_eq!(times(), [1.0]);
     }
 
     /// A source of which nothing comes until it is stopped.

@@ -584,9 +584,8 @@ fn sheet(text: &str, arguments: impl Fn(&str) -> Vec<String>) -> Verdict {
     program::verdict(&[&["author"][..], &arguments].concat())
 }
 
-/// Whether `text` asks for more taxels than are made in a moment without optimisation, which are `from` and more, and not for more than
-/// are allowed: that takes its time, in proportion. The taxels are the product of the numbers after each of `marks`, up to the quote
-/// that ends them, or of all numbers.
+/// Whether `text` asks for at least `from` taxels, which take their time without optimisation, and for no more than are allowed. Their
+/// number is the product of the numbers after each of `marks`, up to the quote that ends them; without marks, of all numbers.
 fn is_large(text: &str, marks: &[&str], from: u64) -> bool {
     let numbers = |text: &str| -> Vec<u64> {
         text.split(|c: char| !c.is_ascii_digit()).filter_map(|digits| digits.parse().ok()).collect()

@@ -121,7 +121,7 @@ fn check(file: &Original, body: &Body, recipe: &Recipe) -> Result<()> {
     Ok(())
 }
 
-/// The names of the links that `recipe` joins, after those that `body` has joined; none if the recipe joins none.
+/// The names of the links of `body` in each `[[join]]` of `recipe`.
 fn joined_links(body: &Body, recipe: &Recipe) -> Result<Vec<Vec<String>>> {
     let names = |(globs, at): &(Globs, Origin)| {
         let names = body.links.iter().map(|link| &link.name).filter(|name| globs.matches(name));
@@ -133,24 +133,21 @@ fn joined_links(body: &Body, recipe: &Recipe) -> Result<Vec<Vec<String>>> {
         };
         Err(at.put(what))
     };
-    let mut joined = Vec::new();
-    if !recipe.joins.is_empty() {
-        joined.extend(body.edges.iter().flat_map(|edges| edges.joined.iter().cloned()));
+    recipe.joins.iter().map(names).collect()
+}
+
+/// Joins further links of `body`. Its edges are out of date then.
+fn join(body: &mut Body, further: Vec<Vec<String>>) {
+    if further.is_empty() {
+        return;
     }
-    for names in recipe.joins.iter().map(names) {
-        let names = names?;
+    let mut joined = body.edges.take().map_or_else(Vec::new, |edges| edges.joined);
+    for names in further {
         if !joined.contains(&names) {
             joined.push(names);
         }
     }
-    Ok(joined)
-}
-
-/// Joins the links of `body` anew, if any are to be `joined`.
-fn join(body: &mut Body, joined: Vec<Vec<String>>) {
-    if !joined.is_empty() {
-        body.edges = Some(StoredEdges { joined, ..StoredEdges::default() });
-    }
+    body.edges = Some(StoredEdges { joined, ..StoredEdges::default() });
 }
 
 /// Writes the edges between the taxels of `body`, which is in `file`, unless the file has current ones. `divided` has all of the

@@ -232,7 +232,7 @@ impl LinkDistances {
         for same in on.values() {
             let tree = point_tree(same.iter().map(|&i| at[i]));
             for &i in same {
-                for (j, length_m) in nearest_on_triangle(&tree, same, &at, i) {
+                for (j, length_m) in nearest_taxels(&tree, same, &at, i) {
                     join(vertices.len() + i, vertices.len() + j, length_m);
                 }
             }
@@ -259,7 +259,7 @@ impl LinkDistances {
 
 /// Up to [`MAX_JOINED_ON_TRIANGLE`] taxels of `same`, which `tree` has, that are nearest to taxel `of`, and how far they are from it, m; of
 /// equally far ones the first. Taxel `i` is at `at[i]`.
-fn nearest_on_triangle(tree: &PointTree, same: &[usize], at: &[DVec3], of: usize) -> Vec<(usize, f64)> {
+fn nearest_taxels(tree: &PointTree, same: &[usize], at: &[DVec3], of: usize) -> Vec<(usize, f64)> {
     let mut nearest: Vec<(usize, f64)> = Vec::new();
     for spot in tree.nearest_neighbor_iter(at[of].to_array()).filter(|spot| same[spot.data] != of) {
         let other = same[spot.data];

@@ -125,8 +125,8 @@ export class PerceptPanel {
     const values = make("table", "explain-values");
     values.append(line("th", ["percept", `${explanation.backend}, reference`, "difference, bound", ""]));
     for (const column of explanation.columns) {
-      const about = welcome.columns.find((c) => c.name === column.name);
-      const unit = unitOf(about, letter, quantity);
+      const shown = welcome.columns.find((c) => c.name === column.name);
+      const unit = unitOf(shown, letter, quantity);
       const { value, reference } = column;
       if (!value && !reference && !column.recorded) continue;
       const apart = value && reference ? Math.hypot(...value.map((x, i) => x - (reference[i] ?? NaN))) : null;

@@ -3,6 +3,7 @@
 import { Observed } from "./dom.js";
 import { withUnit } from "./format.js";
 import { REASONS } from "./reasons.js";
+import { unitOf } from "./senses.js";
 import { IN_WORLD_BIT, isPresent } from "./wire.js";
 
 export class Reported extends Observed {
@@ -100,8 +101,8 @@ export class Reported extends Observed {
   get loadUnit() {
     if (this.sense === "temperature") return "°C";
     if (this.sense === "proximity") return "m";
-    if (this.letter === "change") return `${this.quantity}/s`;
-    return this.loadColumn === "force" ? "N" : "P";
+    const name = this.loadColumn ?? "";
+    return unitOf({ name, unit: name === "force" ? "N" : "P" }, this.letter, this.quantity);
   }
 
   /** The column that is plotted first: how hard fields are pressed, or where that is not computed the run's first output. */

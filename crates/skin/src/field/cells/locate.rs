@@ -6,7 +6,7 @@ use rstar::{AABB, RTree};
 
 use crate::body::Topology;
 
-/// How far around a part its box reaches, as a part of its size: rounding puts points on its sides beyond them.
+/// Boxes reach beyond their parts by this share of their size, as rounding may put a point of a side outside.
 const MARGIN: f64 = 1e-6;
 
 /// The parts of one triangle, found by place: a triangle with thousands of points has tens of thousands of parts.
@@ -35,7 +35,7 @@ impl<'a> Located<'a> {
             depths.max_by(|(a, first), (b, second)| a.total_cmp(b).then(first.cmp(second))).map(|(_, part)| part)
         };
         let here = AABB::from_point(p.to_array());
-        // Beyond all of them by rounding, the nearest is as good.
+        // If rounding puts it outside of all of them, it is the least outside of one.
         deepest(&mut self.tree.locate_in_envelope_intersecting(here).map(|boxed| boxed.data))
             .or_else(|| deepest(&mut self.parts.iter().copied()))
     }

@@ -2,8 +2,8 @@
 //!
 //! Its nodes are a body's pressure taxels. Two have an edge if their cells on the surface at rest share a border and the way
 //! along the surface is at most 2 √(the larger cell). Parts of one link's surface that no mesh connects, links that the layout
-//! joins, and taxels without a surface get edges by their places: see `points.rs`. Other links have edges
-//! between them only where one surface connects them.
+//! joins, and taxels without a surface get edges by their places: see `points.rs`. Other links have edges between them only where one
+//! surface connects them.
 
 mod joined;
 mod nodes;

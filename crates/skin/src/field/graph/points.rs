@@ -17,7 +17,7 @@ pub(super) const LENGTH_PER_ROOT: f64 = 2.0;
 /// cos 90°, with a tolerance for normals that a file has in single precision.
 const MIN_NORMAL_COSINE: f64 = -1e-6;
 
-/// A taxel, in the frame of one link for all of them.
+/// A taxel. All that are compared are in the frame of one link.
 pub(super) struct LinkPoint {
     /// Its index in the body.
     pub(super) taxel: u32,
